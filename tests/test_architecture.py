@@ -30,7 +30,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "units": {"errors"},
     "outputs": {"errors", "_version"},  # files of any content
     "parameters": {"errors", "units"},  # knows no laws: it reads the fields that they declare
-    "questions": _BASE,  # knows nothing of how they are answered
+    "questions": _BASE | {"loads"},  # knows nothing of how they are answered
     "algebra": {"_jax"},
     "laws": _BASE,  # knows no springs, no loads, no numbers of any paper
     "loads": _BASE,  # knows no laws
@@ -47,13 +47,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "tribometer": _BASE | {"recording"},  # is handed a trajectory
     "inference": _EQUATIONS | _SIGNALS | {"materials", "orbit", "transients", "questions"},
     "experiment": _RESULTS,
-    "operating_point": _EQUATIONS | {"algebra", "materials", "orbit"},  # numbers by name
+    "operating_point": _EQUATIONS | {"algebra", "materials", "orbit", "questions"},
     "protocol": _RESULTS | {"experiment", "operating_point"},
     "samples": _BASE | {"operating_point", "protocol", "recording"},
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
-    "ledger": _BASE | {"materials", "figures"},  # knows no paper: papers are users of the library
+    "ledger": _BASE | {"materials", "figures", "questions"},  # knows no paper
     "app": _RESULTS
     | _STUDIES
     | {"inference", "figures", "operating_point", "ledger", "fit_report"},

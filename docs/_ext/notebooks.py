@@ -1,43 +1,66 @@
-"""Tutorials as notebooks: text and Python of a page, written next to it, with a link at its end."""
+"""Tutorials as executed notebooks, written next to their pages, with a link at the end of each.
+
+Nothing runs while the pages are built: what a block prints stands on the page, where the tests of
+the pages compare it with what it prints, and pictures are those of the page.
+"""
 
 import json
 import re
+from base64 import b64encode
 from pathlib import Path
 
-_BLOCK = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```\s*$", re.M | re.S)
+_BLOCK = re.compile(r"^```(\S*) *([^\n]*)\n(.*?)^```\s*$", re.M | re.S)
 _ROLE = re.compile(r"\{doc\}`(?:\.\./)?([^`<]+)`")
 
 
-def cells(source: str) -> list[dict]:
-    """Cells of a notebook: a page's text, and each of its ``python`` blocks.
+def cells(source: str, folder: Path) -> list[dict]:
+    """Cells of a notebook: a page's text and pictures, and each of its ``python`` blocks.
 
-    What a block prints is left out, as it comes when the notebook runs; commands are for a
-    terminal, and stay as text.
+    The ``text`` block behind one is its output; commands are for a terminal, and stay as text.
+
+    Parameters
+    ----------
+    source : str
+    folder : Path
+        That of the page, which pictures are relative to.
     """
     made: list[dict] = []
     text: list[str] = []
+    pictures: dict[str, dict[str, str]] = {}
 
     def close() -> None:
         whole = _ROLE.sub(r"`\1`", "".join(text)).strip()
         text.clear()
         if whole:
             made.append(cell("markdown", whole))
+            if pictures:
+                made[-1]["attachments"] = dict(pictures)
+                pictures.clear()
 
-    end, ran = 0, False
+    end, ran, count = 0, False, 0
     for block in _BLOCK.finditer(source):
         between = source[end : block.start()]
         if between.strip():
             ran = False
         text.append(between)
-        kind, body = block[1], block[2]
+        kind, body = block[1], block[3]
         if kind == "python":
             close()
-            made.append(cell("code", body.rstrip("\n")))
+            count += 1
+            made.append(cell("code", body.rstrip("\n"), count))
             ran = True
+        elif kind == "text" and ran:
+            lines = body.splitlines(keepends=True)
+            made[-1]["outputs"] = [{"name": "stdout", "output_type": "stream", "text": lines}]
+        elif kind == "{image}":
+            file = folder / block[2]
+            pictures[file.name] = {"image/png": b64encode(file.read_bytes()).decode()}
+            said = re.search(r":alt: (.*)", body)
+            text.append(f"![{said[1] if said else ''}](attachment:{file.name})\n")
         elif kind == "console":
             commands = [line for line in body.splitlines() if line.startswith(("$ ", "    "))]
             text.append("```\n" + "\n".join(commands) + "\n```\n")
-        elif kind.startswith("{") or (kind == "text" and ran):
+        elif kind.startswith("{"):
             pass
         else:
             text.append(block[0])
@@ -47,21 +70,26 @@ def cells(source: str) -> list[dict]:
     return made
 
 
-def cell(kind: str, source: str) -> dict:
-    """A cell in the format of Jupyter, version 4.4."""
+def cell(kind: str, source: str, count: int | None = None) -> dict:
+    """A cell in the format of Jupyter, version 4.4; of code with its number."""
     content = {"cell_type": kind, "metadata": {}, "source": source.splitlines(keepends=True)}
     if kind == "code":
-        content |= {"execution_count": None, "outputs": []}
+        content |= {"execution_count": count, "outputs": []}
     return content
 
 
-def notebook(source: str) -> str:
-    """A page as a notebook, JSON."""
+def notebook(source: str, folder: Path) -> str:
+    """A page of a folder as a notebook, JSON."""
     about = {
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
         "language_info": {"name": "python"},
     }
-    content = {"cells": cells(source), "metadata": about, "nbformat": 4, "nbformat_minor": 4}
+    content = {
+        "cells": cells(source, folder),
+        "metadata": about,
+        "nbformat": 4,
+        "nbformat_minor": 4,
+    }
     return json.dumps(content, indent=1)
 
 
@@ -83,7 +111,7 @@ def write(app, error: Exception | None) -> None:
         return
     for name, source in getattr(app.env, "tutorial_sources", {}).items():
         target = Path(app.outdir) / "tutorials" / name
-        target.write_text(notebook(source), encoding="utf-8")
+        target.write_text(notebook(source, Path(app.srcdir) / "tutorials"), encoding="utf-8")
 
 
 def setup(app) -> dict:

@@ -46,6 +46,22 @@ def velocity_step() -> Figure:
     return asp.inference.fit(run, "rice-ruina", ["A", "B", "D0"]).plot()
 
 
+def of_python() -> dict[str, Figure]:
+    """Pictures of docs/tutorials/python.md."""
+    law = asp.laws.get_law("rice-ruina")(mu0=0.6, A=0.009, B=0.0125, D0="8 um", V0="1 um/s")
+    slider = asp.Slider(law, spring="20 N/um", load="10 kN")
+    epsilon = np.linspace(0.05, 0.4, 8)
+    soft = asp.Slider(law, spring="2 N/um", load="10 kN", mass="10 kg")
+    response = asp.periodic_response(slider, velocity="1 um/s", epsilon=epsilon, frequency="1 Hz")
+    return {
+        "measured-steps.png": asp.measure(asp.samples.velocity_steps()).plot(),
+        "periodic-response.png": response.plot(),
+        "stick-slip-response.png": asp.experiment.stick_slip_response(
+            soft, velocity=np.geomspace(1e-6, 1e-2, 5)
+        ).plot(),
+    }
+
+
 def stick_slip() -> Figure:
     """Slip events of the sample recording (docs/stick_slip.md)."""
     result = asp.measure(asp.samples.stick_slip(), stiffness="0.05 N/um", velocity="100 um/s")
@@ -68,6 +84,8 @@ def main() -> None:
         save(vibration(), "vibration.png")
         save(stick_slip(), "stick-slip.png")
         save(velocity_step(), "velocity-step.png")
+        for name, figure in of_python().items():
+            save(figure, name)
 
 
 if __name__ == "__main__":

@@ -159,6 +159,34 @@ class MistakesError(InputError):
         return f"{self.subject} must be free of mistakes, got {len(self.errors)}{where}: {numbered}"
 
 
+@contextmanager
+def code_of_others(
+    field: str, rule: str = "be code that runs", advice: str = "correct it", where: str = ""
+) -> Iterator[None]:
+    """Run code that a user or another package has written; it may raise anything.
+
+    Parameters
+    ----------
+    field, rule, advice : str
+        As of `InputError`.
+    where : str
+        Place of the code, where `field` does not name it.
+
+    Raises
+    ------
+    InputError
+        In the place of any other exception, with its type and text.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        text = printable(" ".join(str(error).split()), 200)
+        got = f"{type(error).__name__} ({text})" + (f" from {where}" if where else "")
+        raise InputError(field, rule, got, advice) from error
+
+
 def closest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean 'x'?`` for the nearest known name, or the list of known names.
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from asperity.errors import Argument, InputError
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulated import lowest_load, modulated
+from asperity.materials import load_from
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import (
     MODULATION,
@@ -31,6 +32,7 @@ from asperity.slider.named import slider_from
 
 if TYPE_CHECKING:
     from asperity.materials import Material
+    from asperity.questions.point import Point
 
 
 @dataclass(frozen=True)
@@ -146,8 +148,10 @@ def numbers_for(
         name, example = missing[0], known[missing[0]].example
         like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
         raise InputError(
-            f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
-            f"name a material that has them or give each one, like {like}"
+            law_name,
+            "have all its numbers",
+            f"none for {', '.join(missing)}",
+            f"name a material that has them or give each one, like {like}",
         )
     return {name: numbers[name] for name in known if name in numbers}
 
@@ -161,9 +165,61 @@ def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:
         ]
         if canonical_name(name, own) is None and owners:
             raise InputError(
-                f"{law_name} must be given its own parameters, got '{name}', which belongs to "
-                f"{', '.join(owners)}; leave it out or choose another law"
+                law_name,
+                "be given its own parameters",
+                f"'{name}', which belongs to {', '.join(owners)}",
+                "leave it out or choose another law",
             )
+
+
+def point_numbers(
+    point: Point,
+    origin: str = "given",
+    among: Mapping[str, Parameter] | None = None,
+    needed: tuple[str, ...] = (),
+    place: str = "",
+) -> dict[str, SourcedNumber]:
+    """All numbers of a point in SI, with their sources.
+
+    Parameters
+    ----------
+    point : Point
+    origin : str
+        Name of the source of `point.parameters`.
+    among, needed
+        As of `numbers_for`.
+    place : str
+        As of `sourced_numbers`; with one, other parameters than those of `among` are refused.
+
+    Raises
+    ------
+    InputError
+        If law or material are unknown, a name belongs to other laws or to nothing, or a number is
+        missing or breaks its rule.
+    """
+    offered = offered_numbers(point, origin, among, place)
+    return numbers_for(point.law, offered, among, needed, place)
+
+
+def offered_numbers(
+    point: Point,
+    origin: str = "given",
+    among: Mapping[str, Parameter] | None = None,
+    place: str = "",
+) -> dict[str, SourcedNumber]:
+    """Numbers of a point of which some come from elsewhere; arguments as of `point_numbers`."""
+    if not point.law:
+        advice = f"choose one of {', '.join(sorted(registered()))}"
+        raise InputError("law", "be given", "nothing", advice)
+    refuse_foreign(point.law, point.parameters)
+    for name in point.parameters if place and among is not None else ():
+        known_name(name, among or {}, f"{place}.{name}")
+    return sourced_numbers(point.parameters, material_of(point), origin, point.law, place)
+
+
+def material_of(point: Point) -> Material | None:
+    """The material that a point names, if any."""
+    return load_from(point.folder, point.material) if point.material else None
 
 
 def respond(

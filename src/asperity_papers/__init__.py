@@ -1,1 +1,1 @@
-"""Published papers, reproduced with `asperity`: one folder each, found by its entry point."""
+"""Published papers, reproduced with `asperity`: one folder each, registered by its entry point."""

@@ -96,6 +96,18 @@ def raw(server):
 
 
 @pytest.fixture
+def barriers():
+    """What axe finds on a page that was opened with ``bypass_csp``: axe is a script in the page."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+
+    def of(page):
+        violations = axe.Axe().run(page).response["violations"]
+        return [(v["help"], [node["html"] for node in v["nodes"]]) for v in violations]
+
+    return of
+
+
+@pytest.fixture
 def visit(chromium, server):
     """Open a view of the page; a request to anywhere else, or a script that fails, is an error."""
     opened, fetched, failed = [], [], []

@@ -428,10 +428,12 @@ def test_a_wrong_fit_gets_a_sentence(ask, changed, word):
     assert " must " in error
 
 
-def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modulated, tmp_path):
+def test_a_recording_is_dropped_measured_and_restored_from_its_link(
+    visit, barriers, modulated, tmp_path
+):
     (tmp_path / "good.csv").write_bytes(modulated)
     (tmp_path / "bad.csv").write_bytes(b"PK\x03\x04" + b"\0" * 500)
-    page = visit("#data")
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files("#data-files", [tmp_path / "bad.csv", tmp_path / "good.csv"])
     good, bad = (
@@ -441,6 +443,7 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     bad.locator(".message", has_text="must").wait_for()
     good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
     assert good.locator("figure").count() == 4
+    assert barriers(page) == []
     page.get_by_role("button", name="Remove bad.csv").click()
     page.wait_for_url(lambda url: "good.csv" in url and "bad.csv" not in url)
     again = visit(page.url.split("/")[-1])
@@ -451,8 +454,10 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     good.locator(".message", has_text="must").wait_for()
 
 
-def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, sawtooth, tmp_path):
-    page = visit("#data")
+def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(
+    visit, barriers, sawtooth, tmp_path
+):
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files(
         "#data-files", [{"name": "events.csv", "mimeType": "text/csv", "buffer": sawtooth}]
@@ -462,6 +467,7 @@ def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, saw
     count = int(sentence.inner_text().split(": ")[1].split()[0])
     table = page.get_by_role("region", name="Catalogue of events")
     assert table.locator("tbody tr").count() == count
+    assert barriers(page) == []
     assert page.locator(".panel.drops .plot .point").count() == count - 1
     with page.expect_download() as waited:
         page.get_by_role("button", name="Catalogue as CSV").click()
@@ -476,8 +482,8 @@ def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, saw
     page.mouse.down()
     page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 60, steps=4)
     page.mouse.up()
-    page.get_by_role("button", name="Measure the whole recording again").wait_for()
-    begin, end = (float(t) for t in page.get_by_label("Window (s)").input_value().split(" to "))
+    page.get_by_role("button", name="Measure the whole recording").wait_for()
+    begin, end = map(float, page.get_by_label("Window (s)").input_value().split(":"))
     assert 0 < begin < end < 30
     onsets = page.locator(".catalogue tbody td:nth-child(2)").all_inner_texts()
     assert len(onsets) < count
@@ -585,20 +591,20 @@ def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, wo
     assert "0123" not in str(refused.value)
 
 
-def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, stepped):
-    page = visit("#data")
+def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, barriers, stepped):
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files(
         "#data-files",
         [{"name": "steps.csv", "mimeType": "text/csv", "buffer": stepped}],
     )
-    page.get_by_label("Fit the recording as a whole").wait_for()
+    page.get_by_label("Fit the whole recording").wait_for()
     form = page.locator(".fit-form")
     for label, on in (("elasto-plastic", False), ("rice-ruina", True)):
         form.get_by_label(label, exact=True).set_checked(on)
     for label in ("eps_ratio", "A", "B", "D0"):
         form.get_by_label(label, exact=True).set_checked(label != "eps_ratio")
-    form.get_by_label("Means a second of long recordings").fill("full")
+    form.get_by_label("Mean values per second for long recordings").fill("full")
     form.get_by_label("Intervals by profile likelihood").check()
     fit = page.locator("section.fit")
     fit.get_by_role("button", name="Fit", exact=True).click()
@@ -617,6 +623,20 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     assert found["A"] - found["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
     assert fit.locator(".panel.run-1 svg path.line").count() == 3
     assert not fit.get_by_role("button", name="Cancel").is_visible()
+    # The numbers of the fit are moved by hand, and the link restores them.
+    page.locator("summary", has_text="by hand").click()
+    page.locator(".by-hand .plot svg").wait_for()
+    assert barriers(page) == []
+    field = page.locator(".by-hand").get_by_label("memory length, with its unit")
+    field.fill("0.5 um")
+    field.press("Enter")
+    page.wait_for_url(lambda url: "5e-7" in url)
+    again = visit("#" + page.url.split("#", 1)[1])
+    again.locator(".by-hand .plot svg").wait_for()
+    values = "(all) => all.map((e) => e.type === 'checkbox' ? e.checked : e.value)"
+    controls = ".fit-form :is(input, select, textarea), .by-hand input"
+    first, second = (p.locator(controls).evaluate_all(values) for p in (page, again))
+    assert first == second
 
 
 def number(text):

@@ -10,6 +10,7 @@ from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.laws import RiceRuina
 from asperity.parameters import DRIVE, MACHINE, law_parameters
+from asperity.protocol import load_protocol
 from asperity.study import load_plan, run_sweep
 from asperity.units import KINDS
 
@@ -93,6 +94,30 @@ def test_a_number_of_a_point(ask, tmp_path, name, value):
     ends = {text.removeprefix(f"{field} must ") for field, text in said.items()}
     assert all(text.startswith(f"{field} must ") for field, text in said.items()), said
     assert len(ends) == 1, said
+
+
+@pytest.mark.parametrize(
+    ("field", "name"), [("law", "rice"), ("law", "a b"), ("material", "bureau1999")]
+)
+def test_an_unknown_name(ask, tmp_path, field, name):
+    point = {"law": "rice-ruina", "material": "bureau2000", field: name}
+    options = [text for n, value in point.items() for text in (f"--{n}", value)]
+    axes = ("--x", "V=1:2:3 m/s", "--y", "K=1:2:3 N/m", "--out", str(tmp_path / "map.nc"))
+    path = tmp_path / "protocol.toml"
+    fields = "".join(f"{n} = '{value}'\n" for n, value in point.items())
+    path.write_text(fields + "steps = ['slide for 1 s']\n[start]\nvelocity = '1 um/s'\n")
+    said = [
+        command("response", *options).removeprefix("--"),
+        command("map", *options, *axes).removeprefix("--"),
+        sentence(load_protocol, path),
+    ]
+    if field == "law":
+        page = ask("explore", {"law": name, "numbers": POINT, "laws": []})
+        said += [page.json["error"], sentence(asp.laws.get_law, name)]
+    else:  # the page has the materials of the package only
+        said.append(sentence(asp.materials.load, name))
+    assert set(said) == {said[0]}
+    assert said[0].startswith(f"{field} must be a ")
 
 
 #: By field of a measurement: the option, the label of the page, and values that it may not have.

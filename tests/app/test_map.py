@@ -23,8 +23,8 @@ def test_the_grid_is_that_of_the_package(ask):
     grid = grid["grid"]
     text = ask("map/text", ASKED).json["python"]
     namespace = {}
-    exec(text.replace('print(found["growth_rate"])', ""), namespace)
-    found = namespace["found"]
+    exec(text.replace('print(result["growth_rate"])', ""), namespace)
+    found = namespace["result"]
     # The page's numbers have five digits.
     assert np.array(grid["values"]) == pytest.approx(found["growth_rate"].values, rel=1e-4)
     assert np.array_equal(np.array(grid["stable"], dtype=bool), found["stable"].values)

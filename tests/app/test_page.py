@@ -1,6 +1,8 @@
 """The page as a whole: accessibility, widths, keyboard, links, copies, printing."""
 
 import json
+import re
+import shlex
 import subprocess
 import sys
 from urllib.parse import parse_qs
@@ -14,6 +16,7 @@ VIEW = {
     "explore": "#explore?law=rice-ruina&laws=&epsilon=0.1",
     "map": "#map?count=16",
     "data": "#data?run=modulation",
+    "paper": "#paper?figure=figure-10",
 }
 
 
@@ -23,14 +26,12 @@ def opened(visit, tab, **options):
     return page
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
 @pytest.mark.parametrize("tab", TABS)
-def test_no_barrier_that_axe_knows_of(visit, tab, scheme):
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    # The checks are a script that is put into the page, which the page's own policy forbids.
-    page = opened(visit, tab, color_scheme=scheme, bypass_csp=True)
-    found = axe.Axe().run(page)
-    assert found.response["violations"] == [], found.generate_report()
+def test_no_barrier_that_axe_knows_of(visit, barriers, tab, scheme, width):
+    page = opened(visit, tab, width=width, color_scheme=scheme, bypass_csp=True)
+    page.locator(f"section.tab.{tab} :is(.plot svg, .fine)").first.wait_for()
+    assert barriers(page) == []
 
 
 @pytest.mark.parametrize("width", [375, 800, 1440])
@@ -108,27 +109,31 @@ def test_a_foreign_text_in_the_link_is_a_text(visit):
     assert page.locator("main img, main script, main b").count() == 0
 
 
-def test_the_copied_python_gives_the_same_numbers(explored):
+@pytest.fixture
+def copied(ask, explored):
+    """An operating point with an air layer: its answer, and its Python and command."""
     numbers = {"V": 2e-6, "epsilon": 0.2, "frequency": "90 Hz", "A": 0.012, "K": 3e5}
-    answer = explored({"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}})
+    question = {"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}}
+    return explored(question)["point"], ask("explore/text", question).json
+
+
+def test_the_copied_python_gives_the_same_numbers(copied):
+    point, texts = copied
     namespace = {}
-    exec(answer["python"].replace("print(response)", ""), namespace)
-    found = namespace["response"]
+    exec(texts["python"].replace("print(response)", ""), namespace)
     for name in ("mean_friction", "mu1", "mu2", "phase1"):
-        assert float(getattr(found, name)) == pytest.approx(answer["point"][name], rel=1e-9)
+        value = float(getattr(namespace["response"], name))
+        assert value == pytest.approx(point[name], rel=1e-9)
 
 
-def test_the_copied_command_gives_the_same_numbers(explored):
-    import shlex
-
+def test_the_copied_command_gives_the_same_numbers(copied):
     from click.testing import CliRunner
 
-    numbers = {"V": 2e-6, "epsilon": 0.2, "frequency": "90 Hz", "A": 0.012, "K": 3e5}
-    answer = explored({"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}})
-    arguments = shlex.split(answer["command"])[1:]
-    result = CliRunner().invoke(main, [*arguments, "--json"]).stdout
+    point, texts = copied
+    arguments = shlex.split(texts["command"])[1:]
+    result = json.loads(CliRunner().invoke(main, [*arguments, "--json"]).stdout)
     for name in ("mean_friction", "mu1", "mu2", "phase1"):
-        assert json.loads(result)[name] == pytest.approx(answer["point"][name], rel=1e-9)
+        assert result[name] == pytest.approx(point[name], rel=1e-9)
 
 
 def test_figures_are_saved_as_svg_png_and_csv(visit, tmp_path):
@@ -231,13 +236,50 @@ def test_without_the_extra_there_is_a_sentence(monkeypatch):
     assert "pip install 'asperity[app]' in an environment" in result.stderr
 
 
-def test_the_link_of_a_view_restores_it(visit):
-    page = opened(visit, "explore")
-    page.get_by_label("pulling velocity, with its unit").fill("3 um/s")
-    page.keyboard.press("Enter")
-    page.wait_for_timeout(2000)
-    query = parse_qs(page.url.split("?", 1)[1])
-    assert float(query["V"][0]) == 3e-6
-    again = visit("#" + page.url.split("#", 1)[1])
-    field = again.get_by_label("pulling velocity, with its unit")
-    assert field.input_value() == "3 µm/s"
+#: Scenes: a tab, and what its link holds.
+SCENES = {
+    "explore": "law=linker-dieterich&laws=rice-ruina,nagata&V=0.000003&epsilon=0.2"
+    "&air=1&air.h0=0.000009&K=300000&alpha=0.3&show=phases&names=geophysics&letters=large",
+    "map": "law=rice-ruina&count=16&show=mu1&x=V,1e-7,0.00001,log&y=epsilon,0.01,0.3,linear"
+    "&inertia=1&M=2&names=geophysics",
+    "paper": "figure=figure-08&K=300000&names=friction",
+    "data": "run=hold_step_modulate&names=geophysics",
+}
+
+#: Tab, values of all controls that are filled, and pressed buttons, as a person sees them.
+SEEN = """() => [
+  document.title, document.documentElement.className,
+  ...[...document.querySelectorAll("main :is(input, select, textarea)")].map((e) =>
+    [e.ariaLabel || e.labels[0]?.innerText, e.type === "checkbox" ? e.checked : e.value]),
+  ...[...document.querySelectorAll("[aria-pressed=true], details[open] > summary, #names")]
+    .map((e) => e.innerText)]"""
+#: Curves, points and labels of all figures.
+DRAWN = """() => [...document.querySelectorAll("main .panel:not([hidden]) .plot svg")].map((e) =>
+  [e.closest(".panel").className, [...e.querySelectorAll(".line, .point, .bar, text, image")].map(
+    (m) => [m.getAttribute("d") || m.getAttribute("cy") || m.getAttribute("href") || m.innerHTML])])
+"""
+
+
+#: Words that the page shows while it computes.
+BUSY = re.compile("…|so far|Integrating|Compiling|finer grid")
+
+
+def settled(page, tab):
+    """What the page shows once nothing is computed any more."""
+    page.locator(f"section.tab.{tab} :is(.plot svg, .fine)").last.wait_for()
+    seen, before = page.evaluate(DRAWN), None
+    while seen != before or BUSY.search(page.locator("main").inner_text()):
+        page.wait_for_timeout(1000)
+        seen, before = page.evaluate(DRAWN), seen
+    return page.evaluate(SEEN), seen
+
+
+@pytest.mark.parametrize("tab", SCENES)
+def test_the_link_of_a_scene_restores_it(visit, tab):
+    page = visit(f"#{tab}?{SCENES[tab]}")
+    controls, figures = settled(page, tab)
+    address = page.url.split("#", 1)[1]
+    query = parse_qs(address.split("?", 1)[1])
+    assert {n: query.get(n) for n in parse_qs(SCENES[tab])} == parse_qs(SCENES[tab])
+    again = visit("#" + address)
+    assert settled(again, tab) == (controls, figures)

@@ -178,7 +178,7 @@ def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
     assert float(line.split()[1]) == pytest.approx(over["value"], abs=over["se"] / 10)
     assert len(line.split()[1]) < 10
     assert line.rstrip().endswith("1/um")
-    assert "chi-squared judges nothing" in shown.output
+    assert "chi-squared does not judge the law" in shown.output
 
 
 @pytest.mark.parametrize(

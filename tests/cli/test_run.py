@@ -42,9 +42,11 @@ def protocol(tmp_path) -> Path:
 
 def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
     out = tmp_path / "run.nc"
-    result = asperity("run", protocol, "--out", out, "--csv", "--plot", "--json")
+    result = asperity(
+        "run", protocol, "--out", out, "--csv", "--plot", out.with_suffix(".png"), "--json"
+    )
     assert result.exit_code == 0, result.output
-    assert result.stderr.startswith("asperity: writing 1001 rows, about 206 kB, to ")
+    assert result.stderr.startswith("asperity: writing 1001 rows, about 214 kB, to ")
     assert result.stderr.count("\n") == 1
     summary = json.loads(result.stdout)
     assert summary == {
@@ -192,7 +194,15 @@ def test_every_output_is_checked_before_the_run(
 ) -> None:
     protocol.write_text(PROTOCOL + _TRIBOMETER)
     make(tmp_path / blocked)
-    outputs = ("--out", tmp_path / "run.nc", "--csv", "--plot", "--record", tmp_path / "rec.csv")
+    outputs = (
+        "--out",
+        tmp_path / "run.nc",
+        "--csv",
+        "--plot",
+        tmp_path / "run.png",
+        "--record",
+        tmp_path / "rec.csv",
+    )
     result = asperity("run", protocol, *outputs)
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1

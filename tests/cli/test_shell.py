@@ -1,5 +1,6 @@
 """The command itself: what it costs, how it helps, how it leaves."""
 
+import importlib
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 
 import asperity.cli.response
 from asperity import __version__
+from asperity.cli.main import main
 from asperity.cli.shell import Shell
 
 HEAVY = ("jax", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
@@ -55,7 +57,7 @@ def test_a_mistake_in_a_real_process_is_one_line_and_exit_2() -> None:
     done = python("-m", "asperity", "response", "--law", "elasto-plastc")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "asperity: law must be a registered law, got 'elasto-plastc'; "
+        "asperity: --law must be a registered law, got 'elasto-plastc'; "
         "did you mean 'elasto-plastic'?\n"
     )
 
@@ -74,6 +76,19 @@ def test_every_command_has_help_with_an_example(asperity, command: str) -> None:
     shown = asperity(command, "--help")
     assert shown.exit_code == 0
     assert f"asperity {command}" in shown.stdout.split("Example")[-1]
+
+
+@pytest.mark.parametrize("command", sorted(main.modules))
+def test_options_come_in_one_order(command: str) -> None:
+    """What a first look needs comes first, in every command alike."""
+    module = importlib.import_module(main.modules[command])
+    listed = [p.opts[-1] for p in getattr(module, command).params]
+    order = ["--plot", "--names", "--json", "--window", "--resume"]
+    shared = [option for option in listed if option in order]
+    assert shared == [option for option in order if option in shared]
+    if command in ("compare", "fit", "map", "response"):
+        assert listed.index("--law") < listed.index("--plot")
+    assert ("--plot" in listed) == ("--names" in listed)
 
 
 def test_an_unknown_command_names_the_nearest(asperity) -> None:

@@ -1,5 +1,6 @@
 """Nothing that a user can name is missing from the documentation, and its parts fit together."""
 
+import base64
 import dataclasses
 import importlib
 import json
@@ -197,7 +198,7 @@ def test_formulas_become_mathml_and_unknown_commands_are_told(extension, caplog)
 
 def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None:
     page = PAGES["tutorials/vibration.md"]
-    made = json.loads(extension("notebooks").notebook(page))
+    made = json.loads(extension("notebooks").notebook(page, DOCS / "tutorials"))
     assert (made["nbformat"], {c["cell_type"] for c in made["cells"]}) == (4, {"code", "markdown"})
     code_cells = ["".join(c["source"]) for c in made["cells"] if c["cell_type"] == "code"]
     assert code_cells == [
@@ -206,7 +207,22 @@ def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None
     text = "\n".join("".join(c["source"]) for c in made["cells"] if c["cell_type"] == "markdown")
     assert "# Lowering friction by vibration" in text
     assert "asperity measure recording.csv" in text
-    assert "35.2 %" not in text  # what a block prints comes when it runs
+    # What a block prints, which tests compare with the page, is the output of its cell.
+    assert "35.2 %" not in text
+    (first, *_) = [c for c in made["cells"] if c["cell_type"] == "code"]
+    assert "35.2 %" in "".join(first["outputs"][0]["text"])
+    attached = [c["attachments"] for c in made["cells"] if "attachments" in c]
+    picture = base64.b64decode(attached[0]["vibration.png"]["image/png"])
+    assert picture == (DOCS / "images" / "vibration.png").read_bytes()
+
+
+def test_the_gallery_shows_every_tutorial() -> None:
+    gallery = PAGES["tutorials/gallery.md"]
+    for name, text in PAGES.items():
+        if name.startswith("tutorials/") and name != "tutorials/gallery.md":
+            page = name.removeprefix("tutorials/").removesuffix(".md")
+            assert f"{{doc}}`{page}`" in gallery
+            assert (f'href="{page}.ipynb"' in gallery) == ("```python" in text)
 
 
 def test_outside_the_repository_the_readme_has_no_links_into_it() -> None:

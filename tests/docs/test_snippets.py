@@ -25,6 +25,7 @@ ROOT = pages.ROOT
 #: Pages whose code takes more than about ten seconds; tests of fits have the same recording as the
 #: tutorial on velocity steps.
 SLOW = {
+    "docs/tutorials/python.md",
     "docs/tutorials/velocity_step.md",
     *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
     "docs/healing.md",

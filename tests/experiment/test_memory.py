@@ -84,7 +84,7 @@ def test_a_spring_below_the_critical_stiffness_runs_away():
 
 def test_a_long_hold_may_run_away_above_the_critical_stiffness():
     """Slip law and PRZ, not ageing: a large disturbance weakens them without bound."""
-    for name, expected in zip(LAWS, ("comes back", "runs away", "runs away"), strict=True):
+    for name, expected in zip(LAWS, ("comes back", "accelerates", "accelerates"), strict=True):
         done = hold_response(law(name), hold_time=1e6, velocity=1e-6, stiffness=2e3)
         assert done.stable
         assert str(done.result).startswith(expected)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from asperity.errors import InputError
-from asperity.laws import discovery, get_law, known_law, registered, registry
+from asperity.laws import get_law, known_law, registered, registry
 
 LAW = """
 import jax.numpy as jnp
@@ -24,9 +24,9 @@ number = 3
 def a_registry_of_its_own(monkeypatch):
     """What a test makes known is forgotten after it."""
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
-    discovery.installed.cache_clear()
+    registry.installed.cache_clear()
     yield
-    discovery.installed.cache_clear()
+    registry.installed.cache_clear()
 
 
 @pytest.fixture

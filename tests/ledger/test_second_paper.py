@@ -87,8 +87,8 @@ def test_the_page_of_the_browser_has_the_second_paper_by_its_name(installed):
         ('claims = ["frequency"]', 'claims = ["mass"]', "must name claims of the file, got 'mass'"),
         ('found = "{frequency}."', 'found = "{mass}."', "found must name claims .*got 'mass'"),
         ('depends_on = ["K"]', 'depends_on = ["M"]', "must name an uncertainty of the file"),
-        ('kind = "test"', 'kind = "guess"', "kind must be valid"),
-        ("[[claim]]", "[[claim]", "must be TOML"),
+        ('kind = "test"', 'kind = "guess"', "kind must be test, fit, arithmetic or identity"),
+        ("[[claim]]", "[[claim]", "must be valid TOML"),
     ],
 )
 def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
@@ -116,7 +116,7 @@ def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
         ),
         ("figures.py", '"block", "t"', '"ball", "t"', "curves must be computed, got 'block'"),
         ("figures.toml", 'color = "grey"', 'colour = "grey"', "draw must be code that"),
-        ("figures.toml", 'y = "x"', 'z = "x"', "swing.plot.panel.0.y must be valid"),
+        ("figures.toml", 'y = "x"', 'z = "x"', "swing.plot.panel.0.y must be given"),
         ("figures.toml", "{frequency:.1f}", "{period:.1f}", "got '{period}'"),
         ("figures.py", "FIGURES = (swing,)", "FIGURES = swing", "must have FIGURES, a tuple of"),
     ],

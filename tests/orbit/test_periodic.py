@@ -423,7 +423,9 @@ def test_a_point_that_fails_says_why_and_costs_no_other():
         "rice-ruina", V, epsilon, frequency, progress=lambda *count: counts.append(count)
     )
     assert list(response.converged) == [True, False, True]
-    assert response.result[1].startswith("on the branch from steady sliding slip runs away")
+    assert response.result[1].startswith(
+        "on the branch from steady sliding the slip velocity grows"
+    )
     assert not response.stable[1]
     for numbers in (response.mean_friction, response.harmonics, response.multipliers):
         assert np.isnan(numbers[1]).all()

@@ -14,7 +14,28 @@ from asperity.parameters import OUTPUTS
 from asperity.study import SweepPlan, run_sweep
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.solve import SOLVES, SolveKind
-from asperity.study.workers import ThisProcess, Workers
+from asperity.study.workers import Workers
+
+
+class ThisProcess(Workers):
+    """The process of the driver: `submit` runs the task before it returns."""
+
+    count = 1
+    about = "this process"
+    lost = ()
+    gone = ()
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`; Ctrl-C is raised at once."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*args))
+        except Exception as error:  # an executor stores exceptions in the future, too
+            future.set_exception(error)
+        return future
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`."""
 
 
 class ClosedForm(SolveKind):
@@ -30,10 +51,10 @@ class ClosedForm(SolveKind):
     def chunk_points(self, points: int, record: Any) -> int:
         return 10
 
-    def solve(self, points: Any, record: Any) -> Answers:
+    def solve_law(self, law: Any, points: Any, record: Any) -> Answers:
         epsilon, K = points.values["epsilon"], points.values["K"]
         self.solved |= set(zip(K.tolist(), epsilon.tolist(), strict=True))
-        answers = Answers.empty(("mu1", "mu2"), len(points))
+        answers = Answers.empty(self.defaults, len(points))
         answers.numbers["mu1"][:], answers.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
         answers.outcome[:] = SweepOutcome.CONVERGED
         # A whole chunk without one answer, and a few single ones.
@@ -45,7 +66,7 @@ class ClosedForm(SolveKind):
 class InClosedForm(Workers):
     """Other workers, on which every task uses the closed form.
 
-    The first task with the third chunk kills its process, which leaves the file `mark`.
+    The first task of the third chunk kills its process, which leaves the file `mark`.
     """
 
     def __init__(self, workers: Workers, mark: str) -> None:
@@ -62,16 +83,16 @@ class InClosedForm(Workers):
         self.workers.close(kill=kill)
 
 
-def _in_closed_form(mark: str, task: Callable[..., Any], chunks: Any, *args: Any) -> Any:
+def _in_closed_form(mark: str, task: Callable[..., Any], chunk: int, *args: Any) -> Any:
     SOLVES["periodic"] = ClosedForm()
-    if 2 in chunks:
+    if chunk == 2:
         try:
             os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
         except FileExistsError:
             pass
         else:
             os.kill(os.getpid(), signal.SIGKILL)
-    return task(chunks, *args)
+    return task(chunk, *args)
 
 
 class _Slow(ClosedForm):

@@ -8,7 +8,6 @@ import asperity as asp
 from asperity import materials
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales, stiffness_threshold
-from asperity_papers.bureau2000.stability import resonance_map
 
 PMMA = materials.load("bureau2000")
 SLIDERS = {
@@ -122,7 +121,10 @@ def test_a_planted_mistake_in_the_scale_is_seen(monkeypatch) -> None:
 def test_twice_the_resonance_of_the_asperities_doubles_the_period() -> None:
     """An integration of the inertial equations: force, velocity, interface force and age."""
     V, eps, f, K = 1e-6, 0.15, 810.0, 2 * KC
-    found = resonance_map(Axis("frequency", 700.0, f, 2), Axis("epsilon", 0.02, eps, 2))
+    numbers = {n: PMMA[n].si for n in ("mu0", "A", "B", "D0", "V0", "lambda", "W0", "M")}
+    numbers |= {"K": K, "V": V, "inertia": 1.0}
+    axes = {"x": Axis("frequency", 700.0, f, 2), "y": Axis("epsilon", 0.02, eps, 2)}
+    found = asp.map("elasto-plastic", numbers, **axes)
     assert found["stable"].values.tolist() == [[True, True], [True, False]]
     assert found["mode"].values[1, 1] == "period doubling"
     W0, D0, A, B, M, lam = PMMA.W0, PMMA.D0, PMMA.A, PMMA.B, PMMA.M, PMMA.lambda_

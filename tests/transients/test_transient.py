@@ -236,6 +236,8 @@ def test_the_dataset_says_everything(physical) -> None:
     np.testing.assert_array_equal(data["friction"], found.force / found.load)
     stretch = data["load_point_displacement"] - data["displacement"]
     np.testing.assert_allclose(stretch * p.slider.K, found.force, rtol=1e-9)
+    # Steady sliding at first, under the load of the programme's start: Phi = D0/V.
+    np.testing.assert_allclose(data["age"][0], p.slider.law.D0 / found.velocity[0], rtol=1e-9)
     assert data.sizes == {"time": 76, "state": 2, "event": len(found.events)}
     assert data.attrs["stopped"] == "end of the programme"
     assert "lambda = 6.2e-07 m" in data.attrs["parameters"]

@@ -22,10 +22,9 @@ from starlette.staticfiles import StaticFiles
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, asked
-from asperity.app.interactive import Busy, Lane, Superseded
 from asperity.app.jobs import processes
 from asperity.app.jobs.processes import Jobs
-from asperity.app.preparation import Preparation
+from asperity.app.jobs.threads import Busy, Lane, Preparation, Superseded
 from asperity.app.security import (
     BODY_LIMIT,
     BodyTooLarge,
@@ -80,10 +79,10 @@ def build(
                 handler = _upload(endpoint, uploads)
                 limits[path] = endpoint.largest
             elif isinstance(endpoint, Job):
-                # A job with limits has a process for itself, which need not know any orbits.
-                own = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
+                # A job with limits has a process for itself, which needs no solver of orbits.
+                preload = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
                 jobs = lanes.setdefault(
-                    endpoint.lane, Jobs(preload=own, laws=laws, folder=uploads.folder)
+                    endpoint.lane, Jobs(preload=preload, laws=laws, folder=uploads.folder)
                 )
                 warm[endpoint.lane] = warm.get(endpoint.lane) or endpoint.warm
                 handler = _job(endpoint, jobs, uploads)
@@ -118,7 +117,7 @@ def build(
     @contextlib.asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         if prepare:
-            preparation.start(list(tasks)[:3])
+            preparation.start([n for m in modules for n in getattr(m, "AT_START", ())])
             for name, first in warm.items():
                 await lanes[name].prepare(first)
         yield
@@ -145,7 +144,7 @@ def _answer(endpoint: Answer, lane: Lane) -> Callable[[Request], Any]:
 
 def _upload(endpoint: Upload, uploads: Uploads) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
-        # A form of another site cannot send this type without being asked first.
+        # A form of another site cannot send this type without a preflight request.
         if request.headers.get("content-type", "") != "application/octet-stream":
             raise InputError(
                 "request.body must be a file, got another type; send application/octet-stream"
@@ -199,7 +198,7 @@ def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any
 
 
 def _refusing(handle: Callable[[Request], Any], limit: int) -> Callable[[Request], Any]:
-    """The same, with a sentence for each thing that a request can do wrong."""
+    """The same handler, with a sentence for each refusal."""
 
     async def handle_or_refuse(request: Request) -> Response:
         try:
@@ -238,4 +237,4 @@ async def _http_error(request: Request, error: HTTPException) -> Response:
 
 async def _fault(request: Request, error: Exception) -> Response:
     _log.error("%s failed", request.url.path, exc_info=error)
-    return sentence(500, "the server failed for a reason of its own; its console says more")
+    return sentence(500, "the server failed by a defect of the program; its console says more")

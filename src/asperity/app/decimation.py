@@ -9,18 +9,18 @@ Array = NDArray[np.float64]
 
 
 def extremes(x: Array, y: Array, blocks: int) -> dict[str, Array]:
-    """The smallest and the largest sample of each block, in their order.
+    """The smallest and the largest sample of each block, in order of time.
 
     Parameters
     ----------
     x, y : array, shape (n,)
     blocks : int
-        A curve of fewer than four samples a block stays as it is.
+        A curve with fewer than four samples per block is returned whole.
 
     Returns
     -------
     dict
-        ``x`` and ``y``, of at most 2 `blocks` + 2 points; NaN where a block has nothing else.
+        ``x`` and ``y``, of at most 2 `blocks` + 2 points; NaN where all samples of a block are.
     """
     length = -(-y.size // blocks)
     if length < 4:
@@ -31,15 +31,15 @@ def extremes(x: Array, y: Array, blocks: int) -> dict[str, Array]:
     high = np.argmax(np.where(np.isnan(table), -np.inf, table), axis=1)
     first = np.arange(0, whole, length)
     pair = np.sort(np.stack([first + low, first + high], axis=1), axis=1).ravel()
-    rest = y[whole:]
-    if rest.size and not np.isnan(rest).all():
-        ends = sorted({whole + int(np.nanargmin(rest)), whole + int(np.nanargmax(rest))})
+    remainder = y[whole:]
+    if remainder.size and not np.isnan(remainder).all():
+        ends = sorted({whole + int(np.nanargmin(remainder)), whole + int(np.nanargmax(remainder))})
         pair = np.concatenate([pair, ends])
     return {"x": _rounded(x[pair]), "y": _rounded(y[pair])}
 
 
 def _rounded(values: Array) -> Array:
-    """Seven digits of the span: more than a picture shows."""
+    """Values rounded to seven digits of the largest: more than a picture shows."""
     finite = values[np.isfinite(values)]
     size = float(np.abs(finite).max()) if finite.size else 0.0
     if not size:

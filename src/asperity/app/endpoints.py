@@ -1,4 +1,4 @@
-"""Endpoints: a path, what a request must hold, and who answers it.
+"""Endpoints: a path, what a request must contain, and the function that answers it.
 
 A tab's module in `asperity.app.api` lists its endpoints as ``ENDPOINTS``; `asperity.app.api.TABS`
 lists the modules.
@@ -46,7 +46,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Job:
-    """A computation of any length in a process of its own, answered with a line of JSON a message.
+    """A computation of any length in a worker process, answered with a line of JSON per message.
 
     It ends when the page closes the connection, or begins another job on the same path.
 
@@ -61,7 +61,7 @@ class Job:
     lane : str
         Jobs of one lane share a worker process, so that long ones of one kind hold up no other.
     check : callable, optional
-        Raises `InputError` for what cannot be computed, before a process is asked.
+        Raises `InputError` for what cannot be computed, before a process is started.
     limits : mapping of str to int, optional
         See `asperity.app.jobs.processes.Jobs.run`.
     seconds : float
@@ -102,7 +102,7 @@ class Upload:
     largest : int
         Bytes.
     seconds : float
-        After which the rest is not waited for.
+        After which the upload is refused.
     """
 
     path: str
@@ -116,7 +116,7 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     Raises
     ------
     InputError
-        If the body is no JSON, or something else is asked.
+        If the body is no JSON, or is no question of this kind.
     """
     if request.headers.get("content-type", "").split(";")[0].strip() != "application/json":
         raise InputError("request.body must be JSON, got another type; send application/json")
@@ -143,7 +143,7 @@ async def asked(request: Request, kind: type[Question]) -> Any:
         raise InputError("request.body must not be nested so deep, got more; send less") from None
 
 
-#: Characters of a text, but for those of the fields ``text``, and parts of a list or table.
+#: Most characters of a text, except in fields ``text``, and most parts of a list or table.
 _LONGEST_TEXT, _MOST_PARTS = 300, 1000
 
 

@@ -75,7 +75,7 @@ def explore(
     InputError
         If the extra ``app`` is not installed, or a value breaks its rule.
     """
-    given: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     if slider is not None:
         law = type(slider.law)
         if registered().get(law.name) is not law:
@@ -83,11 +83,11 @@ def explore(
                 f"slider.law must be a registered one, got {law.__name__}; "
                 "register it with asperity.laws.register"
             )
-        given = {"law": law.name, "laws": "", **slider_values(slider)}
+        values = {"law": law.name, "laws": "", **slider_values(slider)}
     for name, value in (("V", velocity), ("epsilon", epsilon), ("frequency", frequency)):
         if value is not None:
-            given[name] = DRIVE[name].check(value)
-    for name, value in given.items():
+            values[name] = DRIVE[name].check(value)
+    for name, value in values.items():
         if isinstance(value, str):
             continue
         if np.size(value) != 1:
@@ -95,8 +95,8 @@ def explore(
                 f"{name} must be one number, got an array of shape {np.shape(value)}; "
                 "the page shows one operating point"
             )
-        given[name] = repr(float(np.ravel(value)[0]))
-    fragment = f"#explore?{urlencode(given)}" if given else "#explore"
+        values[name] = repr(float(np.ravel(value)[0]))
+    fragment = f"#explore?{urlencode(values)}" if values else "#explore"
     return Page(_server() + fragment, height)
 
 

@@ -3,7 +3,7 @@
 The server answers this machine only. A page of another site that runs in the user's browser can
 still send requests here, by a name that resolves to this machine (DNS rebinding) or straight across
 origins. Both are refused: the `Host` must be one of this server's names, and an `Origin` must be
-this server's own.
+that of this server.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BODY_LIMIT = 64 * 1024
 #: average: this machine sends to itself.
 BODY_PAUSE, BODY_RATE = 10.0, 64 * 1024
 
-#: Names by which this machine's own address goes.
+#: Names of the address of this machine.
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 _POLICY = (
@@ -87,7 +87,7 @@ class Guard:
     def _refusal(self, scope: Scope, limit: int) -> JSONResponse | None:
         hosts = list(_values(scope["headers"], b"host"))
         if len(hosts) != 1 or hosts[0].lower() not in self.hosts:
-            return sentence(421, "the address must be this machine's own, such as localhost")
+            return sentence(421, "the address must be that of this machine, such as localhost")
         origins = list(_values(scope["headers"], b"origin"))
         if any(origin.lower() not in self.origins for origin in origins):
             return sentence(403, "a request must come from the page itself, not from another site")
@@ -105,7 +105,7 @@ class BodyTooLarge(Exception):  # noqa: N818
 
 
 class BodyTooSlow(Exception):  # noqa: N818
-    """The rest of a body did not come."""
+    """A body did not arrive in time."""
 
 
 class _LimitedBody:
@@ -147,7 +147,7 @@ def sentence(status: int, text: str, headers: dict[str, str] | None = None) -> J
 
 def too_slow() -> JSONResponse:
     """The answer to a body that does not come; the connection ends with it."""
-    text = "the rest of the request did not come; send it again"
+    text = "the request did not arrive in time; send it again"
     return sentence(408, text, {"connection": "close"})
 
 

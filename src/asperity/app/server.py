@@ -1,8 +1,8 @@
 """The server: listens on this machine only, and ends in order.
 
-A request must come in time, or its connection makes room for others: uvicorn ends a connection that
-is silent after an answer. It waits without end for the first request of a connection and for the
-rest of a head, and counts such connections among those that keep others out.
+A request must come in time, or its connection makes room for others. uvicorn ends a connection that
+is silent after an answer; it would wait without end for the first request of a connection and for
+the end of a head, and would count such connections towards its limit.
 
 The packages of the extra ``app``, which the page needs beyond the core, are checked first.
 """
@@ -116,7 +116,7 @@ def serve(
     laws: Sequence[str] = (),
     started: Callable[[str], Any] | None = None,
 ) -> None:
-    """Serve the page until the process is asked to end.
+    """Serve the page until the process gets SIGTERM or SIGINT.
 
     Parameters
     ----------
@@ -141,8 +141,8 @@ def serve(
     server = server_on(listening, laws=laws)
     if started is not None:
         _call_when_started(server, started, address_of(listening))
-    # uvicorn ends in order on both signals, and raises them again when it is done: an end that was
-    # asked for is no failure.
+    # uvicorn ends in order on both signals, and raises them again when it is done: an end by
+    # signal is no failure.
     earlier = {s: signal.signal(s, signal.SIG_IGN) for s in (signal.SIGTERM, signal.SIGINT)}
     try:
         server.run(sockets=[listening])
@@ -155,8 +155,8 @@ def serve(
 def serve_in_background() -> str:
     """Serve the page from a thread of this process, on a free port; returns its address.
 
-    Pages of this machine, such as a notebook, may show it in a frame. Nothing is compiled before it
-    is asked for.
+    Pages of this machine, such as a notebook, may show it in a frame. Nothing is compiled before a
+    request needs it.
     """
     require_extra()
     listening = listen(0)
@@ -212,8 +212,8 @@ def server_on(
 
     config = uvicorn.Config(
         build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare, laws=laws),
-        # uvicorn's own configuration would close every logging handler of the process, and with
-        # them, through absl's, the streams of a notebook.
+        # The logging configuration of uvicorn would close all logging handlers of the process, and
+        # with them, through that of absl, the streams of a notebook.
         log_config=None,
         log_level="warning",
         server_header=False,

@@ -1,4 +1,4 @@
-"""Files that the page sends: in one temporary folder, under names of the server's own.
+"""Files that the page sends: in one temporary folder, under names that the server makes.
 
 The folder is removed when the server ends, or by the next server after one that was killed.
 
@@ -50,15 +50,11 @@ class Upload:
     path: Path
     name: str
 
-    def named(self, sentence: str) -> str:
-        """A sentence with the sender's name in place of the server's."""
-        return sentence.replace(str(self.path), self.name).replace(self.path.name, self.name)
-
 
 class Uploads:
     """The files of a server, and what its workers write meanwhile.
 
-    The folder is removed with its content when the server ends; those of servers that were killed
+    The folder is removed with its content when the server ends; folders of servers that were killed
     are removed first.
 
     Parameters

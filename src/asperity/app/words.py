@@ -25,9 +25,12 @@ _LABELS: Mapping[str, str] = {
     "measure.harmonics": "Harmonics",
     "measure.steps and holds": "Velocity steps and holds",
     "rate": "Sampling rate",
+    "format": "File format",
+    "delimiter": "Delimiter",
+    "decimal": "Decimal mark",
     "read.rate": "Sampling rate",
     "read.group": "Group",
-    "read.format": "The format",
+    "read.format": "File format",
     "read.delimiter": "Delimiter",
     "read.decimal": "Decimal mark",
     "columns": "Role",
@@ -40,7 +43,7 @@ _LABELS: Mapping[str, str] = {
     "fixed": "Fixed numbers",
     "laws": "Laws",
     "gauge": "Low-pass of the force gauge",
-    "fit_rate": "Means a second of long recordings",
+    "fit_rate": "Mean values per second for long recordings",
     "velocities": "Velocities between the steps",
 }
 _ROLES: Mapping[str, str] = {
@@ -59,9 +62,9 @@ def in_labels(argument: Argument) -> str:
     # A part of a list has the label of the list.
     while name.rpartition(".")[2].isdigit():
         name = name.rpartition(".")[0]
-    head, _, rest = name.partition(".")
-    if head in ("data", "runs") and rest:
-        name = rest.partition(".")[2] or rest
+    head, _, field = name.partition(".")
+    if head in ("data", "runs") and field:
+        name = field.partition(".")[2] or field
     if name in ("numbers", "fixed", "start") and key:
         label = key
     elif name in ("columns", "Trace.channel") and key:

@@ -205,7 +205,7 @@ def _invert(
     from asperity.units import format_si
 
     name, solve = ("R", patch_radius) if sought == "radius" else ("h0", gap)
-    # The layer must be complete, and does not use its own value of what is sought.
+    # The layer must be complete, though the value of the sought quantity is not used.
     layer = _layer({**numbers, name: 1.0})
     W0, M, lambda_z = (numbers[n] for n in _CONTACT)
     result = solve(ratio, hertz, W0=W0, M=M, lambda_z=lambda_z, layer=layer)

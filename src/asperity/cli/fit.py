@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
-    Count,
+    field_option,
     json_option,
     law_options,
     names_option,
@@ -23,7 +23,7 @@ from asperity.errors import InputError
 from asperity.outputs import require_folder
 
 if TYPE_CHECKING:
-    from asperity.inference import Fit
+    from asperity.inference import Fit as FitResult
     from asperity.inference.posterior import Posterior
     from asperity.parameters import Names
 
@@ -60,81 +60,82 @@ motion through the whole of it; its stiffness K is free, its noise autoregressiv
 More than 20,000 samples are compared as means over blocks (--fit-rate).
 """
 
+#: Options that are fields of the question, by the name of the field: text, and name of the value.
+_FIELDS: dict[str, tuple[str, ...]] = {
+    "free": (
+        "Free parameters: a,b,c; by default all of the law that the data may show.",
+        "NAMES",
+    ),
+    "material": ("Fixes what is given nowhere else.", "NAME"),
+    "windows": (
+        "Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
+        "SPANS|auto",
+    ),
+    "stiffness_from": (
+        "Seconds of unloading and reloading whose slope is the prior of K; outside --window.",
+        "START:END",
+    ),
+    "trend": ("Trend of the friction of a recording over slip.", ""),
+    "drift": ("Add a linear drift of the friction over time.",),
+    "initial": ("State at the beginning of a recording.", ""),
+    "gauge": ('Low-pass of the force gauge, like "50 Hz".', "HZ"),
+    "gauge_order": ("Its order.", "N"),
+    "fit_rate": (
+        'Means a second that stand for the samples of a recording, like "100 Hz"; by default '
+        "as many as it needs where it has more than 20,000 samples.",
+        "HZ|full",
+    ),
+    "profile": ("Intervals by profile likelihood.",),
+    "inertia": ("Include the inertia of the slider.",),
+    "radiation_damping": ("Include the radiation damping eta.",),
+}
+
+
+def _field(name: str) -> Any:
+    return field_option("asperity.questions.fit:Fit", name, *_FIELDS[name])
+
+
 #: Options of the data and of what is estimated, what is needed first before the others.
 _FIRST = (
-    click.option(
-        "--free",
-        metavar="NAMES",
-        help="Free parameters: a,b,c; by default all of the law that the data may show.",
-    ),
+    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
+    _field("free"),
     click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."),
     click.option("--start", multiple=True, metavar="NAME=VALUE", help="Start value."),
-    click.option("--material", metavar="NAME", help="Fixes what is given nowhere else."),
+    _field("material"),
     click.option(
         "--prior",
         multiple=True,
         metavar="NAME|NAME=VALUE+-SD",
         help='Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
     ),
-    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
 )
 _THEN = (
     click.option(
         "--steps",
         metavar="TIMES|FILE",
-        help="Times (s) at which the velocity of the drive changes.",
+        help="Times (s) at which the velocity of the drive changes, where no channel has it.",
     ),
     click.option(
         "--velocities",
         metavar="VALUES",
         help='Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.',
     ),
-    click.option(
-        "--stiffness-from",
-        metavar="START:END",
-        help="Seconds of unloading and reloading whose slope is the prior of K; outside --window.",
-    ),
-    click.option(
-        "--trend",
-        metavar="none|linear|quadratic",
-        default="linear",
-        show_default=True,
-        help="Trend of the friction of a recording over slip.",
-    ),
-    click.option("--drift", is_flag=True, help="Let the friction drift over time too."),
-    click.option(
-        "--initial",
-        metavar="steady|free",
-        default="steady",
-        show_default=True,
-        help="State at the beginning of a recording.",
-    ),
-    click.option("--gauge", metavar="HZ", help='Low-pass of the force gauge, like "50 Hz".'),
-    click.option("--gauge-order", type=Count(), default=1, show_default=True, help="Its order."),
-    click.option(
-        "--fit-rate",
-        metavar="HZ|full",
-        help='Means a second that stand for the samples of a recording, like "100 Hz"; by default '
-        "as many as it needs where it has more than 20,000 samples.",
-    ),
-    click.option("--profile", is_flag=True, help="Intervals by profile likelihood."),
-    click.option("--inertia", is_flag=True, help="The mass of the slider counts."),
-    click.option("--radiation-damping", is_flag=True, help="The damping eta counts."),
-)
-#: Options that are fields of the question under the same name.
-_FIELDS = (
-    *("free", "material", "profile", "inertia", "radiation_damping", "stiffness_from", "trend"),
-    *("drift", "initial", "gauge", "gauge_order", "fit_rate", "windows"),
+    *(_field(n) for n in ("stiffness_from", "trend", "drift", "initial", "gauge", "gauge_order")),
+    *(_field(name) for name in ("fit_rate", "profile", "inertia", "radiation_damping")),
 )
 
 
-def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _question_options(
+    *further: Any, laws: str | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
     Parameters
     ----------
-    *own : click options
+    *further : click options
         Of this command alone, which follow those that are needed first.
+    laws : str, optional
+        The laws where none is named.
     """
 
     def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -164,29 +165,26 @@ def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[...,
                     "fixed": settings_of(fixed, "--fix"),
                     "start": settings_of(start, "--start"),
                     "prior": prior,
-                    **{n: others.pop(n) for n in _FIELDS if n in others},
+                    **{n: v for n in _FIELDS if (v := others.pop(n, None)) is not None},
                 }
                 return command(fields=fields, **others)
 
-        result = source_options(gathered)
-        for option in reversed(
-            (
-                click.argument("data", nargs=-1, required=True, type=Path),
-                law_options(),
-                plot_option(),
-                click.option(
-                    "--report",
-                    type=Path,
-                    metavar="DIR",
-                    help="Folder for a page with pictures, the numbers, and a material.",
-                ),
-                names_option(),
-                json_option(),
-                *_FIRST,
-                *own,
-                *_THEN,
-            )
-        ):
+        first = (
+            click.argument("data", nargs=-1, required=True, type=Path),
+            law_options(laws),
+            plot_option(),
+            click.option(
+                "--report",
+                type=Path,
+                metavar="DIR",
+                help="Folder for a page with pictures, the numbers, and a material.",
+            ),
+            names_option(),
+            json_option(),
+            *_FIRST,
+        )
+        result: Callable[..., Any] = gathered
+        for option in reversed((*first, source_options, *_THEN, *further)):
             result = option(result)
         return result
 
@@ -195,11 +193,7 @@ def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[...,
 
 @click.command(epilog=_EPILOG)
 @_question_options(
-    click.option(
-        "--windows",
-        metavar="SPANS|auto",
-        help="Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
-    ),
+    _field("windows"),
     click.option("--posterior", is_flag=True, help="Sample the posterior (extra 'bayes')."),
     click.option("--chains", default=4, show_default=True, metavar="N", help="Chains."),
     click.option(
@@ -221,10 +215,10 @@ def fit(
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit a friction law to tables of lock-in readings and to recordings.
+    """Fit a friction law to recordings, to tables of readings, or to holds.
 
     Estimates with intervals, correlations, what the data cannot determine, and whether the law
-    describes them.
+    describes the data.
     """
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
@@ -232,22 +226,22 @@ def fit(
     from asperity.inference.answers import answer_fit
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import fit_report, posterior_sections, windows_sections
-    from asperity.questions.fit import Fit as Question
+    from asperity.questions.fit import Fit
 
-    if len(laws) > 1:
+    if len(laws) > 1 or "all" in laws:
         raise InputError(
-            "--law", "be one law for a fit", len(laws), "compare several with asperity compare"
+            "--law", "be one law for a fit", ",".join(laws), "compare several: asperity compare"
         )
     sampling = {"chains": chains, "draws": draws, "seed": seed}
     _check_sampling(posterior, sampling, out)
     if report is not None:
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
-    question = Question(law=laws[0] if laws else None, **fields)
+    question = Fit(law=laws[0] if laws else None, **fields)
     with bar("window" if question.windows else "step", "fit", raising=False) as update:
         answer = answer_fit(question, progress=update)
     over = answer if isinstance(answer, WindowedFit) else None
-    result: Fit = answer.fits[0] if isinstance(answer, WindowedFit) else answer
+    result: FitResult = answer.fits[0] if isinstance(answer, WindowedFit) else answer
     sampled = _sampled(result, sampling, out) if posterior and result.converged else None
     if report is not None and result.converged:
         from asperity.fit_report import write_report
@@ -256,7 +250,7 @@ def fit(
     if as_json:
         more = {"posterior": sampled.record()} if sampled else {}
         more |= {"windows": over.record()} if over else {}
-        click.echo(to_json({**fit_record(result), **more}))
+        click.echo(to_json({**fit_record(result), **more}, names, result.law))
     else:
         sections = fit_report(result)
         sections += windows_sections(over) if over else []
@@ -294,7 +288,7 @@ def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None)
         output_file(out, "--out", example="posterior.nc")
 
 
-def _sampled(fit: Fit, sampling: dict[str, int], out: Path | None) -> Posterior:
+def _sampled(fit: FitResult, sampling: dict[str, int], out: Path | None) -> Posterior:
     """Sample with a progress bar, and write the draws."""
     from asperity.cli.progress import bar
     from asperity.inference.posterior import sample_posterior
@@ -323,33 +317,26 @@ if its AICc exceeds the lowest by 10 or more.
 
 @click.command(epilog=_EPILOG_OF_COMPARE)
 @_question_options(
-    click.option(
-        "--laws",
-        "listed",
-        default="all",
-        metavar="NAMES",
-        help="The same as several --law: a,b,c or all.",
-    ),
     click.option("--windows", hidden=True, metavar="SPANS"),
+    laws="all",
 )
 def compare(
     laws: tuple[str, ...],
-    listed: str,
     fields: dict[str, Any],
     report: Path | None,
     plot: Path | None,
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit several laws to the same readings and say which the data exclude."""
+    """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference.answers import answer_comparison
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.report import comparison_report
-    from asperity.questions.fit import Comparison as Question
+    from asperity.questions.fit import Comparison
 
-    if fields.pop("windows") is not None:
+    if fields.pop("windows", None) is not None:
         raise InputError(
             "--windows must go with asperity fit, got it with compare: windows of one recording "
             "overlap, so that what they say against a law does not add up; compare with --window "
@@ -358,8 +345,8 @@ def compare(
     if report is not None:
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
-    fields["laws"] = laws or listed
-    question = Question(**fields)
+    fields["laws"] = laws
+    question = Comparison(**fields)
     with bar("%", raising=False) as update:
 
         def progress(done: int, total: int) -> None:
@@ -371,7 +358,7 @@ def compare(
 
         comparison = answer_comparison(question, progress=progress)
     if as_json:
-        click.echo(to_json(comparison_record(comparison)))
+        click.echo(to_json(comparison_record(comparison), names, comparison.best))
     else:
         click.echo(sections_text(comparison_report(comparison), names, comparison.best))
     if report is not None and comparison.best:

@@ -18,7 +18,7 @@ Examples:
       -V "1 um/s" -e 0.24 -f "120 Hz" --json
   asperity response --table points.csv --out responses.csv --material bureau2000
   asperity measure recording.csv --json --plot recording.png
-  asperity run protocol.toml --out run.nc --plot
+  asperity run protocol.toml --out run.nc --plot run.png
   asperity map --law elasto-plastic --material bureau2000 -V "1 um/s" -f "120 Hz" \\
       --x "epsilon=0.01:0.5:200" --y "K=0.05:0.5:200 N/um" --out map.nc --plot map.png
   asperity sweep plan.toml --out results.zarr

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, law_named, material_named, point_options
+from asperity.cli.options import json_option, names_option, plot_option, point_options
 from asperity.errors import InputError, closest
 
 if TYPE_CHECKING:
     import xarray
+
+    from asperity.parameters import Names
+    from asperity.questions.point import Point
 
 _EPILOG = """\b
 Examples:
@@ -32,11 +35,11 @@ bifurcation and the frequency of its mode.
 @click.command(epilog=_EPILOG)
 @click.option("--x", "x", metavar="AXIS", help='Number along x, like "epsilon=0.01:0.5:200".')
 @click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
-@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
-@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
 @point_options
+@plot_option()
+@names_option()
+@json_option()
 @click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
-@click.option("--plot", type=Path, metavar="PNG", help="Where a picture goes.")
 @click.option(
     "--show",
     metavar="QUANTITY",
@@ -44,18 +47,18 @@ bifurcation and the frequency of its mode.
     show_default=True,
     help="What the picture shows: mu1, delta_mu, floquet_max, ...",
 )
+@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
+@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted map.")
-@json_option()
 def map(
     x: str | None,
     y: str | None,
     log_x: bool,
     log_y: bool,
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     out: Path | None,
     plot: Path | None,
+    names: Names,
     show: str,
     resume: bool,
     as_json: bool,
@@ -66,10 +69,13 @@ def map(
     of the mode at each of its points.
     """
     _check_outputs(out, plot, show)
-    result = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
+    result = _solve(point, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
-        _plot(result, plot, show)
-    _print(result, out, as_json)
+        from asperity.cli.report import save_figure
+        from asperity.figures.map import draw_map
+
+        save_figure(lambda: draw_map(result, show), plot, names)
+    _print(result, out, as_json, names)
     unresolved = int(result.attrs["boundary_unresolved_chords"])
     if unresolved:
         click.echo(
@@ -88,19 +94,16 @@ def map(
 
 
 def _solve(
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     x: tuple[str | None, bool],
     y: tuple[str | None, bool],
     out: Path | None,
     resume: bool,
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
-    from asperity.operating_point import refuse_foreign, sourced_numbers
+    from asperity.operating_point import offered_numbers
     from asperity.study.map import Axis, write_map
 
-    law = law_named(law)
     axes = []
     for option, (text, log) in (("--x", x), ("--y", y)):
         if text is None:
@@ -109,15 +112,18 @@ def _solve(
                 "'epsilon=0.01:0.5:200'"
             )
         axes.append(Axis.parse(text, log))
-    refuse_foreign(law, given)
-    numbers = sourced_numbers(given, material_named(material), "command line", law)
     # A material's number gives way to an axis; one that was given for this map does not.
-    numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
+    kept, varied = point.parameters, {axis.name for axis in axes}
+    numbers = {
+        name: number
+        for name, number in offered_numbers(point, "command line").items()
+        if name in kept or name not in varied
+    }
     assert out is not None
     with bar("point", "map") as update:
         return write_map(
             out,
-            law,
+            point.law,
             numbers,
             x=axes[0],
             y=axes[1],
@@ -128,6 +134,7 @@ def _solve(
 
 def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     """Check files and quantity before anything is solved."""
+    from asperity.cli.report import require_picture
     from asperity.outputs import output_files
     from asperity.study.map import SHOWN
 
@@ -137,34 +144,25 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
         )
     if out is None:
         raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InputError(f"--plot must be a PNG file, got '{plot}'; write it like --plot map.png")
+    require_picture(plot)
     output_files({"--out": out, "--plot": plot})
 
 
-def _plot(dataset: xarray.Dataset, path: Path, show: str) -> None:
-    from asperity.figures.map import draw_map
-    from asperity.figures.style import style
-    from asperity.outputs import written_file
-
-    with style(), written_file(path, "--plot") as file:
-        draw_map(dataset, show).savefig(file, metadata={"Software": None})
-
-
-def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool) -> None:
+def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool, names: Names) -> None:
     from asperity.cli.report import to_json
     from asperity.outputs.tables import aligned
+    from asperity.parameters import display_name
 
     record = _record(dataset, out)
     if as_json:
-        click.echo(to_json(record))
+        click.echo(to_json(record, names, str(dataset.attrs["law"])))
         return
     rows = [(name, str(record[name])) for name in ("points", "stable", "unstable", "failed")]
     click.echo(aligned(rows))
     for line in record["boundaries"]:
         kinds = " and ".join(dict.fromkeys(line["kind"]))
         spans = ", ".join(
-            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g}"
+            f"{display_name(name, names)} {min(line[name]):.6g} to {max(line[name]):.6g}"
             for name in (record["x"], record["y"])
         )
         click.echo(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")

@@ -31,7 +31,7 @@ a fit), assumed (not in the paper).
 def materials(name: str | None, cite: bool, as_json: bool) -> int:
     """List the materials, or every number of one.
 
-    NAME is a material, or the path of a TOML file of your own.
+    NAME is a material, or the path of your TOML file.
     """
     if cite:
         return _cite(name, as_json)

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
-    Count,
+    field_option,
     json_option,
-    law_named,
     law_option,
-    material_named,
     material_option,
     names_option,
     plot_option,
+    point_of,
     set_option,
     settings_of,
 )
 from asperity.cli.recording import listed_times, source_options
-from asperity.cli.words import in_options
+from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -37,6 +36,8 @@ Rows = list[dict[str, Any]]
 #: Adds the cycles of a law to a campaign.
 Cycles = Callable[["StickSlipCampaign"], "StickSlipCampaign"]
 
+#: The record that the options fill.
+_QUESTION = "asperity.questions.recording:Measurement"
 #: Velocities of a curve of a law.
 _POINTS = 13
 
@@ -85,13 +86,10 @@ class FileRows:
 
     def question_of(self, path: Path) -> Question:
         """The question with the conditions of a file."""
-        own = self.conditions.get(path)
-        return (
-            type(self.question)(**{**self.question.model_dump(), **own}) if own else self.question
-        )
+        return self.question.model_copy(update=self.conditions.get(path))
 
     def inputs(self) -> dict[str, Any]:
-        """All that rows depend on besides the files, as JSON values.
+        """Everything except the files that rows depend on, as JSON values.
 
         Of a reduction file its contents: a campaign is not resumed with another one.
 
@@ -143,34 +141,11 @@ in place of numbers; 2: bad input.
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @plot_option()
 @names_option()
-@source_options
-@click.option(
-    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
-    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+@json_option()
+@field_option(
+    _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
+    "START:END",
 )  # fmt: skip
-@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
-@click.option(
-    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
-    help="How many.",
-)  # fmt: skip
-@click.option(
-    "--window",
-    metavar="START:END",
-    help="Seconds to read, like 10:60; chosen by the program if not given.",
-)
-@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
-@click.option(
-    "--detrend",
-    metavar="none|linear|quadratic",
-    default="linear",
-    show_default=True,
-    help="Drift that is fitted together with the harmonics.",
-)
-@click.option(
-    "--no-modulation",
-    is_flag=True,
-    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
-)
 @click.option(
     "--steps",
     metavar="TIMES|FILE",
@@ -181,6 +156,24 @@ in place of numbers; 2: bad input.
     metavar="TIMES|FILE",
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
+@source_options
+@field_option(
+    _QUESTION, "frequency",
+    'Where to look for the modulation, like "120 Hz", which is fitted; determined if not given.',
+    "VALUE", "-f",
+)  # fmt: skip
+@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
+@field_option(_QUESTION, "harmonics", "How many.", "N")
+@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
+@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
+@click.option(
+    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
+)
+@click.option(
+    "--no-modulation",
+    is_flag=True,
+    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
+)
 @click.option(
     "--stick-slip",
     is_flag=True,
@@ -190,22 +183,11 @@ in place of numbers; 2: bad input.
     '--set "K=168 N/m" --set "V=42 um/s"',
     "K, V, M or W0 of the machine, for slip events; with --law its parameters too",
 )
-@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
-@material_option()
-@click.option(
-    "--conditions",
-    metavar="CSV|PATTERN",
-    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
-    'names like "run_k{K N/m}_v{V um/s}".',
-)
 @click.option(
     "--events",
     type=Path,
     metavar="CSV|NC|JSON",
     help="Where the catalogue of slip events goes.",
-)
-@click.option(
-    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
 @click.option(
     "--out",
@@ -214,10 +196,10 @@ in place of numbers; 2: bad input.
     help="Measure all recordings into one table: a row for each amplitude, step and hold.",
 )
 @click.option(
-    "--thresholds",
-    type=Path,
-    metavar="CSV",
-    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+    "--conditions",
+    metavar="CSV|PATTERN",
+    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
+    'names like "run_k{K N/m}_v{V um/s}".',
 )
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 @click.option(
@@ -226,16 +208,17 @@ in place of numbers; 2: bad input.
     type=click.IntRange(1),
     help="Processes of a table; as many as cores if not given.",
 )
-@json_option()
+@click.option(
+    "--thresholds",
+    type=Path,
+    metavar="CSV",
+    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+)
+@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
+@material_option()
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
-    frequency: str,
-    exact_frequency: bool,
-    harmonics: int,
-    window: str | None,
-    whole_periods: bool,
-    detrend: str,
     no_modulation: bool,
     steps: str | None,
     holds: str | None,
@@ -253,29 +236,28 @@ def measure(
     as_json: bool,
     plot: Path | None,
     names: Names,
+    **fields: Any,
 ) -> int:
-    """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
+    """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
 
-    RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
-    are measured into one table with --out.
+    What the recording is, is recognised from its load and velocity. RECORDINGS are files of a
+    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. Several are
+    measured into one table with --out.
     """
     from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
 
-    fields: dict[str, Any] = {
+    if fields["frequency"] == "auto":
+        fields["frequency"] = None
+    fields |= {
         "modulated": False if no_modulation else None,
-        "frequency": None if frequency == "auto" else frequency,
-        "exact_frequency": exact_frequency,
-        "harmonics": harmonics,
-        "window": window,
-        "whole_periods": whole_periods,
-        "detrend": detrend,
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
     }
     given = settings_of(settings)
-    question = Question(**fields, **_machine(given, law is None))
+    known = {name: value for name, value in fields.items() if value is not None}
+    question = Question(**known, **_machine(given, law is None))
     if (law or material) and not (out and plot and stick_slip):
         raise InputError(
             "--law and --material must go with --out, --stick-slip and --plot, got them without; "
@@ -373,17 +355,17 @@ def _cycles(
     """What adds the cycles of the law to a campaign; its numbers are checked at once."""
     if law is None and material is None:
         return lambda campaign: campaign
-    law = law_named(law)
     from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import point_parameters
 
-    refuse_foreign(law, given)
-    chosen = get_law(law)
-    sourced = sourced_numbers(given, material_named(material), "command line", law)
-    among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
-    needed = ("M",) if conditions is None else ()
-    values = {n: x.value for n, x in numbers_for(law, sourced, among, needed).items()}
+    with fields_as_options(POINT_OPTIONS):
+        offered = offered_numbers(point_of(law, material, given), "command line")
+        chosen = get_law(str(law))
+        among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
+        needed = ("M",) if conditions is None else ()
+        numbers = numbers_for(chosen.name, offered, among, needed)
+    values = {name: number.value for name, number in numbers.items()}
 
     def added(campaign: StickSlipCampaign) -> StickSlipCampaign:
         import numpy as np
@@ -441,8 +423,8 @@ def _campaign(
     question = rows_of.question
     if thresholds is not None and not question.stick_slip:
         raise InputError(
-            "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
-            "ends, steady sliding counts too"
+            "--thresholds must go with --stick-slip, got it without; add it: the end "
+            "of stick-slip needs the recordings of steady sliding too"
         )
     if thresholds is not None or plot is not None:
         output_files(
@@ -465,7 +447,7 @@ def _campaign(
         record["out"] = str(out)
         if campaign.series:
             record["healing"] = campaign.healing_record()
-        click.echo(to_json(record))
+        click.echo(to_json(record, names))
     elif campaign.series:
         click.echo(healing_text(campaign, names))
     if plot is not None:
@@ -546,7 +528,7 @@ def _print(
         record_of, text_of = sliding_record, sliding_text
     if as_json:
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}, names))
     else:
         click.echo(text_of(result, recording.name, names))
 

@@ -34,28 +34,19 @@ def modulated_text(measurement: Measurement, name: str, names: Names = "friction
     """
     reading, unit = measurement.reading, measurement.samples.unit
     rows = [
-        _row("W0", reading.W0, reading.uncertainty("W0"), unit, "mean load"),
-        _row("epsilon", reading.epsilon, reading.uncertainty("epsilon"), "", "amplitude of W/W0"),
-        _row("frequency", reading.frequency, reading.uncertainty("frequency"), "Hz", ""),
-        _row("mean_force", reading.mean_force, reading.uncertainty("mean_force"), unit, ""),
-        _row(
-            "mean_friction",
-            reading.mean_friction,
-            reading.uncertainty("mean_friction"),
-            "",
-            "mean of F/W0",
-        ),
+        _row(number, getattr(reading, number), reading.uncertainty(number), of, meaning)
+        for number, of, meaning in (
+            ("W0", unit, "mean load"),
+            ("epsilon", "", "amplitude of W/W0"),
+            ("frequency", "Hz", ""),
+            ("mean_force", unit, ""),
+            ("mean_friction", "", "mean of F/W0"),
+        )
     ]
     if math.isfinite(measurement.delta_mu):
-        rows.append(
-            _row(
-                "delta_mu",
-                measurement.delta_mu,
-                measurement.delta_mu_uncertainty,
-                "",
-                "mean_friction - F(0)/W0 without modulation",
-            )
-        )
+        change, doubt = measurement.delta_mu, measurement.delta_mu_uncertainty
+        meaning = "mean_friction - F(0)/W0 without modulation"
+        rows.append(_row("delta_mu", change, doubt, "", meaning))
     for side, level in (("before", measurement.before), ("after", measurement.after)):
         if level is not None:
             rows.append(_row(f"F0_{side}", level.value, level.uncertainty, unit, "no modulation"))
@@ -105,7 +96,7 @@ def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
             if value is None or not math.isfinite(value):
                 cells.append("-")
                 continue
-            cells.append(" ".join(c for c in _row("", value, doubt, "", "")[1:3] if c))
+            cells.append(_number(value, doubt))
         times = f"{row['start']:.6g}", f"{row['end']:.6g}"
         table.append((str(row["part"]), *times, *cells, row["verdict"]))
     named = [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
@@ -126,18 +117,10 @@ def sliding_text(measurement: SlidingMeasurement, name: str, names: Names = "fri
     friction = measurement.friction
     rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in measurement.rates)
     rows = [_row("friction", friction.value, friction.uncertainty, "", "mean of F/W")]
-    if measurement.load is not None:
-        rows.append(
-            _row(
-                "load",
-                measurement.load.value,
-                measurement.load.uncertainty,
-                measurement.load_unit,
-                "mean",
-            )
-        )
+    if (load := measurement.load) is not None:
+        rows.append(_row("load", load.value, load.uncertainty, measurement.load_unit, "mean"))
     head = (
-        f"{name}: {friction.start:.10g} s to {friction.end:.10g} s, "
+        f"{name}: {_time(friction.start)} s to {_time(friction.end)} s, "
         f"{measurement.time.size} samples at {rates}"
     )
     lines = [
@@ -164,7 +147,9 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names =
 
     time = measurement.time
     rate = (time.size - 1) / float(time[-1] - time[0])
-    head = f"{name}: {time[0]:.10g} s to {time[-1]:.10g} s, {time.size} samples at {rate:.4g} Hz"
+    head = (
+        f"{name}: {_time(time[0])} s to {_time(time[-1])} s, {time.size} samples at {rate:.4g} Hz"
+    )
     parts = [(f"{r.start:.6g}", f"{r.end:.6g}", r.kind, r.evidence) for r in measurement.regimes]
     slope, doubt = measurement.loading_slope, measurement.loading_slope_uncertainty
     rows = [
@@ -208,15 +193,19 @@ def healing_text(campaign: StickSlipCampaign, names: Names = "friction") -> str:
     )
 
 
+def _time(seconds: float) -> str:
+    """A time of a recording, to a nanosecond: what a fit of the clock leaves about zero is zero."""
+    return f"{round(float(seconds), 9) + 0.0:.10g}"
+
+
 def _segments(measurement: SlidingMeasurement) -> list[str]:
     table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
     for s in measurement.segments:
-        shown = [*_row("", s.steady.value, s.steady.uncertainty, "", "")[1:3]]
-        steady = " ".join(part for part in shown if part)
+        steady = _number(s.steady.value, s.steady.uncertainty)
         table.append(
             (
-                f"{s.start:.10g}",
-                f"{s.end:.10g}",
+                _time(s.start),
+                _time(s.end),
                 "hold" if s.hold else velocity_text(s.velocity),
                 steady,
                 f"{s.slope:.2g}",
@@ -238,37 +227,19 @@ def velocity_text(velocity: float) -> str:
 def _steps(measurement: SlidingMeasurement, names: Names) -> list[str]:
     lines = []
     for k, step in enumerate(measurement.steps, 1):
-        rows = [
-            _row(
-                "change",
-                step.change,
-                step.uncertainty,
-                "",
-                f"of steady friction at the step; noise {step.noise_uncertainty:.2g}, choice of "
-                f"window and trend {step.choice_uncertainty:.2g}",
-            )
-        ]
+        meaning = (
+            f"of steady friction at the step; noise {step.noise_uncertainty:.2g}, choice of "
+            f"window and trend {step.choice_uncertainty:.2g}"
+        )
+        rows = [_row("change", step.change, step.uncertainty, "", meaning)]
         if math.isfinite(step.rate_dependence):
-            rows.append(
-                _row(
-                    "A - B",
-                    step.rate_dependence,
-                    step.rate_uncertainty,
-                    "",
-                    f"d mu/d ln V; 95 %: +- {step.rate_interval_95:.2g}",
-                )
-            )
+            slope, doubt = step.rate_dependence, step.rate_uncertainty
+            meaning = f"d mu/d ln V; 95 %: +- {step.rate_interval_95:.2g}"
+            rows.append(_row("A - B", slope, doubt, "", meaning))
             rows.append(("peak", f"{step.peak:.4g}", "", "beyond the level before"))
         if step.trend != "none":
-            rows.append(
-                (
-                    "trend",
-                    step.trend,
-                    "",
-                    f"{_slope(measurement, step.slope_before)} before, "
-                    f"{_slope(measurement, step.slope_after)} after",
-                )
-            )
+            before, after = (_slope(measurement, s) for s in (step.slope_before, step.slope_after))
+            rows.append(("trend", step.trend, "", f"{before} before, {after} after"))
         speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
         lines += [f"step {k} at {step.time:.10g} s, {speeds}", _named(rows, names)]
     return lines
@@ -291,25 +262,15 @@ def _holds(measurement: SlidingMeasurement) -> list[str]:
             (hold.peak, 0.0),
             (hold.healing, hold.healing_uncertainty),
         )
-        cells = []
-        for value, doubt in numbers:
-            shown = _row("", value, doubt, "", "")[1:3] if doubt else (f"{value:.5g}", "")
-            cells.append(" ".join(part for part in shown if part))
+        cells = [_number(value, doubt) if doubt else f"{value:.5g}" for value, doubt in numbers]
         reload = f"{1e-3 * hold.reload_slope:.3g}" if math.isfinite(hold.reload_slope) else "-"
         table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells, reload))
     lines = ["holds", aligned(table, "  ")]
     if measurement.healing is not None:
         rate = measurement.healing
-        rows = [
-            _row(
-                "healing rate",
-                rate.per_decade,
-                rate.uncertainty,
-                "",
-                f"per decade of hold time, {rate.holds} holds; 95 %: +- {rate.interval_95:.2g}",
-            )
-        ]
-        lines.append(aligned(rows, "  "))
+        meaning = f"per decade of hold time, {rate.holds} holds; 95 %: +- {rate.interval_95:.2g}"
+        row = _row("healing rate", rate.per_decade, rate.uncertainty, "", meaning)
+        lines.append(aligned([row], "  "))
     return lines
 
 
@@ -317,6 +278,11 @@ def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tupl
     """A number with as many digits as its uncertainty allows: two uncertain ones."""
     number, uncertain = rounded(value, doubt)
     return name, f"{number} {unit}".strip(), uncertain, meaning
+
+
+def _number(value: float, doubt: float) -> str:
+    """A number and its uncertainty, as in `_row`."""
+    return " ".join(part for part in rounded(value, doubt) if part)
 
 
 def _named(rows: Iterable[Row], names: Names) -> str:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError
 from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
+    from asperity.questions.point import Point
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -34,13 +37,57 @@ class Count(click.ParamType):
             raise InputError(option, rule, f"'{value}'", "correct the value") from None
 
 
+class FieldOption(click.Option):
+    """An option with the default and the choices of a field of a question, which its help shows.
+
+    The record is imported for the help only; without the option the default of the record applies.
+    """
+
+    def __init__(self, *names: Any, record: str = "", **look: Any) -> None:
+        super().__init__(*names, **look)
+        self.record = record
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Option and text, as click prints them."""
+        module, _, name = self.record.partition(":")
+        about = getattr(importlib.import_module(module), name).model_fields[self.name]
+        if about.default is not None and not self.is_flag:
+            self.default, self.show_default = about.default, True
+        self.metavar = self.metavar or "|".join(map(str, get_args(about.annotation)))
+        return super().get_help_record(ctx)
+
+
+def field_option(
+    record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
+) -> Decorator:
+    """The option of a field of a question.
+
+    Parameters
+    ----------
+    record : str
+        Its place, as ``module:Name``.
+    field : str
+    help_text : str
+    metavar : str, optional
+        What is given: empty for the choices of the field, "N" for a whole number; None for a
+        switch.
+    short : str
+        A second name of the option.
+    """
+    names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
+    # Click takes an option that is said to be no switch for one whose value may be left out.
+    look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
+    kind = Count() if metavar == "N" else None
+    return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)
+
+
 def material_option() -> Decorator:
     """``--material``."""
     return click.option(
         "--material",
         metavar="NAME",
         help="Take the numbers that are not given from a material, such as bureau2000, or from "
-        "a TOML file of your own.",
+        "a TOML file.",
     )
 
 
@@ -78,60 +125,94 @@ def plot_option() -> Decorator:
 
 
 def point_options(command: Command) -> Command:
-    """Options of an operating point: law, material, and numbers.
-
-    The command is called with `law` and `material` as they were given, and with `given`, the texts
-    of the numbers by their names.
-    """
+    """Options of an operating point; the command gets `point`, a `Point`."""
     named = [p for p in (*DRIVE.values(), *MACHINE.values()) if p.options]
 
     @wraps(command)
-    def gathered(*, settings: tuple[str, ...], **others: Any) -> Any:
+    def gathered(
+        *, law: str | None, material: str | None, settings: tuple[str, ...], **others: Any
+    ) -> Any:
         given = settings_of(settings)
         for parameter in named:
             value = others.pop(parameter.argument)
             if parameter.rule == "switch":
                 value = "1" if value else None
             add_setting(given, parameter.name, value)
-        return command(given=given, **others)
+        with fields_as_options(POINT_OPTIONS):
+            return command(point=point_of(law, material, given), **others)
 
-    result: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
-    for parameter in reversed(named):
-        result = _option(parameter)(result)
-    result = material_option()(result)
-    return law_option()(result)
+    drive = [_option(parameter) for parameter in DRIVE.values() if parameter.options]
+    machine = [_option(parameter) for parameter in MACHINE.values() if parameter.options]
+    numbers = set_option('--set A=0.013 --set "K=0.3 N/um"')
+    result: Command = gathered
+    for option in reversed((law_option(), material_option(), *drive, numbers, *machine)):
+        result = option(result)
+    return result
 
 
 def law_option(
     help_text: str = (
-        "Friction law, such as elasto-plastic, or one of your own as module:Name or file.py:Name."
+        "Friction law, such as elasto-plastic, or a law of yours as module:Name or file.py:Name."
     ),
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
-    return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
-
-
-def law_options() -> Decorator:
-    """``--law`` that may be repeated, as `law_option`; the command gets `laws`."""
     return click.option(
         "--law",
-        "laws",
         metavar="NAME",
-        multiple=True,
-        callback=lambda context, option, texts: tuple(
-            str(_named_law(context, option, text)) for text in texts
-        ),
-        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
-        "of a comparison, repeatable.",
+        callback=lambda context, option, text: None if text is None else known_place(text),
+        help=help_text,
     )
 
 
-def _named_law(context: click.Context, option: click.Parameter, text: str | None) -> str | None:
-    if text is None or ":" not in text:
+def law_options(default: str | None = None) -> Decorator:
+    """``--law``, which may be repeated, and ``--laws``; the command gets `laws`, a tuple of names.
+
+    Parameters
+    ----------
+    default : str, optional
+        Of ``--laws``, without either option.
+    """
+
+    def with_options(command: Command) -> Command:
+        @wraps(command)
+        def gathered(*, laws: tuple[str, ...], listed: str | None, **others: Any) -> Any:
+            if laws and listed is not None:
+                raise InputError(
+                    "--law must go without --laws, got both; they say the same, leave one out"
+                )
+            if not laws:
+                texts = (listed or default or "").split(",")
+                laws = tuple(known_place(text.strip()) for text in texts if text.strip())
+            return command(laws=laws, **others)
+
+        result: Command = click.option(
+            "--laws",
+            "listed",
+            metavar="NAMES",
+            help="The same as several --law: a,b,c or all"
+            + (f"; {default} if neither is given." if default else "."),
+        )(gathered)
+        return click.option(
+            "--law",
+            "laws",
+            metavar="NAME",
+            multiple=True,
+            callback=lambda context, option, texts: tuple(map(known_place, texts)),
+            help="Friction law, such as rice-ruina, or one of your own as module:Name or "
+            "file.py:Name; of a comparison, repeatable.",
+        )(result)
+
+    return with_options
+
+
+def known_place(text: str) -> str:
+    """Name of a law; one given by its place is imported and registered."""
+    if ":" not in text:
         return text
     from asperity.laws import known_law
 
-    return known_law(text)
+    with fields_as_options(POINT_OPTIONS):
+        return known_law(text)
 
 
 def _option(parameter: Parameter) -> Decorator:
@@ -179,19 +260,16 @@ def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
     settings[name] = value
 
 
-def law_named(name: str | None) -> str:
-    """Name of the law, which must be given."""
-    from asperity.laws import registered
+def point_of(law: str | None, material: str | None, given: dict[str, str]) -> Point:
+    """The operating point of options."""
+    from asperity.questions.point import Point
 
-    if name is None:
-        raise InputError(
-            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
-        )
-    return name
+    return Point(law=law or "", material=material or "", parameters=given)
 
 
 def material_named(name: str | None) -> Material | None:
     """Load the material, if one is named."""
     from asperity import materials
 
-    return None if name is None else materials.load(name)
+    with fields_as_options(POINT_OPTIONS):
+        return None if name is None else materials.load(name)

@@ -1,15 +1,17 @@
-"""Progress of long work on stderr: a bar on a terminal, lines in a log."""
+"""Progress of long work on stderr, a bar on a terminal or lines in a log, and Ctrl-C in it."""
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from typing import Any
 
 import click
-
-from asperity.cli.interrupt import interruptible
 
 #: Seconds before a bar shows itself, between its updates, and between lines of a log.
 _SILENT, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
@@ -79,3 +81,64 @@ def _in_log(unit: str) -> Iterator[Callable[[int, int, str], None]]:
         click.echo(f"asperity: {label or 'done'}: {amount}, {now - start:.0f} s", err=True)
 
     yield show
+
+
+INTERRUPTED = 130
+MESSAGE = "interrupted; nothing was written"
+
+Handler = Callable[[int, Any], Any]
+
+
+@contextmanager
+def ending_at_once() -> Iterator[None]:
+    """Leave the process on Ctrl-C without unwinding.
+
+    Python's default, an exception between any two steps, crashes compiled modules that are just
+    being loaded, and JAX's callbacks swallow it.
+    """
+    with _handling(_leave):
+        yield
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], None]]:
+    """Raise `KeyboardInterrupt` on Ctrl-C, for work that has files to put in order.
+
+    Yields
+    ------
+    callable
+        To be called now and then: raises again if the first exception was swallowed.
+    """
+    pressed = False
+
+    def note(signum: int, frame: Any) -> None:
+        nonlocal pressed
+        pressed = True
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if pressed:
+            raise KeyboardInterrupt
+
+    with _handling(note):
+        yield check
+
+
+def _leave(signum: int, frame: Any) -> None:
+    # Not through sys.stderr: the interrupted step may be in the middle of writing to it.
+    os.write(2, f"\nasperity: {MESSAGE}\n".encode())
+    os._exit(INTERRUPTED)
+
+
+@contextmanager
+def _handling(handler: Handler) -> Iterator[None]:
+    # Batch systems and nohup ignore Ctrl-C; only the main thread may set handlers.
+    ours = signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _leave)
+    if not ours or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

@@ -1,4 +1,4 @@
-"""``asperity recipe``: a paper's own way from measurements to numbers."""
+"""``asperity recipe``: a paper's procedure from measurements to numbers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def recipe(
     fixes: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Numbers as a PAPER finds them, step by step, beside the paper's own.
+    """Parameters by the steps of a PAPER, compared with the numbers that it prints.
 
     For bureau2000: A, B and D0 from steady sliding and its bifurcation, eps_ratio from the drop of
     the mean, lambda from mu1, a bound on alpha from the drop; uncertainties of all steps.
@@ -74,7 +74,7 @@ def recipe(
 
 
 def recipe_text(result: RecipeResult) -> str:
-    """Numbers beside the paper's, as a person reads them."""
+    """The numbers next to the published ones, as text."""
     from asperity.outputs.tables import aligned
 
     rows = [("step", "", "here", "paper", "", "from")]

@@ -44,8 +44,16 @@ def listed_times(text: str, option: str) -> list[str]:
 
 
 _OPTIONS = (
-    click.option("--load", metavar="NAME", help="Column of the normal load; found if it is one."),
-    click.option("--force", metavar="NAME", help="Column of the shear force; found if it is one."),
+    click.option(
+        "--load",
+        metavar="NAME",
+        help="Column of the normal load; by default recognised by name and unit.",
+    ),
+    click.option(
+        "--force",
+        metavar="NAME",
+        help="Column of the shear force; by default recognised by name and unit.",
+    ),
     click.option("--time", metavar="NAME", help="Column of the time."),
     click.option(
         "--column",
@@ -78,7 +86,7 @@ _OPTIONS = (
     click.option(
         "--group", metavar="NAME", help="Group of an HDF5, MATLAB or TDMS file of several."
     ),
-    click.option("--format", metavar="NAME", help="Format of the file, or a reader's of your own."),
+    click.option("--format", metavar="NAME", help="Format of the file, or name of a reader."),
     click.option("--delimiter", metavar="SIGN", help="Of a text: a character, tab or blank."),
     click.option("--decimal", metavar="SIGN", help="Decimal mark of a text: . or ,"),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,25 +13,38 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.outputs import json, output_files, written_file
 from asperity.outputs.tables import Section, as_text
-from asperity.parameters import OUTPUTS, Names, in_names
-from asperity.parameters.parameter import Drawn
+from asperity.parameters import NAMES, OUTPUTS, Names, in_names
+from asperity.parameters.names import plain_names
+from asperity.parameters.parameter import Drawn, labelled
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from asperity.laws import Law
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
 
 
-def to_json(record: Mapping[str, Any]) -> str:
-    """JSON for people and programs, indented; a number that is not finite becomes null."""
+def to_json(record: Mapping[str, Any], names: Names = "friction", law: str = "") -> str:
+    """JSON for people and programs, indented; a number that is not finite becomes null.
+
+    Keys keep the one name of each parameter; ``names`` says what another set of names calls it.
+    """
+    if names != "friction":
+        record = {**record, "names": plain_names(_law_of(law))}
     return json.to_json(record, indent=2)
 
 
 def sections_text(sections: Iterable[Section], names: Names, law: str = "") -> str:
     """Sections as text, the parameters in a set of names."""
+    chosen = _law_of(law)
+    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
+
+
+def _law_of(name: str) -> type[Law] | None:
     from asperity.laws import get_law
 
-    chosen = get_law(law) if law else None
-    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
+    return get_law(name) if name else None
 
 
 def require_picture(path: Path | None, *inputs: Path) -> None:
@@ -47,11 +60,28 @@ def write_picture(drawn: Drawn, path: Path | None, names: Names) -> None:
     """Draw an answer where ``--plot`` was given."""
     if path is None:
         return
+    save_figure(lambda: drawn.plot(names), path)
+    click.echo(f"asperity: the figure is {path}", err=True)
+
+
+def save_figure(
+    draw: Callable[[], Figure], path: Path, names: Names = NAMES[0], option: str = "--plot"
+) -> None:
+    """Draw a figure in the style of the package, and write it as PNG.
+
+    Parameters
+    ----------
+    draw : callable
+    path : Path
+    names : {"friction", "geophysics"}
+        Of its labels.
+    option : str
+        That names the path, for messages.
+    """
     from asperity.figures.style import style
 
-    with style(), written_file(path, "--plot") as file:
-        drawn.plot(names).savefig(file, metadata={"Software": None})
-    click.echo(f"asperity: the figure is {path}", err=True)
+    with style(), written_file(path, option) as file:
+        labelled(draw(), names).savefig(file, metadata={"Software": None})
 
 
 #: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.
@@ -72,7 +102,7 @@ def response_record(
     response : PeriodicResponse
         Of a single point.
     numbers : mapping of str to SourcedNumber
-        What was asked, by name.
+        Inputs by name.
     """
     converged = bool(response.converged)
 

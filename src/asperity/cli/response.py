@@ -7,20 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import (
-    json_option,
-    law_named,
-    material_named,
-    names_option,
-    plot_option,
-    point_options,
-)
+from asperity.cli.options import json_option, names_option, plot_option, point_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
     from asperity.parameters import Names
+    from asperity.questions.point import Point
 
 _EPILOG = """\b
 Examples:
@@ -58,21 +52,19 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@plot_option()
+@names_option()
+@json_option()
 @click.option(
     "--stick-slip",
     is_flag=True,
     help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
 )
-@plot_option()
-@names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
-@json_option()
 def response(
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     stick_slip: bool,
     table: Path | None,
     out: Path | None,
@@ -84,7 +76,7 @@ def response(
     """Periodic response to a modulated normal load.
 
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
-    stable or not; without inertia unless it is asked for.
+    stable or not; without inertia by default.
     """
     if stick_slip:
         if table is not None or out is not None or plot is not None or resume:
@@ -92,48 +84,33 @@ def response(
                 "--stick-slip must go with one point and alone, got --table, --out, --resume or "
                 "--plot; leave it out, or take asperity.experiment.stick_slip_response with arrays"
             )
-        return _stick_slip(law, material, given, as_json, names)
+        return _stick_slip(point, as_json, names)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
         if plot is not None:
             raise InputError("--plot must go with one point, got a table; leave one of them out")
-        return _table(table, out, law, material, given, resume, as_json)
+        return _table(table, out, point, resume, as_json)
     if out is not None or resume:
         raise InputError(
             "--out and --resume must go with --table, got no table; name it or leave them out"
         )
-    return _point(law, material, given, as_json, plot, names)
+    return _point(point, as_json, plot, names)
 
 
-def _point(
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
-    as_json: bool,
-    plot: Path | None,
-    names: Names,
-) -> int:
+def _point(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
     from asperity.cli.report import require_picture, response_record, to_json, write_picture
     from asperity.laws import get_law
-    from asperity.operating_point import (
-        numbers_for,
-        refuse_foreign,
-        respond,
-        sourced_numbers,
-    )
+    from asperity.operating_point import point_numbers, respond
 
-    law = law_named(law)
     require_picture(plot)
-    refuse_foreign(law, given)
-    numbers = numbers_for(
-        law, sourced_numbers(given, material_named(material), "command line", law)
-    )
-    result = respond(get_law(law), {name: number.value for name, number in numbers.items()})
+    numbers = point_numbers(point, "command line")
+    values = {name: number.value for name, number in numbers.items()}
+    result = respond(get_law(point.law), values)
     if as_json:
-        click.echo(to_json(response_record(result, numbers)))
+        click.echo(to_json(response_record(result, numbers), names, point.law))
     elif result.converged:
-        click.echo(_text(law, result, numbers, names))
+        click.echo(_text(point.law, result, numbers, names))
     if result.converged:
         write_picture(result, plot, names)
     if not result.converged:
@@ -141,46 +118,44 @@ def _point(
     return 0 if result.converged else 1
 
 
-def _stick_slip(
-    law: str | None, material: str | None, given: dict[str, str], as_json: bool, names: Names
-) -> int:
+def _stick_slip(point: Point, as_json: bool, names: Names) -> int:
     from asperity._version import __version__
     from asperity.cli.report import to_json
     from asperity.experiment import stick_slip_response
     from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import MODULATION, point_parameters
     from asperity.slider.named import slider_from
 
-    law = law_named(law)
-    refuse_foreign(law, given)
+    offered = offered_numbers(point, "command line")
     for name in ("epsilon", "frequency"):
-        if name in given:
+        if name in point.parameters:
             raise InputError(
-                f"--stick-slip must come without a modulation, got {name} = {given[name]}; leave "
-                "it out, or leave --stick-slip out"
+                "--stick-slip",
+                "come without a modulation",
+                f"{name} = {point.parameters[name]}",
+                "leave it out, or leave --stick-slip out",
             )
-    sourced = sourced_numbers(given, material_named(material), "command line", law)
-    modulation = ("epsilon", "frequency", *MODULATION)
-    among = {n: p for n, p in point_parameters(get_law(law)).items() if n not in modulation}
-    numbers = numbers_for(law, sourced, among)
+    law, modulation = get_law(point.law), ("epsilon", "frequency", *MODULATION)
+    among = {n: p for n, p in point_parameters(law).items() if n not in modulation}
+    numbers = numbers_for(law.name, offered, among)
     values = {name: number.value for name, number in numbers.items()}
     result = stick_slip_response(
-        slider_from(get_law(law), values), velocity=values["V"],
+        slider_from(law, values), velocity=values["V"],
         inertia=bool(values.get("inertia", 0.0)), radiation_damping=values.get("eta"),
     )  # fmt: skip
     rows = result.values()
     if as_json:
         record: dict[str, Any] = {name: value for name, value, _, _ in rows}
-        record |= {"result": str(result.result), "asperity_version": __version__, "law": law}
-        click.echo(to_json({**record, "parameters": values}))
+        record |= {"result": str(result.result), "asperity_version": __version__, "law": law.name}
+        click.echo(to_json({**record, "parameters": values}, names, law.name))
     else:
         texts = [
             (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)
             for name, value, unit, meaning in rows
             if result.slips or name in ("steady", "stable")
         ]
-        click.echo(_words(law, numbers, str(result.result), texts, names))
+        click.echo(_words(law.name, numbers, str(result.result), texts, names))
     return 0 if result.slips or result.steady else 1
 
 
@@ -228,21 +203,18 @@ def _words(
 def _table(
     table: Path,
     out: Path,
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     resume: bool,
     as_json: bool,
 ) -> int:
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.laws import get_law
-    from asperity.operating_point import sourced_numbers
+    from asperity.operating_point import material_of, sourced_numbers
     from asperity.study.table import run_table
 
-    if law is not None:
-        get_law(law)
-    filled = sourced_numbers(given, material_named(material), law=law)
+    law = get_law(point.law).name if point.law else None
+    filled = sourced_numbers(point.parameters, material_of(point), law=law)
     with bar("point", "responses") as update:
         done = run_table(
             table,

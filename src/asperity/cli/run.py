@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option, law_option
+from asperity.cli.options import json_option, law_option, names_option, plot_option
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
+    from asperity.parameters import Names
     from asperity.protocol import Protocol, RecordingSetup, RunSummary
 
 _EPILOG = """\b
 Examples:
-  asperity run protocol.toml --out run.nc --csv --plot
+  asperity run protocol.toml --out run.nc --csv --plot run.png
   asperity run protocol.toml --out run.nc --record recording.csv
   asperity run protocol.toml --out run.nc --resume
 
@@ -48,8 +49,10 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 @click.command(epilog=_EPILOG)
 @click.argument("protocol", type=Path)
 @click.option("--out", type=Path, metavar="NC", required=True, help="Where the motion goes.")
-@click.option("--csv", "as_csv", is_flag=True, help="Write it as text too, beside --out.")
-@click.option("--plot", is_flag=True, help="Draw it too, as a PNG beside --out.")
+@plot_option()
+@names_option()
+@json_option()
+@click.option("--csv", "as_csv", is_flag=True, help="Write it as text too, next to --out.")
 @click.option(
     "--record",
     type=Path,
@@ -58,12 +61,12 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 )
 @law_option("Make a law of your own known to the protocol: module:Name or file.py:Name.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted run.")
-@json_option()
 def run(
     protocol: Path,
     out: Path,
     as_csv: bool,
-    plot: bool,
+    plot: Path | None,
+    names: Names,
     record: Path | None,
     law: str | None,
     resume: bool,
@@ -74,10 +77,12 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
+    from asperity.cli.report import require_picture, save_figure
     from asperity.outputs import output_files
     from asperity.protocol import (
         ProtocolError,
         load_protocol,
+        outline,
         record_run,
         run_protocol,
         write_csv,
@@ -85,9 +90,9 @@ def run(
     from asperity.recording.writers import write
 
     text = out.with_suffix(".csv") if as_csv else None
-    picture = out.with_suffix(".png") if plot else None
+    require_picture(plot, protocol)
     output_files(
-        {"--out": out, "--csv": text, "--plot": picture, "--record": record},
+        {"--out": out, "--csv": text, "--plot": plot, "--record": record},
         inputs={"protocol": protocol},
     )
     try:
@@ -112,8 +117,11 @@ def run(
     with _after_the_motion(files):
         if text is not None:
             files.append(write_csv(out, text))
-        if picture is not None:
-            files.append(_draw(out, picture))
+        if plot is not None:
+            from asperity.figures.trajectory import draw_run
+
+            save_figure(lambda: draw_run(outline(out)), plot, names)
+            files.append(plot)
         if record is not None and setup is not None:
             files.append(write(record_run(setup, out), record))
     _report(wanted, done, files, as_json, statement)
@@ -127,7 +135,7 @@ def run(
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
     """On Ctrl-C, say that the motion is finished and which other files are."""
-    from asperity.cli.interrupt import interruptible
+    from asperity.cli.progress import interruptible
 
     try:
         with interruptible():
@@ -182,17 +190,6 @@ def _setup_for(wanted: Protocol, record: Path) -> RecordingSetup:
         )
     check_path(record)
     return wanted.setup
-
-
-def _draw(run_file: Path, picture: Path) -> Path:
-    from asperity.figures.style import style
-    from asperity.figures.trajectory import draw_run
-    from asperity.outputs import written_file
-    from asperity.protocol import outline
-
-    with style(), written_file(picture, "--plot") as file:
-        draw_run(outline(run_file)).savefig(file, metadata={"Software": None})
-    return picture
 
 
 def _report(

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import click
 
-from asperity.cli.interrupt import INTERRUPTED, MESSAGE, ending_at_once
+from asperity.cli.progress import INTERRUPTED, MESSAGE, ending_at_once
 from asperity.cli.words import in_options
 from asperity.errors import InputError, closest, naming, printable
 
@@ -19,9 +19,9 @@ _BAD_INPUT = 2
 
 
 class Shell(click.Group):
-    """Commands by the module that defines each, under its own name.
+    """Commands by the module that defines each, under its name.
 
-    A command returns its exit code, None for 0. `InputError` and click's own complaints become one
+    A command returns its exit code, None for 0. `InputError` and click's errors become one
     line on stderr and exit code 2, Ctrl-C one line and 130.
 
     Parameters
@@ -57,7 +57,7 @@ class Shell(click.Group):
     ) -> NoReturn:
         """Run, and leave with the exit code.
 
-        Click's own standalone mode is not used: its messages take several lines.
+        Click's standalone mode is not used: its messages take several lines.
         """
         try:
             with ending_at_once(), _warnings_as_sentences(), naming(in_options):

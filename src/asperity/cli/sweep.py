@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.interrupt import interruptible
 from asperity.cli.options import Count, json_option
+from asperity.cli.progress import interruptible
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -246,11 +246,10 @@ def status(store: Path, as_json: bool) -> int:
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned
     from asperity.study import store_status
-    from asperity.study.results import status_record
 
     result = store_status(store)
     if as_json:
-        click.echo(to_json(status_record(result)))
+        click.echo(to_json({**vars(result), "store": str(result.store)}))
         return 0
     done = result.done / result.points
     rows = [
@@ -340,21 +339,19 @@ def plot(
     assert show is not None
     assert x is not None
     assert out is not None
+    from asperity.cli.report import save_figure
     from asperity.figures.slice import plot_slice
-    from asperity.figures.style import style
-    from asperity.outputs import output_file, written_file
+    from asperity.outputs import output_file
 
-    where = settings_of(at, "--at")
-    for name, value in where.items():
+    where: dict[str, float] = {}
+    for name, value in settings_of(at, "--at").items():
         try:
-            float(value)
+            where[name] = float(value)
         except ValueError:
             raise InputError(
                 f"--at must be a number in SI or the number of a row, got '{name}={value}'; write "
                 "it like --at epsilon=0.1"
             ) from None
     target = output_file(out, "--out", example="slice.png")
-    with style(), written_file(target, "--out") as file:
-        figure = plot_slice(store, show, x=x, y=y, at={n: float(v) for n, v in where.items()})
-        figure.savefig(file, metadata={"Software": None})
+    save_figure(lambda: plot_slice(store, show, x=x, y=y, at=where), target, option="--out")
     return 0

@@ -7,6 +7,9 @@ from contextlib import contextmanager
 
 from asperity.errors import Argument, InputError, naming
 
+#: Fields of an operating point, and fields whose options take NAME=VALUE.
+POINT_OPTIONS: Mapping[str, str] = {"law": "--law", "material": "--material"}
+_PAIRS = ("fixed", "numbers", "start", "prior")
 _OPTIONS: Mapping[str, str] = {
     "measure.trace": "the recording",
     "measure.steps and holds": "--steps and --holds",
@@ -25,13 +28,13 @@ _OPTIONS: Mapping[str, str] = {
 }
 
 
-def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
+def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> str:
     """The words of the command line: ``--load``, ``--column "velocity=speed"``.
 
     Parameters
     ----------
     argument : Argument
-    own : mapping of str to str, optional
+    options : mapping of str to str, optional
         Option of each field of a question, which other commands mean otherwise.
     """
     from asperity.parameters import DRIVE, MACHINE
@@ -50,18 +53,20 @@ def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
         if named and named.options:
             return f"{named.options[0]} {_quoted(value) if value else ''}".rstrip()
         pair = _quoted(f"{key}={value}", also="=") if value else key
-        return f"{(own or {}).get(name, '--set')} {pair}".rstrip()
+        return f"{(options or {}).get(name, '--set')} {pair}".rstrip()
     if name == "channels" and value:
         return f'--channel "{key} = {value}"'
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
-    known = {**_OPTIONS, **SOURCE_OPTIONS, **(own or {})}
+    known = {**_OPTIONS, **SOURCE_OPTIONS, **(options or {})}
     known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
     known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
     option = known.get(name)
     if option is None:
         whole, _, part = name.partition(".")
-        option, key = (known[whole], part) if whole in (own or {}) else (name, key)
+        option = name
+        if whole in _PAIRS and whole in (options or {}):
+            option, key = known[whole], part
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 
@@ -70,12 +75,12 @@ def _quoted(value: str, also: str = "") -> str:
 
 
 @contextmanager
-def fields_as_options(own: Mapping[str, str]) -> Iterator[None]:
+def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
     """Name fields of a question, which other commands mean otherwise, by this command's options.
 
     Parameters
     ----------
-    own : mapping of str to str
+    options : mapping of str to str
         Option of each field.
     """
 
@@ -84,7 +89,7 @@ def fields_as_options(own: Mapping[str, str]) -> Iterator[None]:
         # All files of data have the same options.
         if head == "data" and rest:
             argument = argument._replace(name=rest.partition(".")[2] or rest)
-        return in_options(argument, own)
+        return in_options(argument, options)
 
     with naming(words):
         try:

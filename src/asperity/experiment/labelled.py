@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from asperity._version import __version__
 from asperity.laws import Law
 from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters
+from asperity.parameters.parameter import Displayed, SummaryLine, number_line
+from asperity.slider import Slider
 from asperity.slider.named import slider_values
 
 if TYPE_CHECKING:
@@ -32,53 +34,74 @@ class Shaped:
         return array.reshape((*self._shape, *array.shape[1:]))
 
 
-def labelled(
-    record: Any,
-    meanings: Mapping[str, tuple[str, str]],
-    drive: Mapping[str, tuple[str, Float]],
-    dims: tuple[str, ...] | None = None,
-) -> xarray.Dataset:
-    """A record as a Dataset: its arrays, drive, slider and law with units and meanings.
+class Labelled(Displayed):
+    """A record of arrays of one shape, `result` among them, and its `slider`.
 
-    Parameters
-    ----------
-    record : object
-        With arrays of one shape, `result` among them, and its `slider`.
+    Class attributes
+    ----------------
     meanings : mapping of str to (str, str)
-        Unit and meaning by the name of an attribute; those that the record has are taken.
-    drive : mapping of str to (str, array)
-        Unit and values of what drives the slider.
-    dims : tuple of str, optional
-        Names of the axes; by default of what varies along each alone.
+        Unit and meaning by the name of an attribute.
+    drive : mapping of str to str
+        Unit by the name of what drives the slider.
+    shown : tuple of str
+        What the summary has.
     """
-    import xarray
 
-    shape = record.result.shape
-    values = {name: (np.asarray(v), {"units": unit}) for name, (unit, v) in drive.items()}
-    law: type[Law] = type(record.slider.law)
-    known = {**law_parameters(law), **MACHINE}
-    for name, value in slider_values(record.slider).items():
-        array = np.asarray(value, float)
-        padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
-        values[name] = padded, known[name].attributes
-    varying = {name: _varying(value) for name, (value, _) in values.items()}
-    names = dimension_names(shape, varying, dims)
-    data = {
-        name: (names, getattr(record, name), {"units": unit, "long_name": meaning})
-        for name, (unit, meaning) in meanings.items()
-        if hasattr(record, name)
-    }
-    data["result"] = (names, record.result.astype(str), {"long_name": "what follows"})
-    coords = {
-        name: (
-            [d for d, n in zip(names, varying[name], strict=True) if n > 1],
-            value[tuple(slice(None) if n > 1 else 0 for n in varying[name])],
-            attributes,
-        )
-        for name, (value, attributes) in values.items()
-    }
-    attrs = {"asperity_version": __version__, "law": law.name}
-    return xarray.Dataset(data, coords=coords, attrs=attrs)
+    meanings: ClassVar[Mapping[str, tuple[str, str]]]
+    drive: ClassVar[Mapping[str, str]]
+    shown: ClassVar[tuple[str, ...]]
+
+    result: NDArray[np.object_]
+    slider: Slider
+
+    def outcomes(self) -> str:
+        """How many points there are, and what became of them."""
+        raise NotImplementedError
+
+    def values(self) -> list[tuple[str, float, str, str]]:
+        """Name, value, unit and meaning of every number of a single point."""
+        return [(n, float(getattr(self, n).item()), *about) for n, about in self.meanings.items()]
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """The law and the outcomes, and the range of the most important numbers."""
+        lines = [number_line(n, getattr(self, n), self.meanings[n][1]) for n in self.shown]
+        return f"{type(self).__name__}, {self.slider.law.name}, {self.outcomes()}", lines
+
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """Arrays, drive, slider and law with units and meanings.
+
+        Parameters
+        ----------
+        dims : tuple of str, optional
+            Names of the axes; by default of what varies along each alone.
+        """
+        import xarray
+
+        shape = self.result.shape
+        values = {n: (np.asarray(getattr(self, n)), {"units": u}) for n, u in self.drive.items()}
+        law: type[Law] = type(self.slider.law)
+        known = {**law_parameters(law), **MACHINE}
+        for name, value in slider_values(self.slider).items():
+            array = np.asarray(value, float)
+            padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
+            values[name] = padded, known[name].attributes
+        varying = {name: _varying(value) for name, (value, _) in values.items()}
+        names = dimension_names(shape, varying, dims)
+        data = {
+            name: (names, getattr(self, name), {"units": unit, "long_name": meaning})
+            for name, (unit, meaning) in self.meanings.items()
+        }
+        data["result"] = (names, self.result.astype(str), {"long_name": "what follows"})
+        coords = {
+            name: (
+                [d for d, n in zip(names, varying[name], strict=True) if n > 1],
+                value[tuple(slice(None) if n > 1 else 0 for n in varying[name])],
+                attributes,
+            )
+            for name, (value, attributes) in values.items()
+        }
+        attrs = {"asperity_version": __version__, "law": law.name}
+        return xarray.Dataset(data, coords=coords, attrs=attrs)
 
 
 def _varying(value: Float) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ way back to steady sliding. The extremum is located, not sampled.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
-from asperity.experiment.labelled import Shaped, labelled
+from asperity.experiment.labelled import Labelled, Shaped
 from asperity.laws import Law
 from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
-from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import Slider
 from asperity.slider.problem import flatten
 from asperity.theory.memory import steady_growth
@@ -32,9 +31,6 @@ from asperity.transients.hold_and_step import (
     settle,
     step,
 )
-
-if TYPE_CHECKING:
-    import xarray
 
 Float = NDArray[np.float64]
 
@@ -50,21 +46,58 @@ _STEP = 0.02
 _SENTENCES = {
     End.STEADY: "comes back to steady sliding",
     End.RUNAWAY: (
-        "runs away after the extremum: steady sliding is stable, but the disturbance is too large "
-        "for this spring and law; take a stiffer spring, or inertia in asperity.transient"
+        "accelerates without bound after the extremum: steady sliding is stable, but the "
+        "disturbance is too large for this spring and law; take a stiffer spring, or "
+        "inertia in asperity.transient"
     ),
     End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
     End.CROSSING: "was followed to the extremum only",
 }
 _RINGING = "did not settle within the steps that are allowed; the extremum is as it should be"
 _UNSTABLE = (
-    "runs away after the extremum: the spring is softer than the critical stiffness; take a "
-    "stiffer spring, or inertia in asperity.transient"
+    "accelerates without bound after the extremum: the spring is softer than the critical "
+    "stiffness; take a stiffer spring, or inertia in asperity.transient"
 )
 
 
+#: Unit and meaning of what both kinds of test have, of holds, and of velocity steps.
+_BOTH: dict[str, tuple[str, str]] = {
+    "distance": ("m", "way of the drive to the extremum"),
+    "slip": ("m", "slip to the extremum"),
+    "settling_distance": ("m", f"way of the drive to within {100 * SETTLED:g} % of steady sliding"),
+    "settling_slip": ("m", f"slip to within {100 * SETTLED:g} % of steady sliding"),
+    "stable": ("1", "whether steady sliding is stable"),
+}
+_OF_HOLDS: dict[str, tuple[str, str]] = {
+    "level": ("1", "F/W0 of steady sliding"),
+    "minimum": ("1", "F/W0 at the end of the hold"),
+    "maximum": ("1", "static friction: F/W0 at the maximum after the hold"),
+    "healing": ("1", "static friction less the level of sliding"),
+    "healing_rate": ("1", "healing per decade of hold time"),
+    "relaxation": ("1", "fall of F/W0 in the hold"),
+    "hold_slip": ("m", "slip in the hold"),
+    "end_velocity": ("m/s", "plastic velocity at the end of the hold"),
+}
+_OF_STEPS: dict[str, tuple[str, str]] = {
+    "before": ("1", "F/W0 of steady sliding before the step"),
+    "extremum": ("1", "F/W0 at the first extremum after the step"),
+    "after": ("1", "F/W0 of steady sliding after the step"),
+    "direct": ("1", "extremum less F/W0 before the step"),
+    "evolution": ("1", "extremum less F/W0 in steady sliding after the step"),
+}
+
+
+class _Memory(Labelled):
+    """Outcomes of tests of the memory of friction."""
+
+    def outcomes(self) -> str:
+        """How many points there are, and how many do not settle."""
+        lost = sum(text != _SENTENCES[End.STEADY] for text in self.result.ravel())
+        return f"{self.result.size} points" + (f", {lost} of which do not settle" if lost else "")
+
+
 @dataclass(frozen=True, repr=False)
-class Holds(Displayed):
+class Holds(_Memory):
     """Slide-hold-slide tests: static friction, healing and relaxation; arrays of one shape.
 
     Attributes
@@ -102,6 +135,10 @@ class Holds(Displayed):
     slider : Slider
     """
 
+    meanings = _OF_HOLDS | _BOTH
+    drive: ClassVar[dict[str, str]] = {"hold_time": "s", "velocity": "m/s"}
+    shown = ("healing", "healing_rate", "relaxation", "hold_slip", "settling_slip")
+
     hold_time: Float
     velocity: Float
     level: Float
@@ -132,20 +169,9 @@ class Holds(Displayed):
         """Decrease of the force in the hold, over W0."""
         return self.level - self.minimum
 
-    def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Healing, its rate, and what follows."""
-        names = ("healing", "healing_rate", "relaxation", "hold_slip", "settling_slip")
-        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
-        return f"Holds, {self.slider.law.name}, {_outcomes(self.result)}", lines
-
-    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
-        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
-        drive = {"hold_time": ("s", self.hold_time), "velocity": ("m/s", self.velocity)}
-        return labelled(self, _MEANINGS, drive, dims)
-
 
 @dataclass(frozen=True, repr=False)
-class VelocityStepResponse(Displayed):
+class VelocityStepResponse(_Memory):
     """Steps of the drive's velocity from steady sliding; arrays of one shape.
 
     Attributes
@@ -170,6 +196,10 @@ class VelocityStepResponse(Displayed):
     slider : Slider
         As for `Holds`.
     """
+
+    meanings = _OF_STEPS | _BOTH
+    drive: ClassVar[dict[str, str]] = {"velocity_before": "m/s", "velocity": "m/s"}
+    shown = ("direct", "evolution", "settling_slip")
 
     velocity_before: Float
     velocity: Float
@@ -196,18 +226,6 @@ class VelocityStepResponse(Displayed):
         """Change of friction from the extremum to steady sliding (evolution effect)."""
         return self.extremum - self.after
 
-    def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Direct effect, evolution, and what follows."""
-        names = ("direct", "evolution", "settling_slip")
-        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
-        title = f"VelocityStepResponse, {self.slider.law.name}, {_outcomes(self.result)}"
-        return title, lines
-
-    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
-        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
-        drive = {n: ("m/s", getattr(self, n)) for n in ("velocity_before", "velocity")}
-        return labelled(self, _MEANINGS, drive, dims)
-
 
 @typed
 def hold_response(
@@ -223,7 +241,8 @@ def hold_response(
     Parameters
     ----------
     slider : Slider or Law
-        A law alone takes `stiffness`. Its parameters may be arrays, which broadcast with the rest.
+        A law alone takes `stiffness`. Its parameters may be arrays, which broadcast with the
+        other arguments.
     hold_time : array or str
         Seconds, positive.
     velocity : array or str
@@ -407,31 +426,3 @@ def _settling(
         "settling_slip": shaped(none if after is None else after.slip),
         "result": shaped(texts),
     }
-
-
-def _outcomes(result: NDArray[np.object_]) -> str:
-    lost = sum(text != _SENTENCES[End.STEADY] for text in result.ravel())
-    return f"{result.size} points" + (f", {lost} of which do not settle" if lost else "")
-
-
-#: Unit and meaning of the variables.
-_MEANINGS: dict[str, tuple[str, str]] = {
-    "level": ("1", "F/W0 of steady sliding"),
-    "minimum": ("1", "F/W0 at the end of the hold"),
-    "maximum": ("1", "static friction: F/W0 at the maximum after the hold"),
-    "healing": ("1", "static friction less the level of sliding"),
-    "healing_rate": ("1", "healing per decade of hold time"),
-    "relaxation": ("1", "fall of F/W0 in the hold"),
-    "hold_slip": ("m", "slip in the hold"),
-    "end_velocity": ("m/s", "plastic velocity at the end of the hold"),
-    "before": ("1", "F/W0 of steady sliding before the step"),
-    "extremum": ("1", "F/W0 at the first extremum after the step"),
-    "after": ("1", "F/W0 of steady sliding after the step"),
-    "direct": ("1", "extremum less F/W0 before the step"),
-    "evolution": ("1", "extremum less F/W0 in steady sliding after the step"),
-    "distance": ("m", "way of the drive to the extremum"),
-    "slip": ("m", "slip to the extremum"),
-    "settling_distance": ("m", f"way of the drive to within {100 * SETTLED:g} % of steady sliding"),
-    "settling_slip": ("m", f"slip to within {100 * SETTLED:g} % of steady sliding"),
-    "stable": ("1", "whether steady sliding is stable"),
-}

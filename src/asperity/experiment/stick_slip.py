@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -12,17 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.algebra.small_systems import jacobian_columns
 from asperity.errors import InputError
-from asperity.experiment.labelled import Shaped, labelled
+from asperity.experiment.labelled import Labelled, Shaped
 from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
-from asperity.parameters.parameter import Displayed, SummaryLine, number_line
+from asperity.parameters.parameter import Drawn
 from asperity.slider import Motion, Slider, equation_of_motion
 from asperity.slider.problem import flatten
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
-
-if TYPE_CHECKING:
-    import xarray
 
 Float = NDArray[np.float64]
 
@@ -42,7 +39,7 @@ _MEANINGS: dict[str, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, repr=False)
-class StickSlip(Displayed):
+class StickSlip(Labelled, Drawn):
     """Limit cycles under a drive of constant velocity; arrays of one shape.
 
     Numbers are NaN where no cycle repeats itself; `result` says why.
@@ -61,14 +58,19 @@ class StickSlip(Displayed):
     slips : int array
         In a period; 0 where no cycle repeats itself.
     steady : bool array
-        Whether the motion comes to steady sliding.
+        Whether the motion ends in steady sliding.
     stable : bool array
         Whether steady sliding is stable against small disturbances. Where it is, and there is
         stick-slip all the same, the beginning of the motion decides.
     result : str array
-        What the motion comes to.
+        Sentence on how the motion ends: stick-slip, steady sliding, or why neither.
     slider : Slider
     """
+
+    meanings = _MEANINGS
+    drive: ClassVar[dict[str, str]] = {"velocity": "m/s"}
+    shown = ("period", "drop", "slip_duration", "peak_velocity")
+    _drawn_by = "asperity.figures.response:draw_stick_slip_response"
 
     velocity: Float
     period: Float
@@ -84,21 +86,9 @@ class StickSlip(Displayed):
     result: NDArray[np.object_]
     slider: Slider
 
-    def values(self) -> list[tuple[str, float, str, str]]:
-        """Name, value, unit and meaning of every number of a single point."""
-        return [(n, float(getattr(self, n).item()), *about) for n, about in _MEANINGS.items()]
-
-    def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Period, drop and peak velocity, and how many points have a cycle."""
-        names = ("period", "drop", "slip_duration", "peak_velocity")
-        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
-        count = int(np.sum(self.slips > 0))
-        points = f"{self.slips.size} points, {count} with stick-slip"
-        return f"StickSlip, {self.slider.law.name}, {points}", lines
-
-    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
-        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
-        return labelled(self, _MEANINGS, {"velocity": ("m/s", self.velocity)}, dims)
+    def outcomes(self) -> str:
+        """How many points there are, and how many have a cycle."""
+        return f"{self.slips.size} points, {int(np.sum(self.slips > 0))} with stick-slip"
 
 
 @typed
@@ -111,7 +101,7 @@ def stick_slip_response(
     radiation_damping: float | str | None = None,
     rtol: float = 1e-9,
 ) -> StickSlip:
-    """What a slider pulled at a constant velocity comes to: stick-slip, or steady sliding.
+    """Long-term motion of a slider pulled at a constant velocity: stick-slip or steady sliding.
 
     Parameters
     ----------
@@ -141,9 +131,10 @@ def stick_slip_response(
     Notes
     -----
     The motion begins after sliding at a thousandth of the velocity, so that of a cycle and stable
-    steady sliding the cycle is reached. It is followed until its states repeat themselves to 1e-8,
-    after up to eight slips; `drop`, `peak` and `period` are accurate to about 1e-8 relatively. One
-    point after the other takes some hundredths of a second each.
+    steady sliding the cycle is reached. Near its end Newton's method closes the cycle, of up to
+    eight slips, which is taken where all its multipliers lie within the unit circle; `drop`, `peak`
+    and `period` are accurate to about 1e-8 relatively. One point after the other takes some
+    hundredths of a second each: steps of stiff motions differ too much to be taken together.
     """
     if not slider.law.rate_dependent:
         raise InputError(

@@ -330,7 +330,7 @@ class _Drawing:
     def _range(self, item: Item, panel: Panel, axis: Axes) -> None:
         """A hatched bar over the interval that a text states at one abscissa.
 
-        It lies below the curves and is wide, so that nobody takes it for a measured point.
+        It lies below the curves and is wide, so that it is not taken for a measured point.
         """
         from matplotlib.patches import Rectangle
 

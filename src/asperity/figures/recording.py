@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
-from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, STATED_FILL, new_figure
+from asperity.figures.style import (
+    ELASTO_PLASTIC,
+    GREY,
+    LINKER_DIETERICH,
+    STATED_FILL,
+    letter_panels,
+    new_figure,
+)
 from asperity.measurement.record import mean_cycle, residual_spectrum
 
 if TYPE_CHECKING:
@@ -26,7 +33,6 @@ if TYPE_CHECKING:
 _COLUMNS = 1200
 _POINTS = 20_000
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
-_LABELLED: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
 
 def draw_modulated(measurement: Measurement) -> Figure:
@@ -41,8 +47,7 @@ def draw_modulated(measurement: Measurement) -> Figure:
     _draw_recording(whole, measurement)
     _draw_cycle(cycle, measurement)
     _draw_residual(left, measurement)
-    for axis, letter in zip((whole, cycle, left), "abc", strict=True):
-        axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, **_LABELLED)
+    letter_panels((whole, cycle, left))
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Figure of a periodic response: one cycle of a point, or curves over the varying parameter."""
+"""Figures of responses, periodic and of stick-slip: a cycle of one point, or curves over points."""
 
 from __future__ import annotations
 
@@ -16,10 +16,22 @@ from asperity.units import format_si
 if TYPE_CHECKING:
     import xarray
 
+    from asperity.experiment.stick_slip import StickSlip
     from asperity.orbit import PeriodicResponse
 
 #: Largest number of curves in a panel.
 _MOST_CURVES = 8
+#: Name, label and unit of the quantity of each panel.
+_PERIODIC = (
+    ("mean_friction", "mean of $F/W_0$", 1.0),
+    ("mu1", r"$\mu_1$", 1.0),
+    ("mu2", r"$\mu_2$", 1.0),
+)
+_STICK_SLIP = (
+    ("drop", "drop of $F/W_0$", 1.0),
+    ("period", "period (s)", 1.0),
+    ("peak_velocity", "largest velocity (mm/s)", 1e-3),
+)
 
 
 def draw_response(response: PeriodicResponse) -> Figure:
@@ -39,14 +51,38 @@ def draw_response(response: PeriodicResponse) -> Figure:
     if response.mean_friction.size == 1:
         return _cycle(response)
     data = response.to_dataset().squeeze()
-    count = int(np.prod([data.sizes[d] for d in data.mean_friction.dims[:-1]]))
-    if data.mean_friction.ndim > 2 or count > _MOST_CURVES:
-        shape = "x".join(map(str, response.mean_friction.shape))
+    _require_rows(data.mean_friction.shape, "one point, a row of points", "asperity.map")
+    return _curves(data, response.slider.law.name, _PERIODIC, ~data.stable.values)
+
+
+def draw_stick_slip_response(response: StickSlip) -> Figure:
+    """Drop, period and largest velocity over the last axis of several points.
+
+    Parameters
+    ----------
+    response : StickSlip
+        With one or two axes. A point without stick-slip leaves a gap.
+
+    Raises
+    ------
+    InputError
+        If there is one point only, more than two axes, or too many curves.
+    """
+    data = response.to_dataset().squeeze()
+    if data.period.ndim == 0:
         raise InputError(
-            f"plot must have one point, a row of points or up to {_MOST_CURVES} rows, got "
-            f"{shape} points; draw grids with asperity.map"
+            "plot", "have a row of points", "one", "give several velocities, as an array"
         )
-    return _curves(data, response.slider.law.name)
+    _require_rows(data.period.shape, "a row of points", "xarray, from its to_dataset()")
+    return _curves(data, response.slider.law.name, _STICK_SLIP)
+
+
+def _require_rows(shape: tuple[int, ...], rows: str, other: str) -> None:
+    if len(shape) > 2 or int(np.prod(shape[:-1])) > _MOST_CURVES:
+        raise InputError(
+            f"plot must have {rows} or up to {_MOST_CURVES} rows, got "
+            f"{'x'.join(map(str, shape))} points; draw grids with {other}"
+        )
 
 
 def _cycle(response: PeriodicResponse) -> Figure:
@@ -92,44 +128,46 @@ def _cycle(response: PeriodicResponse) -> Figure:
     return figure
 
 
-def _curves(data: xarray.Dataset, law: str) -> Figure:
-    """Mean, first and second harmonic over the last axis, a curve for each row of the first."""
+def _curves(
+    data: xarray.Dataset,
+    law: str,
+    shown: tuple[tuple[str, str, float], ...],
+    unstable: Any = None,
+) -> Figure:
+    """Quantities over the last axis, a panel each, and a curve for each row of the first."""
     figure = new_figure(6.4, 2.7)
-    panels = figure.subplots(1, 3)
-    along = str(data.mean_friction.dims[-1])
+    panels = figure.subplots(1, len(shown))
+    dims = data[shown[0][0]].dims
+    along = str(dims[-1])
     side = data[along] if along in data.coords else None
     unit = (1.0, "") if side is None else axis_unit(side)
     x = np.arange(data.sizes[along]) if side is None else side.values / unit[0]
-    rows = data if data.mean_friction.ndim == 2 else data.expand_dims("row")
-    across = str(rows.mean_friction.dims[0])
-    for panel, (name, text) in zip(
-        panels,
-        (
-            ("mean_friction", "mean of $F/W_0$"),
-            ("mu1", r"$\mu_1$"),
-            ("mu2", r"$\mu_2$"),
-        ),
-        strict=True,
-    ):
+    rows = data if len(dims) == 2 else data.expand_dims("row")
+    across = str(rows[shown[0][0]].dims[0])
+    opened = np.zeros(rows[shown[0][0]].shape, bool) if unstable is None else unstable
+    opened = opened.reshape(rows[shown[0][0]].shape)
+    for panel, (name, text, scale) in zip(panels, shown, strict=True):
         for i in range(rows.sizes[across]):
             row = rows.isel({across: i})
-            _curve(panel, x, row[name].values, row.stable.values, _row_label(row, across))
+            _curve(panel, x, row[name].values / scale, opened[i], _row_label(row, across))
         panel.set(xlabel=along if side is None else label(side, unit), ylabel=text)
         if x.min() > 0 and x.max() > 30 * x.min():
             panel.set_xscale("log")
+        if unstable is None and np.nanmax(rows[name]) > 30 * np.nanmin(rows[name]):
+            panel.set_yscale("log")
         panel.margins(y=0.08)
     if rows.sizes[across] > 1:
         panels[0].legend(fontsize="small")
-    if not rows.stable.values.all():
+    if opened.any():
         panels[2].plot([], [], "o", color=GREY, fillstyle="none", markersize=3, label="unstable")
         panels[2].legend(handles=panels[2].get_lines()[-1:], fontsize="small")
     figure.suptitle(law, fontsize="small")
     return figure
 
 
-def _curve(panel: Axes, x: Any, y: Any, stable: Any, text: str) -> None:
+def _curve(panel: Axes, x: Any, y: Any, unstable: Any, text: str) -> None:
     (line,) = panel.plot(x, y, label=text)
-    open_ = ~stable & np.isfinite(y)
+    open_ = unstable & np.isfinite(y)
     panel.plot(x[open_], y[open_], "o", color=line.get_color(), fillstyle="none", markersize=3)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from asperity.figures.plot import NORMAL
 from asperity.figures.recording import band
-from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure
+from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, letter_panels, new_figure
 from asperity.measurement.stick_slip.regimes import REPEATED
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 _CLOSE = 8
 #: Of the series of a campaign, in turn.
 _MARKS = "osD^vP"
-_LETTER: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
 
 def draw_stick_slip(measurement: StickSlipMeasurement) -> Figure:
@@ -37,8 +36,7 @@ def draw_stick_slip(measurement: StickSlipMeasurement) -> Figure:
     _draw_whole(whole, measurement)
     _draw_close(close, measurement)
     _draw_drops(drops, measurement)
-    for axis, letter in zip((whole, close, drops), "abc", strict=True):
-        axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, **_LETTER)
+    letter_panels((whole, close, drops))
     return figure
 
 

@@ -9,18 +9,15 @@ Figures and their numbers are the same bytes on disk whenever the same numbers a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from string import ascii_lowercase
 
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 #: Twelve digits: more than the accuracy of any method, and less than round-off.
 _DIGITS = "%.12g"
@@ -121,6 +118,10 @@ def style() -> Iterator[None]:
 
 def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
     """An empty figure (inches), not registered with pyplot."""
-    from matplotlib.figure import Figure
-
     return Figure(figsize=(width, height))
+
+
+def letter_panels(axes: Sequence[Axes]) -> None:
+    """Write (a), (b), ... into the upper left corners of the panels."""
+    for axis, letter in zip(axes, ascii_lowercase, strict=False):
+        axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)

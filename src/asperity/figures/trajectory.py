@@ -1,4 +1,4 @@
-"""Figure of a run: load, force and velocity over time, with its events."""
+"""Figure of a run: load, force, velocity and age over time, with its events."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_RUINA, new_figure
+from asperity.figures.style import (
+    ELASTO_PLASTIC,
+    GREY,
+    LINKER_DIETERICH,
+    RICE_RUINA,
+    letter_panels,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from asperity.protocol import RunOutline
@@ -22,7 +29,7 @@ _STRETCHES = 2000
 
 
 def draw_run(run: RunOutline) -> Figure:
-    """Load, spring force, and velocity of the slider over time.
+    """Load, spring force, velocity of the slider and age of the contacts over time.
 
     Where a curve turns faster than the figure can show, the band between its extremes is filled.
 
@@ -30,27 +37,30 @@ def draw_run(run: RunOutline) -> Figure:
     ----------
     run : RunOutline
     """
-    figure = new_figure(5.0, 6.2)
-    load, force, velocity = figure.subplots(3, 1, sharex=True)
+    aged = "age" in run.low
+    figure = new_figure(5.0, 8.0 if aged else 6.2)
+    panels = figure.subplots(4 if aged else 3, 1, sharex=True)
+    load, force, velocity = panels[:3]
     _draw_band(load, run, "load", RICE_RUINA, 1.0)
     _draw_band(force, run, "force", ELASTO_PLASTIC, 1.0)
     _draw_band(velocity, run, "velocity", ELASTO_PLASTIC, 1e6)
     load.set_ylabel("$W$ (N)")
     force.set_ylabel("$F$ (N)")
     velocity.set_ylabel("velocity (µm/s)")
-    velocity.set_xlabel("time (s)")
     _scale_velocity(velocity, run)
+    if aged:
+        _draw_age(panels[3], run)
+    panels[-1].set_xlabel("time (s)")
     _mark_events(force, run)
     if run.title:
         load.set_title(run.title)
-    for axis, letter in zip((load, force, velocity), "abc", strict=True):
-        axis.text(0.015, 0.94, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
+    letter_panels(panels)
     velocity.set_xlim(run.time[0], run.time[-1])
     return figure
 
 
 def draw_trajectory(trajectory: Trajectory) -> Figure:
-    """Load, spring force, and velocity of the slider over time.
+    """Load, spring force, velocity of the slider and age of the contacts over time.
 
     Parameters
     ----------
@@ -60,6 +70,8 @@ def draw_trajectory(trajectory: Trajectory) -> Figure:
 
     starts = np.unique(np.linspace(0, trajectory.time.size, _STRETCHES, endpoint=False, dtype=int))
     columns = {name: getattr(trajectory, name) for name in ("load", "force", "velocity")}
+    if (age := trajectory.age) is not None:
+        columns["age"] = age
     outline = RunOutline(
         time=trajectory.time[starts],
         low={name: np.minimum.reduceat(values, starts) for name, values in columns.items()},
@@ -83,6 +95,16 @@ def _draw_band(axis: Axes, run: RunOutline, name: str, color: str, scale: float)
         axis.set_ylim(middle - 0.1 * abs(middle) - 1e-12, middle + 0.1 * abs(middle) + 1e-12)
     else:
         axis.set_ylim(float(np.min(low)) - 0.06 * span, float(np.max(high)) + 0.22 * span)
+
+
+def _draw_age(axis: Axes, run: RunOutline) -> None:
+    """The age, logarithmic where it spans decades, as from slip to a hold."""
+    _draw_band(axis, run, "age", RICE_RUINA, 1.0)
+    axis.set_ylabel(r"age $\Phi$ (s)")
+    low, high = float(np.min(run.low["age"])), float(np.max(run.high["age"]))
+    if 0 < 30 * low < high:
+        axis.set_yscale("log")
+        axis.set_ylim(low / 2, 8 * high)
 
 
 def _scale_velocity(axis: Axes, run: RunOutline) -> None:

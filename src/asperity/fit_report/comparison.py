@@ -112,16 +112,16 @@ def draw_comparison(comparison: Comparison) -> Figure:
 
 def _predictions(fits: Mapping[str, Fit], i: int) -> tuple[LockInTable, dict[str, list[Series]]]:
     """The table of a number, which is the same for all laws, and bands of each."""
-    terms = {name: own.objective.terms_of(LockInTerm)[i] for name, own in fits.items()}
+    terms = {name: fit.objective.terms_of(LockInTerm)[i] for name, fit in fits.items()}
     table = next(iter(terms.values())).table
-    return table, {name: bands_of(own, terms[name], None) for name, own in fits.items()}
+    return table, {name: bands_of(fit, terms[name], None) for name, fit in fits.items()}
 
 
 def _motions(fits: Mapping[str, Fit], i: int) -> tuple[RecordedRun, dict[str, Float]]:
     """The recording of a number, which is the same for all laws, and the motion of each."""
-    terms = {name: own.objective.terms_of(RunTerm)[i] for name, own in fits.items()}
+    terms = {name: fit.objective.terms_of(RunTerm)[i] for name, fit in fits.items()}
     run = next(iter(terms.values())).run
-    return run, {name: terms[name].fitted_friction(own.values) for name, own in fits.items()}
+    return run, {name: terms[name].fitted_friction(fit.values) for name, fit in fits.items()}
 
 
 def _figures(fits: Mapping[str, Fit]) -> str:

@@ -101,7 +101,7 @@ def read_data(
     Raises
     ------
     InputError
-        If a file cannot be read, or what is said of one recording meets several.
+        If a file cannot be read, or an argument for one recording meets several.
     """
     tables = [is_table(data) for data in question.data]
     recordings = tables.count(False)
@@ -138,17 +138,30 @@ def _stick_slip(
     """The averaged cycle of a recording of stick-slip; None of any other."""
     if data.steps is not None or data.velocities is not None:
         return None
+    name = Path(data.name or data.file).stem
+    over_load = False
     try:
-        given = {n: MACHINE[n].check(fixed[n]) for n in ("K", "M", "W0") if n in fixed}
+        given = {n: MACHINE[n].check(fixed[n]) for n in ("M", "W0") if n in fixed}
         V = float(DRIVE["V"].check(fixed["V"])) if "V" in fixed else None
-        machine = Machine(given.get("K"), V, given.get("M"), given.get("W0"))
+        try:
+            K = MACHINE["K"].check(fixed["K"]) if "K" in fixed else None
+        except InputError:
+            # The reader of runs takes K over the load.
+            K, over_load = None, True
+        machine = Machine(K, V, given.get("M"), given.get("W0"))
         measurement = measure_stick_slip(trace, window=data.window, machine=machine)
     except InputError:
-        # The reader of runs checks the numbers again; it also takes K over the load.
+        # The reader of runs checks the numbers again.
         return None
     if not measurement.clear:
         return None
-    return averaged_cycle(measurement, Path(data.name or data.file).stem)
+    if over_load:
+        raise InputError(
+            f"K must be in N/m for a fit of the cycles of {name}, got '{fixed['K']}'; multiply it "
+            "by the load, as --fix 'K=300 N/m', with --fix 'W0=0.3 N'; of a force over the weight "
+            "the load is that of the mass, as --fix 'M=30 g'"
+        )
+    return averaged_cycle(measurement, name)
 
 
 def _reading(data: questions.Data) -> dict[str, Any]:

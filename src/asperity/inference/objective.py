@@ -18,6 +18,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
@@ -174,7 +175,8 @@ class DataTerm(Protocol):
         ----------
         values : sequence of mapping of str to float
         near : bool
-            Whether solutions are like those of the last call of `residuals`, and begun there.
+            Whether solutions are like those of the last call of `residuals`, and begun there. The
+            sums may then be those of a coarser model: differences between them count.
         least : float
             Share of a table's rows that must have a periodic orbit; with some, the sum is that of
             these rows, scaled to all. Infinite with fewer, and where there is no motion.
@@ -182,17 +184,17 @@ class DataTerm(Protocol):
         ...
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
-        """The same data without most of their rows, to look for minima with.
+        """The same data with fewer rows and a coarser model, to look for minima with.
 
         Parameters
         ----------
         rows, data : int
-            That are kept at least, spread over all.
+            Rows that are kept, spread over all, and readings that these hold at least.
 
         Returns
         -------
         DataTerm or None
-            None for data that have no rows, or so few that it saves little.
+            None for data without rows.
         """
         ...
 
@@ -255,6 +257,8 @@ class Objective:
         Parameters that are not free, in SI.
     tolerance : float
         Relative change of the coordinates at which a minimum is reached.
+    curved : bool
+        Whether chi-squared has narrow valleys that bend (`asperity.inference.levenberg_marquardt`).
     unsolved : int
         Evaluations so far at which a term had no solution.
     """
@@ -264,6 +268,7 @@ class Objective:
     unknowns: tuple[Unknown, ...]
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
+    curved: bool = False
     unsolved: int = field(default=0, init=False, repr=False)
     # Of this objective alone: `dataclasses.replace` leaves it out.
     _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
@@ -409,6 +414,15 @@ class Objective:
             full[moving] = part
             return full
 
+        if self.curved:
+
+            def of_moving(part: Float) -> tuple[Float, Float]:
+                r, jacobian = self.residuals(whole(part))
+                return r, jacobian[:, moving]
+
+            end = whole(levenberg_marquardt.minimised(of_moving, inside, low, high, evaluations))
+            return Minimum(end, self.chi2(end))
+
         # SciPy asks for the Jacobian where it has just asked for the residuals.
         @functools.lru_cache(1)
         def triangle_of(part: bytes) -> Float:
@@ -465,7 +479,7 @@ class Objective:
         return all(term.profiled == 0 for term in self.terms)
 
     def thinned(self, rows: int, data: int = 0) -> Objective | None:
-        """The objective of few rows of its table; None for other data, or few rows."""
+        """The objective of `DataTerm.thinned` data; None for other data than one table."""
         term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
         return None if term is None else replace(self, terms=(term,))
 

@@ -1,4 +1,4 @@
-"""What fits and comparisons say, described once: text, page, notebook and JSON render it."""
+"""Fits and comparisons as sections of sentences and tables, which every report renders."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _estimate_row(name: str, p: Estimate, undetermined: bool) -> tuple[str, ...]
         if unit in ("", p.unit):
             mean, sd, unit = mean * 10.0**-shown.power, sd * 10.0**-shown.power, shown.unit
         unit = f" {unit}" if unit else ""
-        notes = f"prior {mean:.4g} +- {sd:.2g}{unit} ({p.prior.source})"
+        notes = f"prior {mean:.4g} +- {float(f'{sd:.2g}'):g}{unit} ({p.prior.source})"
     intervals = (shown.interval(p.interval_68), shown.interval(p.interval_95))
     return name, shown.value, shown.error(p.se), *intervals, shown.unit, notes
 
@@ -118,8 +118,8 @@ def _estimate_row(name: str, p: Estimate, undetermined: bool) -> tuple[str, ...]
 def quality(fit: Fit) -> Section:
     """Whether the law describes the data, and the noise."""
     sentences = [
-        "the noise is estimated from what the law leaves: chi-squared judges nothing, and AICc "
-        "compares laws"
+        "the noise is estimated from the residual, so that chi-squared does not judge the law; "
+        "laws are compared by AICc (asperity compare)"
     ]
     rows: tuple[tuple[str, ...], ...] = ()
     if fit.judged_by_chi2:

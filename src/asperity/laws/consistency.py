@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.errors import InputError, printable
+from asperity.errors import InputError, code_of_others
 from asperity.laws.law import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import shown
@@ -117,16 +117,8 @@ def _check_shapes(kind: type[Law], law: Law) -> None:
             continue
         name = f"law.{method}"
         function: Callable[..., Any] = getattr(kind, method)
-        try:
+        with code_of_others(name, "work on arrays of jax.numpy", _PAGE, f"'{kind.name}'"):
             result = jax.eval_shape(function, one, *arguments)
-        except InputError:
-            raise
-        except Exception as error:  # a user's code may raise anything
-            text = printable(" ".join(str(error).split()), 200)
-            raise InputError(
-                f"{name} must work on arrays of jax.numpy, got {type(error).__name__} "
-                f"({text}) from '{kind.name}'; {_PAGE}"
-            ) from error
         if states is None:
             _require_shape(result, v.shape, name, kind)
             continue

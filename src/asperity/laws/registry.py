@@ -1,14 +1,29 @@
-"""Laws by name."""
+"""Laws by name: those of the package, of installed packages, and of a module or file.
+
+A package makes its laws known in its ``pyproject.toml``::
+
+    [project.entry-points."asperity.laws"]
+    composite = "mylab.friction:Composite"
+
+and a file or module that is not installed is named on the command line, ``--law
+path/to/file.py:Composite`` or ``--law mylab.friction:Composite``. Naming a place runs its code, so
+that tables and protocols, which others may have written, cannot name one.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import importlib
+import importlib.util
 import sys
 import warnings
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import ModuleType
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, code_of_others
 from asperity.laws.consistency import checked_class
-from asperity.laws.discovery import installed, law_at, load_installed
 from asperity.laws.law import Law
 from asperity.parameters.arguments import shown, typed
 
@@ -33,8 +48,10 @@ def register(law: type[Law]) -> type[Law]:
         _LAWS[law.name] = law
     elif known is not law:
         raise InputError(
-            f"law.name must be unique, got '{law.name}', which {known.__module__} already has; "
-            "choose another name"
+            "law.name",
+            "be unique",
+            f"'{law.name}', which {known.__module__} already has",
+            "choose another name",
         )
     return law
 
@@ -73,9 +90,7 @@ def get_law(name: str) -> type[Law]:
     if name not in _LAWS and name in installed():
         register(load_installed(installed()[name]))
     if name not in _LAWS:
-        raise InputError(
-            f"law must be a registered law, got {shown(name)}; {closest(name, registered())}"
-        )
+        raise InputError("law", "be a registered law", shown(name), closest(name, registered()))
     return _LAWS[name]
 
 
@@ -95,3 +110,117 @@ def known_law(text: str) -> str:
     if ":" not in text:
         return text
     return register(law_at(text)).name
+
+
+GROUP = "asperity.laws"
+
+
+@cache
+def installed() -> dict[str, EntryPoint]:
+    """Entry points of the group ``asperity.laws`` by name."""
+    return {point.name: point for point in entry_points(group=GROUP)}
+
+
+def load_installed(point: EntryPoint) -> type[Law]:
+    """Import the law of an entry point.
+
+    Raises
+    ------
+    InputError
+        If it cannot be imported, is no law, or has another name than the entry point.
+    """
+    where = f"entry point '{point.name}' of {point.value}"
+    with code_of_others("law", advice="repair or uninstall the package", where=where):
+        result = point.load()
+    law = _checked(result, where)
+    if law.name != point.name:
+        raise InputError(
+            "law",
+            "have the name of its entry point",
+            f"{where} and the name '{law.name}'",
+            "change one of the two",
+        )
+    return law
+
+
+def law_at(place: str) -> type[Law]:
+    """Import the law at a place.
+
+    Parameters
+    ----------
+    place : str
+        ``module:Name`` or ``path/to/file.py:Name``.
+
+    Raises
+    ------
+    InputError
+        If there is no such module, file or name, its code fails, or it is no law.
+    """
+    where, _, name = place.rpartition(":")
+    if not where or not name:
+        raise InputError(
+            "law",
+            "be a place like 'module:Name' or 'path/to/file.py:Name'",
+            f"'{place}'",
+            "give both parts",
+        )
+    module = _module(where, place)
+    if not hasattr(module, name):
+        laws = [n for n, value in vars(module).items() if _is_law(value)]
+        raise InputError(
+            "law",
+            f"be in '{where}'",
+            f"'{name}', which is not there",
+            closest(name, laws) if laws else "define a subclass of asperity.laws.Law in it",
+        )
+    return _checked(getattr(module, name), f"'{place}'")
+
+
+def _module(where: str, place: str) -> ModuleType:
+    file = where.endswith(".py")
+    with code_of_others("law", where=f"'{place}'"):
+        try:
+            return _from_file(Path(where)) if file else importlib.import_module(where)
+        except (FileNotFoundError, ModuleNotFoundError) as error:
+            raise InputError(
+                "law",
+                "be in a module or file that exists",
+                f"'{place}' ({error})",
+                "correct the path, or install the module",
+            ) from None
+
+
+def _from_file(path: Path) -> ModuleType:
+    file = path.resolve(strict=True)
+    # One module for each file, so that the same file gives the same class; an edited file gives a
+    # new module.
+    content = hashlib.sha256(str(file).encode() + b"\0" + file.read_bytes())
+    name = f"asperity_law_{content.hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, file)
+    if spec is None or spec.loader is None:
+        raise FileNotFoundError(f"no Python file: {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _is_law(value: object) -> bool:
+    return isinstance(value, type) and issubclass(value, Law) and value is not Law
+
+
+def _checked(result: object, where: str) -> type[Law]:
+    if not (isinstance(result, type) and issubclass(result, Law) and result is not Law):
+        raise InputError(
+            "law",
+            "be a subclass of asperity.laws.Law",
+            f"{where}, a {type(result).__name__}",
+            "see the page 'Write your own law'",
+        )
+    return checked_class(result, where)

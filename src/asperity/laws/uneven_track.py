@@ -72,8 +72,8 @@ def on_uneven_track(
     InputError
         If a value breaks its rule, or the law has no mu0.
     """
-    own = {f.name: getattr(law, f.name) for f in dataclasses.fields(law)}
-    if "mu0" not in own or POSITION in law.state_names:
+    fields = {f.name: getattr(law, f.name) for f in dataclasses.fields(law)}
+    if "mu0" not in fields or POSITION in law.state_names:
         raise InputError(
             "track",
             "be that of a law with a mu0 that is the same everywhere",
@@ -81,7 +81,7 @@ def on_uneven_track(
             "choose another law",
         )
     made = _on_track(type(law))(
-        **own,
+        **fields,
         track_amplitude=amplitude,
         track_length=length,
         track_exponent=exponent,
@@ -138,20 +138,20 @@ def _on_track(base: type[Law]) -> type[Any]:
 
         def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
             """That of the law at the position."""
-            here, own = self._here(state)
-            return here.friction(v, own, w)
+            here, inner = self._here(state)
+            return here.friction(v, inner, w)
 
         def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
             """That of the law at the position."""
-            here, own = self._here(state)
-            return here.log_velocity(friction, own, w)
+            here, inner = self._here(state)
+            return here.log_velocity(friction, inner, w)
 
         def state_rate(
             self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike
         ) -> State:
             """Those of the law, and dx/dt / l."""
-            here, own = self._here(state)
-            return (*here.state_rate(v, v_plastic, own, w), jnp.asarray(v / self.track_length))
+            here, inner = self._here(state)
+            return (*here.state_rate(v, v_plastic, inner, w), jnp.asarray(v / self.track_length))
 
         def steady_state(self, v: ArrayLike) -> State:
             """Those of the law at the beginning of the track."""
@@ -162,8 +162,8 @@ def _on_track(base: type[Law]) -> type[Any]:
     if base.velocity is not Law.velocity:
         # A law with rest and reversal has them on a track too.
         def velocity(self: Any, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-            here, own = self._here(state)
-            return here.velocity(friction, own, w)
+            here, inner = self._here(state)
+            return here.velocity(friction, inner, w)
 
         OnUnevenTrack.velocity = velocity
     return OnUnevenTrack

@@ -6,23 +6,19 @@ from collections.abc import Mapping
 from importlib.resources.abc import Traversable
 from typing import Literal, TypeAlias, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from asperity.errors import InputError, closest
 from asperity.ledger import rules
 from asperity.ledger.sentences import names_in
 from asperity.parameters.toml_file import parsed_toml
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+from asperity.questions.record import Question, Record
 
 Kind: TypeAlias = Literal["test", "fit", "arithmetic", "identity"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
-class RuleWords(_Table):
+class RuleWords(Record):
     """A rule as claims.toml writes it: its name, its subject, and its numbers.
 
     A number may be a word of `asperity.ledger.rules.WORDS` or the name of one of the paper's
@@ -73,7 +69,7 @@ class RuleWords(_Table):
         return make(*values, self.what)
 
 
-class Entry(_Table):
+class Entry(Record):
     """A claim in claims.toml; see `Claim` for the common fields.
 
     Attributes
@@ -100,7 +96,7 @@ class Entry(_Table):
     depends_on: tuple[str, ...] = ()
 
 
-class About(_Table):
+class About(Record):
     """The paper itself.
 
     Attributes
@@ -131,7 +127,7 @@ class About(_Table):
     parameters: Mapping[str, tuple[str, str]] = Field(default_factory=dict)
 
 
-class Uncertainty(_Table):
+class Uncertainty(Record):
     """The ends of the published uncertainty of a quantity.
 
     Attributes
@@ -149,7 +145,7 @@ class Uncertainty(_Table):
     note: str
 
 
-class HeadlineWords(_Table):
+class HeadlineWords(Record):
     """A conclusion of the paper, and the claims that decide it.
 
     Attributes
@@ -166,7 +162,7 @@ class HeadlineWords(_Table):
     claims: tuple[str, ...]
 
 
-class SummaryWords(_Table):
+class SummaryWords(Record):
     """A paragraph at the head of the report.
 
     Attributes
@@ -183,8 +179,10 @@ class SummaryWords(_Table):
     verdict: str = ""
 
 
-class Contents(_Table):
+class Contents(Question):
     """All of claims.toml: the paper, its uncertainties, summary, conclusions and claims."""
+
+    subject = "claims.toml"
 
     paper: About
     summary: tuple[SummaryWords, ...] = ()
@@ -193,7 +191,7 @@ class Contents(_Table):
     claim: tuple[Entry, ...] = ()
 
 
-Words = TypeVar("Words", bound=BaseModel)
+Words = TypeVar("Words", bound=Question)
 
 
 def read_words(file: Traversable, kind: type[Words]) -> Words:
@@ -208,20 +206,9 @@ def read_words(file: Traversable, kind: type[Words]) -> Words:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{file} must be a readable text, got {type(error).__name__}; write the words there"
+            str(file), "be a readable text", type(error).__name__, "write the words there"
         ) from None
-    try:
-        content = parsed_toml(text, file.name)
-    except InputError as error:
-        raise InputError(f"{file} must be TOML, got: {error}") from None
-    try:
-        return kind.model_validate(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(
-            f"{file}: {where} must be valid, got: {first['msg'].lower()}; see the page on papers"
-        ) from None
+    return kind.of_content(parsed_toml(text, file.name, f"'{file}'"), str(file))
 
 
 def read_contents(file: Traversable) -> Contents:

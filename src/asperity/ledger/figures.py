@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from asperity.errors import InputError
 from asperity.figures.plot import Plot
 from asperity.ledger.contents import read_words
 from asperity.ledger.sentences import fill
+from asperity.questions.record import Question, Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -158,7 +159,7 @@ class PaperFigure:
     failed: int = 0
 
 
-class FigureWords(BaseModel):
+class FigureWords(Record):
     """A figure in figures.toml.
 
     Attributes
@@ -173,8 +174,6 @@ class FigureWords(BaseModel):
     plot : Plot
         Description of the figure; without it a function of the paper draws.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     place: str
     title: str
@@ -235,7 +234,7 @@ def _minus(text: str) -> str:
     return re.sub(r"(?<=[ =])-(?=\d)", "−", text)
 
 
-class SectionWords(BaseModel):
+class SectionWords(Record):
     """A section of the report in figures.toml.
 
     Attributes
@@ -245,13 +244,11 @@ class SectionWords(BaseModel):
         Paragraphs in front of its figures, which may quote numbers.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     title: str
     before: tuple[str, ...] = ()
 
 
-class SliderWords(BaseModel):
+class SliderWords(Record):
     """A slider of the browser page that is not made from the paper's parameter alone.
 
     Attributes
@@ -261,15 +258,13 @@ class SliderWords(BaseModel):
         Its ends; the scale is linear.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     label: str
     meaning: str
     low: float
     high: float
 
 
-class FiguresFile(BaseModel):
+class FiguresFile(Question):
     """All of figures.toml: sections, and a table for each figure.
 
     Attributes
@@ -281,7 +276,8 @@ class FiguresFile(BaseModel):
         By the name of the paper's number.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
+    subject = "figures.toml"
+    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, FigureWords] = Field(init=False)
 
     section: dict[str, SectionWords] = Field(default_factory=dict)

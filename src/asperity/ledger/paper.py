@@ -30,7 +30,7 @@ from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
 from asperity import materials
-from asperity.errors import InputError, closest, printable
+from asperity.errors import InputError, closest, code_of_others
 from asperity.ledger.claims import (
     Claim,
     Headline,
@@ -91,7 +91,7 @@ class Paper:
         InputError
             If it is missing or cannot be imported.
         """
-        with _running(f"{self.package}.{name}".rstrip(".")):
+        with code_of_others(f"{self.package}.{name}".rstrip(".")):
             return importlib.import_module(f"{self.package}.{name}".rstrip("."))
 
     def has(self, name: str) -> bool:
@@ -202,25 +202,11 @@ def find_paper(name: str | None = None) -> Paper:
     return Paper(name, papers[name])
 
 
-@contextmanager
-def _running(what: str) -> Iterator[None]:
-    """Run code of a paper; its exceptions become an `InputError` with the name of the code."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:  # code of a paper may raise anything
-        text = printable(" ".join(str(error).split()), 200)
-        raise InputError(
-            f"{what} must be code that runs, got {type(error).__name__}: {text}; correct it"
-        ) from error
-
-
 def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
     """A function of a paper whose exceptions become `InputError`."""
 
     def run(*arguments: Any) -> Any:
-        with _running(what):
+        with code_of_others(what):
             return function(*arguments)
 
     return run
@@ -236,7 +222,7 @@ def _guarded_figure(compute: Callable[[], Any], where: str) -> Callable[[], Pape
     name = f"{where}.{getattr(compute, '__name__', 'figure')}"
 
     def run() -> PaperFigure:
-        with _running(name):
+        with code_of_others(name):
             made = compute()
         figure: PaperFigure = of_type(made, PaperFigure, name)
         return replace(figure, draw=_guarded(figure.draw, f"{name}, draw"))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,18 +13,20 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.errors import InputError
-from asperity.parameters.toml_file import file_content
+from asperity.parameters.columns import read_headed_columns
+from asperity.units import to_si
 
 Float = NDArray[np.float64]
 
 
-def read_columns(path: Path, columns: Sequence[str], row: str) -> dict[str, Float]:
-    """Columns of a CSV of plain numbers in SI; lines that begin with ``#`` are skipped.
+def read_columns(path: Path, columns: Mapping[str, str], row: str) -> dict[str, Float]:
+    """Columns of a CSV, in SI or with units in their headings; lines with ``#`` are skipped.
 
     Parameters
     ----------
     path : Path
-    columns : sequence of str
+    columns : mapping of str to str
+        Kind of quantity of each column, a key of `asperity.units.KINDS`.
     row : str
         Meaning of a row, such as ``"a bifurcation"``.
 
@@ -34,41 +35,19 @@ def read_columns(path: Path, columns: Sequence[str], row: str) -> dict[str, Floa
     InputError
         If the file cannot be read, a column is missing, or a cell is no number.
     """
-    try:
-        text = file_content(path).decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text in UTF-8"
-        raise InputError(
-            f"{path.stem} must be a readable table, got '{path}': {reason}; give a CSV file"
-        ) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    rows = list(csv.DictReader(lines, skipinitialspace=True))
-    if not rows:
-        raise InputError(
-            f"{path.name} must have a header and rows, got {len(lines)} lines; give {row} on each"
-        )
-    missing = [column for column in columns if column not in rows[0]]
+    cells = read_headed_columns(path, columns, label=path.stem, row=row)
+    missing = [column for column in columns if column not in cells]
     if missing:
         raise InputError(
-            f"{path.name} must have the columns {', '.join(columns)}, got none for "
-            f"{', '.join(missing)}; add them in SI"
+            path.name,
+            f"have the columns {', '.join(columns)}",
+            f"none for {', '.join(missing)}",
+            "add them",
         )
     return {
-        column: np.array(
-            [_number(cells[column], column, n, path.name) for n, cells in enumerate(rows, 1)]
-        )
-        for column in columns
+        name: np.array([to_si(cell, kind, f"{path.name}, {name}") for cell in cells[name]])
+        for name, kind in columns.items()
     }
-
-
-def _number(cell: str | None, column: str, row: int, name: str) -> float:
-    try:
-        return float(cell or "")
-    except ValueError:
-        raise InputError(
-            f"{name} must have numbers in SI without unit in column {column}, got '{cell}' in row "
-            f"{row}; correct the cell"
-        ) from None
 
 
 @dataclass(frozen=True)

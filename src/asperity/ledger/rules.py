@@ -1,8 +1,8 @@
 """Acceptance rules: when a computed number agrees with a statement of the paper.
 
 The meaning of each word is fixed here, once, before anything is computed, and holds for every claim
-that uses the word. claims.toml names the rule and the word; nobody writes a tolerance next to
-a result.
+that uses the word. claims.toml names the rule and the word; no tolerance is written next to a
+result.
 
 ==============================  =========================================================
 the paper writes                accepted

@@ -1,8 +1,7 @@
 """Modulations and programmes of normal load, shear force and pulling velocity."""
 
 from asperity.loads.modulated import modulated, sampled
-from asperity.loads.modulation import Excitation, Harmonic, Modulation
-from asperity.loads.periodic import Periodic
+from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
 from asperity.loads.programme.programme import Programme
 from asperity.loads.programme.steps import (
     CyclicLoading,

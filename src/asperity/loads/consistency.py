@@ -8,9 +8,8 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, printable
-from asperity.loads.modulation import Excitation, Harmonic, Modulation
-from asperity.loads.periodic import Periodic
+from asperity.errors import InputError, code_of_others
+from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
 from asperity.parameters.arguments import shown
 
 #: Numbers of samples of the period; a fault counts if it remains with more samples.
@@ -62,17 +61,10 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
             f"{', '.join(str(np.shape(leaf)) for leaf in leaves)}; give arrays of one shape"
         ) from None
     flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
-    try:
+    rule = "have members that work on arrays of jax.numpy"
+    page, where = "see the page 'Write your own load'", type(modulation).__name__
+    with code_of_others(name, rule, page, where):
         fault = _first_fault(structure, flat, int(np.prod(shape)), name)
-    except InputError:
-        raise
-    except Exception as error:  # a user's code may raise anything
-        text = printable(" ".join(str(error).split()), 200)
-        raise InputError(
-            f"{name} must have members that work on arrays of jax.numpy, got "
-            f"{type(error).__name__} ({text}) of {type(modulation).__name__}; see the page 'Write "
-            "your own load'"
-        ) from error
     if fault:
         raise InputError(fault)
     return modulation

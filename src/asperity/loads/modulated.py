@@ -10,7 +10,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.loads.periodic import Periodic, Series
+from asperity.loads.modulation import Periodic, Series
 from asperity.parameters.arguments import shown
 from asperity.units import to_radians, to_si
 

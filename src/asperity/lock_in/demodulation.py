@@ -243,7 +243,7 @@ def _check_clock(time: Array) -> None:
 
 def _check_resolved(time: Array, frequency: float, harmonics: int) -> None:
     span = float(time[-1] - time[0])
-    # Gaps do not lower the rate at which the rest is sampled.
+    # Gaps do not lower the sampling rate of the remaining samples.
     rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
     if not frequency > 0 or frequency * span < 1:
         raise InputError(

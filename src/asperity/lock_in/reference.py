@@ -86,9 +86,10 @@ def strongest_line(
     if not present:
         where = "" if between is None else f" about {sum(between) / 2:.6g} Hz"
         raise InputError(
-            f"reference.frequency must lie within what the recording resolves, got {time.size} "
-            f"samples in {time[-1] - time[0]:.6g} s{where}; give another frequency or a longer "
-            "window"
+            "reference.frequency",
+            "lie within what the recording resolves",
+            f"{time.size} samples in {time[-1] - time[0]:.6g} s{where}",
+            "give another frequency or a longer window",
         )
     return max(present, key=lambda line: line.amplitude)
 

@@ -29,8 +29,10 @@ def load_material(name: str | PathLike[str]) -> Material:
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
         if not os.path.isfile(text):
             raise InputError(
-                f"material.file must be a readable TOML file, got '{text}', which is none; give "
-                "the path of a material file"
+                "material.file",
+                "be a readable TOML file",
+                f"'{text}', which is none",
+                "give the path of a material file",
             )
         file, content = toml_content(text, "material.file")
         return Material.of_content({"name": file.stem, **content}, text)
@@ -38,8 +40,10 @@ def load_material(name: str | PathLike[str]) -> Material:
         resource = packaged()[text]
     except KeyError:
         raise InputError(
-            f"material must be a known material or the path of a .toml file, got '{text}'; "
-            f"{closest(text, packaged())}"
+            "material",
+            "be a known material or the path of a .toml file",
+            f"'{text}'",
+            closest(text, packaged()),
         ) from None
     content = parsed_toml(resource.read_text(encoding="utf-8"), "material.file", f"'{text}'")
     return Material.of_content({"name": text, **content}, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -49,29 +50,28 @@ class Number(Record):
     @classmethod
     def _dimension_is_known(cls, dimension: str) -> str:
         if dimension not in KINDS:
-            raise ValueError(
-                f"be a kind of quantity, got '{dimension}'; {closest(dimension, KINDS)}"
+            raise InputError(
+                "", "be a kind of quantity", f"'{dimension}'", closest(dimension, KINDS)
             )
         return dimension
 
     @model_validator(mode="after")
     def _has_value(self) -> Self:
         if self.value is None and self.range is None and not self.values:
-            raise ValueError("have a value, a range or values, got none of them; add one")
+            raise InputError("", "have a value, a range or values", "none of them", "add one")
         if self.uncertainty is not None and self.value is None:
-            raise ValueError(
-                f"have a value, got only its uncertainty {self.uncertainty:g}; add the value"
-            )
+            got = f"only its uncertainty {self.uncertainty:g}"
+            raise InputError("", "have a value", got, "add the value")
         if self.range is not None and self.range[0] > self.range[1]:
-            raise ValueError(
-                f"have a range from low to high, got {list(self.range)}; swap its ends"
-            )
+            raise InputError("", "have a range from low to high", list(self.range), "swap its ends")
         try:
             self._to_si(1.0)
         except InputError:
-            raise ValueError(
-                f"have a unit of the dimension {self.dimension}, got '{self.unit}'; "
-                f"write the unit as in '{KINDS[self.dimension].example}'"
+            raise InputError(
+                "",
+                f"have a unit of the dimension {self.dimension}",
+                f"'{self.unit}'",
+                f"write the unit as in '{KINDS[self.dimension].example}'",
             ) from None
         return self
 
@@ -119,5 +119,10 @@ class Number(Record):
         return " ".join([*parts, self.unit]).rstrip()
 
     def _to_si(self, value: float) -> float:
-        # The shortest text of a double is the decimal in the file, which is converted exactly.
-        return to_si(f"{value!r} {self.unit}", self.dimension, "number.value")
+        return _in_si(value, self.unit, self.dimension)
+
+
+@cache
+def _in_si(value: float, unit: str, dimension: str) -> float:
+    # The shortest text of a double is the decimal in the file, which is converted exactly.
+    return to_si(f"{value!r} {unit}", dimension, "number.value")

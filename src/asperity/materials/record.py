@@ -49,8 +49,10 @@ class Material(Question):
         for name, number in numbers.items():
             if not name.isidentifier() or name.startswith("_") or hasattr(cls, name):
                 raise InputError(
-                    f"numbers must have names that are Python attributes and not in use, got "
-                    f"'{name}'; rename that number"
+                    "numbers",
+                    "have names that are Python attributes and not in use",
+                    f"'{name}'",
+                    "rename that number",
                 )
             if number.value is not None:
                 _check_rule(name, number.si, number.dimension, "numbers")
@@ -62,8 +64,7 @@ class Material(Question):
             return self.numbers[_plain(name)]
         except KeyError:
             raise InputError(
-                f"{self.name} must have the number, got {shown(name)}; "
-                f"{closest(name, self.numbers)}"
+                self.name, "have the number", shown(name), closest(name, self.numbers)
             ) from None
 
     def __getattr__(self, name: str) -> float:
@@ -75,8 +76,10 @@ class Material(Question):
         number = self.numbers[_plain(name)]
         if number.value is None:
             raise InputError(
-                f"{self.name}.{name} must be a single value here, got {number}; take si_range or "
-                f"si_values of material['{name}']"
+                f"{self.name}.{name}",
+                "be a single value here",
+                number,
+                f"take si_range or si_values of material['{name}']",
             )
         return number.si
 
@@ -118,8 +121,10 @@ class Material(Question):
         for parameter in given:
             if parameter not in wanted:
                 raise InputError(
-                    f"{name} must be given its own parameters, got '{parameter}'; "
-                    f"{closest(parameter, wanted)}"
+                    name,
+                    "be given its own parameters",
+                    f"'{parameter}'",
+                    closest(parameter, wanted),
                 )
         values = {p: self._parameter(p, name, given) for p in wanted}
         return law(**{_field(p, law): value for p, value in values.items()})
@@ -129,8 +134,10 @@ class Material(Question):
         if parameter not in given:
             if number is None:
                 raise InputError(
-                    f"{owner}.{parameter} must be given, got nothing and '{self.name}' has no "
-                    f"such number; write {parameter}=... after the law's name"
+                    f"{owner}.{parameter}",
+                    "be given",
+                    f"nothing and '{self.name}' has no such number",
+                    f"write {parameter}=... after the law's name",
                 )
             return number.si
         if number is None:  # the declaration of the law's field checks unit and rule

@@ -21,6 +21,9 @@ Indices = NDArray[np.intp]
 #: Points in a block of the fast method; not a power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
+#: Points in a call for a single operating point, as a slider of the page moves it.
+FEW = 8
+
 #: Points in a chunk of orbits on meshes, for up to three states and for more: a few points that
 #: need a finer mesh than the others take a smaller chunk.
 _MESH_CHUNKS = ((24, 8), (8,))
@@ -82,6 +85,11 @@ def run_chunks(
     for start in range(0, len(index), sizes[0]):
         spare_mappings()
         yield work(index[start : start + sizes[0]])
+
+
+def chunk_of(index: Indices, most: int) -> int:
+    """Points in a call that works on the points `index`: `FEW` if they are few, else `most`."""
+    return FEW if len(index) <= FEW else most
 
 
 def mesh_chunk(size: int) -> tuple[int, ...]:

@@ -187,7 +187,8 @@ class ResponseFunction:
         """Refuse known orbits that this call cannot begin with."""
         if known is None:
             return
-        if traced or self._program.search != "direct" or self._program.multipliers:
+        direct = self._program.search in ("direct", "coarse")
+        if traced or not direct or self._program.multipliers:
             raise InputError(
                 'known must go with search="direct", no multipliers and parameters that are not '
                 "traced; leave it out"
@@ -263,7 +264,7 @@ def response_function(
     harmonics: Annotated[int, at_least(1)] = 2,
     multipliers: bool = False,
     modulation: Modulation | None = None,
-    search: bool | Literal["direct"] = True,
+    search: bool | Literal["direct", "coarse"] = True,
     least_points: Annotated[int, at_least(1)] = _FEWEST,
 ) -> ResponseFunction:
     """The periodic response as a function of named parameters, for fits, samplers and designs.
@@ -290,13 +291,14 @@ def response_function(
         In place of the harmonic load with its parameter epsilon: a load of `asperity.loads`, whose
         Fourier coefficients, "load_cos_1", "load_sin_1", "shear_cos_1", "pull_cos_1", ..., become
         parameters with the coefficients of `modulation` as defaults.
-    search : bool or "direct"
+    search : bool, "direct" or "coarse"
         Whether to search for orbits that the fast method does not find. Without it they are not
         converged, and programs are smaller. "direct" tries collocation from the orbits of
         `KnownOrbits`, from the averaged limit and, under a harmonic load, from the orbit on which
         a motion from steady sliding settles, in some milliseconds a point; it leaves out what
         follows branches, which may take a minute for one point. Within `jax.jit`, and where
-        multipliers are wanted, it is as True.
+        multipliers are wanted, it is as True. "coarse" is the same on 72 intervals without a check
+        of the mesh and without motions: values good to some 1e-6, to look for minima with.
     least_points : int
         Calls with fewer points are padded to this number, so that calls with different numbers of
         points share one compiled program.
@@ -378,13 +380,14 @@ def _orbits(
         return fast, None
     values = {n: np.asarray(v) for n, v in parameters.items()}
     # A direct search does not resolve multipliers.
-    direct = program.search == "direct" and not program.multipliers
+    direct = program.search in ("direct", "coarse") and not program.multipliers
     return fast, search_orbits(
         program.equations,
         program.harmonics,
         values,
         rows,
         direct=direct,
+        coarse=program.search == "coarse",
         known=known,
         every=every,
     )

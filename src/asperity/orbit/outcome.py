@@ -60,8 +60,8 @@ _SENTENCES = {
         "amplitude; lower epsilon or stiffen the spring"
     ),
     Outcome.RUNAWAY: (
-        "on the branch from steady sliding slip runs away: before epsilon = {detail:.3g} its "
-        "pulses become faster than e^13 V, without inertia nothing bounds them; lower epsilon or "
+        "on the branch from steady sliding the slip velocity grows without bound: before epsilon = "
+        "{detail:.3g} its pulses exceed e^13 V, which inertia alone would limit; lower epsilon or "
         "include inertia or radiation damping"
     ),
     Outcome.SENSITIVE: (

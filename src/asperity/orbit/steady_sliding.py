@@ -11,7 +11,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import jacobian_columns, spectral_radius
 from asperity.loads import Excitation, Harmonic
-from asperity.orbit.batches import points_of, run_chunks
+from asperity.orbit.batches import chunk_of, points_of, run_chunks
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
@@ -74,7 +74,7 @@ def steady_sliding(problem: Problem) -> SteadySliding:
     """The numbers of all points of `problem`, NumPy arrays with the points along the last axis."""
     points = np.arange(problem.system.V.shape[-1])
     numbers = SteadySliding(*np.empty((3, len(points))))
-    for part, values in run_chunks(_compiled, (problem,), points, _CHUNK):
+    for part, values in run_chunks(_compiled, (problem,), points, chunk_of(points, _CHUNK)):
         for target, value in zip(numbers, values, strict=True):
             target[part] = value
     return numbers

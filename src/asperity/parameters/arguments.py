@@ -252,7 +252,7 @@ def increments(advance: Callable[[int], None] | None) -> Callable[[int, int], No
 
 
 def file_path(value: Any, label: str) -> Path:
-    """A path that an operating system can be asked for.
+    """A path that an operating system accepts.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def file_path(value: Any, label: str) -> Path:
         For anything that is no path, and for a text with a NUL in it.
     """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    # File systems have a longest name, and answer a longer one with an error of their own.
+    # File systems refuse long names with errors that differ between systems.
     if isinstance(text, str) and text and "\0" not in text and len(text) < 4000:
         path = Path(text)
         if all(len(os.fsencode(part)) < 256 for part in path.parts):

@@ -1,6 +1,6 @@
 """Names that tables, figures and sentences are written in: those of the paper, or of geophysics.
 
-JSON, columns of files, options and coordinates keep the one name of each parameter.
+Keys of JSON, columns of files, options and coordinates keep the one name of each parameter.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ def display_name(name: str, names: Names = "friction", law: Any = None) -> str:
         As ``D0``, ``K/W0`` or ``A - B``; words that are no parameter stay as they are.
     names : {"friction", "geophysics"}
     law : type of Law, optional
-        Whose parameters have names too, besides those that several laws share.
+        Whose parameters have names too, in addition to those that several laws share.
     """
     if names == "friction":
         return name
-    known = _plain_names(law)
+    known = plain_names(law)
     return re.sub(r"[A-Za-z]\w*", lambda word: known.get(plain_name(word[0]), word[0]), name)
 
 
@@ -57,7 +57,7 @@ def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
     """A sentence with the names of parameters in it written in a set of names."""
     if names == "friction":
         return text
-    known = _plain_names(law)
+    known = plain_names(law)
 
     def renamed(word: re.Match[str]) -> str:
         return word[0] if word["kept"] else known.get(word[0], word[0])
@@ -65,14 +65,14 @@ def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
     return _WORDS.sub(renamed, text)
 
 
-#: Symbols of figures in geophysics, besides those of `INTERFACE`.
-_SYMBOLS = {"F": r"\tau", "W": r"\sigma_n", "W_0": r"\bar\sigma_n", "K": "k"}
+#: Symbols of figures in geophysics, in addition to those of `INTERFACE`.
+_SYMBOLS = {"F": r"\tau", "W": r"\sigma_n", "W_0": r"\bar\sigma_n", "K": "k", r"\Phi": r"\theta"}
 
 
 def in_symbols(text: str) -> str:
     """A label of a figure with the symbols of its formulas as geophysics writes them."""
     known = {p.symbol: symbol_of(p, "geophysics") for p in INTERFACE.values()} | _SYMBOLS
-    word = re.compile(r"(?<![\\\w{])[A-Z](?:_0)?(?![\w}])")
+    word = re.compile(r"(?<![\\\w{])(?:[A-Z](?:_0)?|\\Phi)(?![\w}])")
 
     def formula(match: re.Match[str]) -> str:
         return word.sub(lambda symbol: known.get(symbol[0], symbol[0]), match[0])
@@ -81,8 +81,8 @@ def in_symbols(text: str) -> str:
 
 
 @cache
-def _plain_names(law: Any) -> dict[str, str]:
-    """Plain names of geophysics by the names of the parameters."""
+def plain_names(law: Any) -> dict[str, str]:
+    """Plain names of geophysics by the names of the parameters, where they differ."""
     parameters = {**INTERFACE, **EXPERIMENT, **(law_parameters(law) if law is not None else {})}
     return {
         name: _DECORATIONS.sub("", symbol_of(parameter, "geophysics"))

@@ -61,7 +61,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "switch": Rule(
             "be 1 or 0",
             lambda x: np.isin(x, (0.0, 1.0)),
-            "write 1 where it counts, 0 elsewhere",
+            "write 1 to include it, 0 to leave it out",
         ),
     }
 )
@@ -133,11 +133,11 @@ class Parameter:
     label : str
         What messages call it.
     argument : str
-        Keyword of the Python functions that take it; empty for a law's own.
+        Keyword of the Python functions that take it; empty for a parameter of one law.
     options : tuple of str
-        Options of the command line, besides ``--set NAME=VALUE``.
+        Options of the command line, in addition to ``--set NAME=VALUE``.
     aliases : tuple of str
-        Other names that are understood where a name is asked for.
+        Other names that are accepted.
     meant : tuple of str
         Names, in lower case, that are refused with this one as the suggestion: of something
         near, or too short to be safe.
@@ -168,7 +168,7 @@ class Parameter:
     angle: bool = False
 
     def __post_init__(self) -> None:
-        # A mistake here is one of the programmer, found when the module is imported.
+        # A mistake in the declaration, reported when the module is imported.
         for word, known in ((self.kind, KINDS), (self.rule, RULES)):
             if word not in known:
                 raise ValueError(f"{self.name} must have a known kind and rule, got '{word}'")
@@ -196,7 +196,7 @@ class Parameter:
         value : str, number, array or sequence of these
             A text carries its unit, a number is SI.
         label : str
-            What messages call the value; the parameter's own label by default.
+            What messages call the value; the parameter's label by default.
 
         Returns
         -------
@@ -315,12 +315,17 @@ class Drawn(Displayed):
         module, name = self._drawn_by.split(":")
         with import_module("asperity.figures.style").style():
             figure: Figure = getattr(import_module(module), name)(self)
-        if names == "geophysics":
-            in_symbols: Any = import_module("asperity.parameters.names").in_symbols
-            labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
-            for text in labels:
-                text.set_text(in_symbols(text.get_text()))
-        return figure
+        return labelled(figure, names)
+
+
+def labelled(figure: Figure, names: Names) -> Figure:
+    """The figure, its labels in a set of names."""
+    if names == "geophysics":
+        in_symbols: Any = import_module("asperity.parameters.names").in_symbols
+        labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
+        for text in labels:
+            text.set_text(in_symbols(text.get_text()))
+    return figure
 
 
 def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:

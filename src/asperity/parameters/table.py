@@ -1,17 +1,17 @@
 """The table of parameters: every number that an operating point depends on, by its one name.
 
-The parameters that only one law has are declared in the file of that law; `law_parameters` reads
-them from the class, so that a law written elsewhere has its place in the table as well.
-
-The table of outputs has every quantity of a periodic response, by its one name.
+The table is ``table.toml``, which has every output of a periodic response, too. The parameters of a
+single law are declared in the file of that law; `law_parameters` reads them from the class, so that
+a law written elsewhere has its place in the table as well.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
+import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
+from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
@@ -19,41 +19,26 @@ from asperity.errors import Argument, InputError, closest
 from asperity.parameters.arguments import shown
 from asperity.parameters.parameter import Output, Parameter
 
+
+def _frozen(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a frozen record: lists and tables of TOML that cannot be changed."""
+    kinds: dict[type, Any] = {list: tuple, dict: MappingProxyType}
+    return {n: kinds[type(v)](v) if type(v) in kinds else v for n, v in fields.items()}
+
+
+def _parameters(part: str, **shared: Any) -> Mapping[str, Parameter]:
+    """The parameters of a part of the table, with fields that they share."""
+    table: Mapping[str, Mapping[str, Any]] = _TABLE[part]
+    return MappingProxyType(
+        {name: Parameter(name, **shared | _frozen(fields)) for name, fields in table.items()}
+    )
+
+
+_TABLE = tomllib.loads(files("asperity.parameters").joinpath("table.toml").read_text("utf-8"))
+
 #: Every output. Convention: F/W0 = mean_friction + sum of mu_n cos(n w t + phase_n).
 OUTPUTS: Mapping[str, Output] = MappingProxyType(
-    {
-        output.name: output
-        for output in (
-            Output("mean_friction", "1", "mean of F/W0", r"\bar F/W_0"),
-            Output("delta_mu", "1", "change of the mean by the modulation", r"\Delta\bar\mu"),
-            Output("mu_ss", "1", "friction coefficient of steady sliding", r"\bar\mu(V)"),
-            Output("mu1", "1", "first harmonic of F/W0, peak", r"\mu_1"),
-            Output("mu2", "1", "second harmonic of F/W0, peak", r"\mu_2"),
-            Output("phase1", "rad", "phase of the first harmonic", r"\arg c_1"),
-            Output("phase2", "rad", "phase of the second harmonic", r"\arg c_2"),
-            Output("harmonics", "1", "complex amplitudes of F/W0", "c_n"),
-            Output("multipliers", "1", "Floquet multipliers", "m", former=("floquet",)),
-            Output(
-                "log_multipliers",
-                "1",
-                "ln|m| + i arg m of the Floquet multipliers",
-                r"\ln m",
-            ),
-            Output("floquet_max", "1", "largest modulus of the multipliers", r"\max\lvert m\rvert"),
-            Output(
-                "log_multiplier",
-                "1",
-                "logarithm of the largest modulus of the multipliers",
-                r"\max\ln\lvert m\rvert",
-            ),
-            Output("mode", "1", "bifurcation of the leading multiplier"),
-            Output("mode_frequency", "Hz", "frequency of the leading mode, modulo f"),
-            Output("growth_rate", "1/s", "growth rate of the leading mode"),
-            Output("stable", "1", "all multipliers inside the unit circle"),
-            Output("converged", "1", "whether the point was solved"),
-            Output("result", "1", "converged, or why not"),
-        )
-    }
+    {name: Output(name, **_frozen(fields)) for name, fields in _TABLE["output"].items()}
 )
 
 #: Columns that a table of operating points gets.
@@ -70,210 +55,22 @@ RESULT_COLUMNS = (
     "result",
 )
 
-
-def _by_name(*parameters: Parameter) -> Mapping[str, Parameter]:
-    return MappingProxyType({p.name: p for p in parameters})
-
-
 #: Parameters that several laws share.
-INTERFACE = _by_name(
-    Parameter(
-        "mu0",
-        "dimensionless",
-        "positive",
-        "friction coefficient of steady sliding at $V_0$",
-        r"\mu_0",
-        geophysics=r"$\mu_0$, $f_0$",
-    ),
-    Parameter(
-        "A",
-        "dimensionless",
-        "positive",
-        "rate coefficient (direct effect)",
-        "A",
-        geophysics="$a$",
-    ),
-    Parameter(
-        "B",
-        "dimensionless",
-        "not negative",
-        "state coefficient (evolution effect)",
-        "B",
-        geophysics="$b$",
-    ),
-    Parameter(
-        "D0",
-        "length",
-        "positive",
-        "memory length",
-        "D_0",
-        meant=("dc", "d_c"),
-        geophysics="$D_c$, $d_c$, $L$",
-    ),
-    Parameter(
-        "V0",
-        "velocity",
-        "positive",
-        "reference velocity",
-        "V_0",
-        geophysics="$V_0$, $V_*$",
-    ),
-    Parameter(
-        "lambda",
-        "length",
-        "not negative",
-        "shear elastic length of the asperities",
-        r"\lambda",
-        aliases=("lambda_",),
-    ),
-)
+INTERFACE = _parameters("interface")
 
 #: The slider, and what of it counts in the equation of motion.
-MACHINE = _by_name(
-    Parameter(
-        "K",
-        "stiffness",
-        "positive",
-        "stiffness of the pulling spring",
-        "K",
-        "slider",
-        "system.slider.K",
-        label="slider.K",
-        argument="spring",
-        meant=("stiffness",),
-        geophysics="$k$ (Pa/m, over the area)",
-    ),
-    Parameter(
-        "W0",
-        "force",
-        "positive",
-        "mean normal load",
-        "W_0",
-        "slider",
-        "system.slider.W0",
-        label="slider.W0",
-        argument="load",
-        meant=("load",),
-        geophysics=r"$\bar\sigma_n$ (Pa, over the area)",
-    ),
-    Parameter(
-        "M",
-        "mass",
-        "not negative",
-        "mass of the slider",
-        "M",
-        "slider",
-        "system.slider.M",
-        default=0.0,
-        label="slider.M",
-        argument="mass",
-        meant=("mass",),
-    ),
-    Parameter(
-        "eta",
-        "damping",
-        "not negative",
-        "radiation damping: force of radiated waves per velocity",
-        r"\eta",
-        "motion",
-        "system.eta",
-        default=0.0,
-        label="radiation_damping",
-        argument="radiation_damping",
-        options=("--radiation-damping",),
-        aliases=("radiation_damping",),
-        geophysics=r"$\eta = G/(2 c_s)$ (Pa s/m, over the area)",
-    ),
-)
+MACHINE = _parameters("machine")
 
 #: Pulling velocity and modulation.
-DRIVE = _by_name(
-    Parameter(
-        "V",
-        "velocity",
-        "positive",
-        "pulling velocity",
-        "V",
-        "drive",
-        "system.V",
-        label="velocity",
-        argument="velocity",
-        options=("-V", "--velocity"),
-        aliases=("velocity",),
-        geophysics=r"$V_{lp}$, $V_{pl}$ (load point, plate)",
-    ),
-    Parameter(
-        "epsilon",
-        "dimensionless",
-        "amplitude",
-        "relative amplitude of the load on the contacts",
-        r"\varepsilon",
-        "load",
-        "load.epsilon",
-        label="epsilon",
-        argument="epsilon",
-        options=("-e", "--epsilon"),
-        aliases=("eps",),
-        geophysics=r"$\Delta\sigma/\bar\sigma$",
-    ),
-    Parameter(
-        "frequency",
-        "frequency",
-        "positive",
-        "frequency of the modulation",
-        "f",
-        "drive",
-        "system.omega",
-        2 * math.pi,
-        label="frequency",
-        argument="frequency",
-        options=("-f", "--frequency"),
-        aliases=("f",),
-        meant=("omega",),
-        geophysics="$1/T$",
-    ),
-    Parameter(
-        "inertia",
-        "dimensionless",
-        "switch",
-        "the mass of the slider counts",
-        "",
-        "motion",
-        default=0.0,
-        label="inertia",
-        argument="inertia",
-        options=("--inertia",),
-        words=MappingProxyType({"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}),
-    ),
-)
-
-
-def _modulation(name: str, symbol: str, meaning: str, rule: str = "finite") -> Parameter:
-    angle = name == "tilt" or name.endswith("_phase")
-    return Parameter(
-        name, "dimensionless", rule, meaning, symbol, "drive", default=0.0, label=name, angle=angle
-    )
-
+DRIVE = _parameters("drive")
 
 #: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulated`.
 #: Angles are in rad. Continuation and fits have a harmonic load and take none of them.
-MODULATION = _by_name(
-    _modulation("epsilon2", r"\varepsilon_2", "relative amplitude of the load's second harmonic"),
-    _modulation("epsilon2_phase", r"\varphi_2", "phase of the load's second harmonic (rad)"),
-    _modulation("epsilon3", r"\varepsilon_3", "relative amplitude of the load's third harmonic"),
-    _modulation("epsilon3_phase", r"\varphi_3", "phase of the load's third harmonic (rad)"),
-    _modulation("pull", "a", "amplitude of the pulling velocity over its mean"),
-    _modulation("pull_phase", r"\varphi_V", "phase of the pulling velocity against the load (rad)"),
-    _modulation(
-        "tilt",
-        r"\chi",
-        "angle between the modulated force and the interface's normal (rad), positive where a "
-        "growing load pushes the slider along",
-        "below a right angle",
-    ),
+MODULATION = _parameters(
+    "modulation", kind="dimensionless", rule="finite", place="drive", default=0.0
 )
 
-#: All that is no law's own.
+#: Parameters that belong to no law.
 EXPERIMENT: Mapping[str, Parameter] = MappingProxyType({**MACHINE, **DRIVE, **MODULATION})
 
 

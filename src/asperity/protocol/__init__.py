@@ -1,16 +1,10 @@
 """Protocols: experiments written as text, and run into a file."""
 
-from asperity.protocol.protocol import (
-    Protocol,
-    ProtocolError,
-    ProtocolStart,
-    Repeat,
-    SolverSettings,
-    load_protocol,
-)
+from asperity.protocol.protocol import Protocol, load_protocol
 from asperity.protocol.recording import RecordingSetup, record_run
 from asperity.protocol.run import RunSummary, run_protocol
 from asperity.protocol.run_file import RunOutline, outline, write_csv
+from asperity.questions.experiment import ProtocolError, ProtocolStart, Repeat, SolverSettings
 
 __all__ = [
     "Protocol",

@@ -102,12 +102,14 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     if not rate > _ROUND_OFF * level.velocity:
         return ""
     return (
-        f"steady sliding at {level.velocity:g} m/s is unstable at the start: a disturbance grows "
-        f"by a factor e in {1 / rate:.3g} s; without a perturbation, such as a step of the load, "
-        "the run stays on it until rounding errors have grown"
+        f"steady sliding at {level.velocity:g} m/s is unstable at the start: a disturbance "
+        f"doubles in {math.log(2) / rate:.3g} s; without a perturbation, such as a step of the "
+        "load, the run stays on it until rounding errors have grown"
     )
 
 
+#: Fields of a protocol by the arguments of a transient.
+_FIELDS = {"initial": "start.states", "rtol": "solver.rtol", "programme.velocity": "start.velocity"}
 #: Rows of a block, the most that an interruption loses.
 _ROWS = 20_000
 
@@ -252,10 +254,7 @@ def run_protocol(
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
     except InputError as error:
-        # The argument `initial` of a transient is `start.states` of a protocol.
-        if not str(error).startswith("initial "):
-            raise
-        raise InputError(f"start.states{str(error).removeprefix('initial')}") from None
+        raise error.about(_FIELDS.get(error.field.name, error.field)) from None
     except KeyboardInterrupt:
         total = protocol.programme.duration
         raise Interrupted(

@@ -5,7 +5,7 @@ Memory does not grow with the file.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,7 +124,8 @@ class RunOutline:
     time : array, shape (n,)
         Middle of each stretch (s).
     low, high : dict of str to array, shape (n,)
-        Extremes of ``load``, ``force``, ``velocity`` over each stretch, in SI.
+        Extremes of ``load``, ``force``, ``velocity`` over each stretch, in SI; of ``age`` too
+        where the file has it.
     events : list of (float, str)
         Time (s) and kind.
     title : str
@@ -159,14 +160,14 @@ def write_csv(run: str | Path, out: str | Path) -> Path:
         file.open("w", encoding="utf-8", newline="\n") as stream,
     ):
         stream.write(",".join(_COLUMNS.values()) + "\n")
-        for block in _blocks(Path(run)):
+        for block in _blocks(Path(run), _COLUMNS):
             rows = np.column_stack([block[name] for name in _COLUMNS])
             np.savetxt(stream, rows, "%.12g", ",")
     return Path(out)
 
 
 def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
-    """Extremes of load, force and velocity over stretches of equal length.
+    """Extremes of load, force, velocity and age over stretches of equal length.
 
     Parameters
     ----------
@@ -183,12 +184,13 @@ def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
         kinds = [k.decode() if isinstance(k, bytes) else k for k in file.variables["event_kind"][:]]
         events = list(zip(map(float, file.variables["event_time"][:]), kinds, strict=True))
         title, law = str(file.attrs["title"]), str(file.attrs["law"])
+        ages = ("age",) if "age" in file.variables else ()
     count = max(1, min(stretches, rows))
-    names = ("load", "force", "velocity")
+    names = ("load", "force", "velocity", *ages)
     low = {name: np.full(count, np.inf) for name in names}
     high = {name: np.full(count, -np.inf) for name in names}
     width = (last - first) / count or 1.0
-    for block in _blocks(Path(run)):
+    for block in _blocks(Path(run), ("time", *names)):
         index = np.minimum(((block["time"] - first) / width).astype(int), count - 1)
         for name in names:
             np.minimum.at(low[name], index, block[name])
@@ -205,10 +207,10 @@ def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     )
 
 
-def _blocks(run: Path) -> Iterator[dict[str, NDArray[np.float64]]]:
+def _blocks(run: Path, names: Iterable[str]) -> Iterator[dict[str, NDArray[np.float64]]]:
     import h5netcdf
 
     with h5netcdf.File(run, "r") as file:
         rows = file.variables["time"].shape[0]
         for begin in range(0, rows, _ROWS):
-            yield {n: np.asarray(file.variables[n][begin : begin + _ROWS]) for n in _COLUMNS}
+            yield {n: np.asarray(file.variables[n][begin : begin + _ROWS]) for n in names}

@@ -245,8 +245,10 @@ def _meant(line: str, name: str) -> list[StepForm]:
         examples = [REPEAT_EXAMPLE]
     shown = "' or '".join(examples or [form.example for form in FORMS])
     raise InputError(
-        f"{name} must be a step, got '{line}'; "
-        + (f"did you mean something like '{shown}'?" if near else f"write it like '{shown}'")
+        name,
+        "be a step",
+        f"'{line}'",
+        f"did you mean something like '{shown}'?" if near else f"write it like '{shown}'",
     )
 
 

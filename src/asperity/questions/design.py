@@ -1,4 +1,4 @@
-"""A plan of an experiment: what can be set, what is measured how well, and what is asked."""
+"""A plan of an experiment: settings, noise of the readings, and aim."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class Estimation(Record):
     profile : bool
         Whether intervals are by profile likelihood.
     starts, seed : int
-        Starts that are drawn besides the first one, and their seed.
+        Number of random starts in addition to the first one, and their seed.
     """
 
     free: Names | None = None

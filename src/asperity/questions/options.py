@@ -7,47 +7,39 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from asperity.questions.fit import Fit
+from asperity.questions.record import Record
 from asperity.questions.recording import Measurement, Source
 
 #: Options that choose the column of a role; other roles have --column.
 COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--time"}
 
+
+def _named(record: type[Record], *others: str, without: tuple[str, ...] = ()) -> dict[str, str]:
+    """The option of each field of a record and of `others`, under the name of the field."""
+    names = [name for name in (*record.model_fields, *others) if name not in without]
+    return {name: f"--{name.replace('_', '-')}" for name in names}
+
+
 SOURCE_OPTIONS: Mapping[str, str] = {
+    **_named(Source, without=("title",)),
     "columns": "--column",
     "units": "--unit",
     "channels": "--channel",
-    **{n: f"--{n}" for n in ("recipe", "area", "rate", "group", "format", "delimiter", "decimal")},
 }
 
 MEASURE_OPTIONS: Mapping[str, str] = {
+    **_named(Measurement, "conditions"),
     "modulated": "--no-modulation",
-    "load": "--load",
-    "force": "--force",
-    "frequency": "--frequency",
-    "exact_frequency": "--exact-frequency",
-    "harmonics": "--harmonics",
-    "window": "--window",
-    "whole_periods": "--whole-periods",
-    "detrend": "--detrend",
-    "steps": "--steps",
-    "holds": "--holds",
-    "stick_slip": "--stick-slip",
     "stiffness": "--set K",
     "velocity": "--set V",
     "mass": "--set M",
     "normal_load": "--set W0",
-    "conditions": "--conditions",
 }
 
 FIT_OPTIONS: Mapping[str, str] = {
-    **{
-        name: f"--{name.replace('_', '-')}"
-        for name in (
-            *("law", "laws", "free", "start", "prior", "material", "window", "windows", "steps"),
-            *("velocities", "stiffness_from", "trend", "drift", "initial", "gauge"),
-            *("gauge_order", "fit_rate", "profile", "inertia", "radiation_damping"),
-        )
-    },
+    # Starts and their seed have no option.
+    **_named(Fit, "laws", "window", "steps", "velocities", without=("data", "starts", "seed")),
     "fixed": "--fix",
     "numbers": "--fix",
 }

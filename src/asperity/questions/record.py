@@ -93,6 +93,8 @@ class Question(Record):
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
         """Read a question from a TOML file, in which every quantity carries its unit.
 
+        Files that it names lie relative to its folder.
+
         Parameters
         ----------
         path : str or path
@@ -106,7 +108,9 @@ class Question(Record):
         MistakesError
             An `InputError` with all mistakes.
         """
-        _, content = toml_content(path, cls.subject)
+        file, content = toml_content(path, cls.subject)
+        if "folder" in cls.model_fields:
+            fields = {"folder": file.parent, **fields}
         return cls.of_content({**fields, **content}, str(path))
 
     @classmethod
@@ -156,9 +160,9 @@ def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
         Place, kind of quantity and value of each.
     """
     mistakes: dict[str, InputError] = {}
-    for place, kind, value in numbers:
+    for place, kind, value in numbers if _units_required.get() else ():
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if _units_required.get() and number and np.isfinite(value) and KINDS[kind].si:
+        if number and np.isfinite(value) and KINDS[kind].si:
             advice = f"write it like '{KINDS[kind].example}'"
             mistake = InputError(place, "carry a unit", shown(value), advice)
             mistakes.setdefault(str(mistake), mistake)
@@ -285,9 +289,6 @@ def _mistakes(
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)
-    if raised is not None:
-        # Raised by a validator of the record, which leaves only the field to be named.
-        return (InputError(f"{field} must {raised}"),)
     if reported["type"] == "missing":
         return (InputError(field, "be given", "nothing", "add it"),)
     value = shown(reported["input"])

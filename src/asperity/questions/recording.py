@@ -94,7 +94,7 @@ class Measurement(Question):
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
-        Where the modulation is looked for (Hz); found by default.
+        Frequency (Hz) near which the modulation is searched; by default the whole spectrum.
     exact_frequency : bool
         Whether the frequency is taken as it is, not fitted.
     harmonics : int

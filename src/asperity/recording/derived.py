@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Evaluated, Names, Quantity, evaluate
 from asperity.recording.finding import Finding
@@ -50,19 +50,19 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         If an expression is invalid, or its unit does not fit the role.
     """
     for target, text in channels.items():
-        field = f"channels['{target}']"
+        field = Argument("channels", target)
         if not str(text).strip():
             raise InputError(
-                f"{field} must be an expression, got {text!r}; write it like '2.4 N/V * Gauge'"
+                field, "be an expression", repr(text), "write it like '2.4 N/V * Gauge'"
             )
         if not target.strip():
-            raise InputError("channels must have names, got an empty one; write 'load = ...'")
+            raise InputError("channels", "have names", "an empty one", "write 'load = ...'")
         trace = _with(trace, target, evaluate(str(text), _names(trace, field), field), field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def _with(trace: Trace, target: str, evaluated: Evaluated, field: str, text: str) -> Trace:
+def _with(trace: Trace, target: str, evaluated: Evaluated, field: Argument, text: str) -> Trace:
     role = role_of(target)
     quantity = evaluated.quantity
     kind = kind_of_dimension(quantity.dimension)
@@ -91,28 +91,30 @@ def _with(trace: Trace, target: str, evaluated: Evaluated, field: str, text: str
     return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 
-def _with_time(trace: Trace, time: NDArray[np.float64], field: str, text: str) -> Trace:
+def _with_time(trace: Trace, time: NDArray[np.float64], field: Argument, text: str) -> Trace:
     if not np.isfinite(time).any():
-        raise InputError(f"{field} must give times, got no finite one; correct the expression")
+        raise InputError(field, "give times", "no finite one", "correct the expression")
     kept = [f for f in trace.findings if f.name not in CHECKED]
     moved = replace(trace, time=time, findings=())
     provenance = {**trace.provenance, "time": f"derived: {text}"}
     return replace(moved, findings=(*kept, *check(moved)), provenance=provenance)
 
 
-def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: str) -> None:
+def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: Argument) -> None:
     if role is None:
         return
     fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
     if kind not in fitting:
         shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
         raise InputError(
-            f"{field} must be a {' or '.join(sorted(fitting))}, got {shown}; add the units of "
-            "gains and areas, like '2.4 N/V' or '25 cm^2'"
+            field,
+            f"be a {' or '.join(sorted(fitting))}",
+            shown,
+            "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'",
         )
 
 
-def _names(trace: Trace, field: str) -> Names:
+def _names(trace: Trace, field: Argument) -> Names:
     def find(name: str, only_channels: bool) -> tuple[Quantity, str] | None:
         key = _key_of(trace, name)
         if key is not None:
@@ -153,7 +155,7 @@ def _bare(name: str) -> str:
     return name.replace(" ", "").strip("._")
 
 
-def _quantity(channel: Channel, key: str, field: str) -> Quantity:
+def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:
     if channel.kind is not None:
         return Quantity(channel.values, base_units(channel.unit)[1])
     if not channel.recorded_unit:
@@ -163,8 +165,10 @@ def _quantity(channel: Channel, key: str, field: str) -> Quantity:
         factor, dimension = base_units(channel.recorded_unit)
     except InputError:
         raise InputError(
-            f"{field} must be made of channels in known units, got '{key}' in "
-            f"'{channel.recorded_unit}'; name its unit when reading, like {key}=N"
+            field,
+            "be made of channels in known units",
+            f"'{key}' in '{channel.recorded_unit}'",
+            f"name its unit when reading, like {key}=N",
         ) from None
     return Quantity(channel.values * factor, dimension)
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import Argument, InputError, closest
 from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
 Array = NDArray[np.float64]
@@ -86,14 +86,14 @@ class Evaluated:
     sources: tuple[str, ...]
 
 
-def evaluate(text: str, names: Names, field: str) -> Evaluated:
+def evaluate(text: str, names: Names, field: str | Argument) -> Evaluated:
     """Value of an expression.
 
     Parameters
     ----------
     text : str
     names : Names
-    field : str
+    field : str or Argument
         Name of the expression in messages, such as ``"channels['load']"``.
 
     Raises
@@ -111,7 +111,7 @@ def evaluate(text: str, names: Names, field: str) -> Evaluated:
 class _Expression:
     """A parsed text, and the quantities of its names, numbers and units."""
 
-    def __init__(self, text: str, names: Names, field: str) -> None:
+    def __init__(self, text: str, names: Names, field: str | Argument) -> None:
         self.text, self.names, self.field = text, names, field
         self.operands: list[Quantity] = []
         self.sources: list[str] = []
@@ -119,7 +119,7 @@ class _Expression:
             self.fail(f"have at most {_LONGEST} characters", f"{len(text)}", "split it")
 
     def fail(self, rule: str, got: str, advice: str) -> NoReturn:
-        raise InputError(f"{self.field} must {rule}, got {got}; {advice}")
+        raise InputError(self.field, rule, got, advice)
 
     def _misplaced(self, what: str) -> NoReturn:
         self.fail(

@@ -2,7 +2,7 @@
 
     M dv/dt = F + S - F_i - eta v,      dF/dt = K (V p - v),
 
-F the spring force, S a shear force besides it, F_i = W F_i/W the interface force, eta v the force
+F the spring force, S an additional shear force, F_i = W F_i/W the interface force, eta v the force
 that waves radiated into the half-spaces take (Rice, 1993), the substitute for inertia in models
 of faults. With asperities of stiffness W/lambda, F_i/W is a further state,
 

@@ -60,8 +60,10 @@ def equation_of_motion(
         return QuasiStatic(slider, V, omega)
     if not slider.law.rate_dependent:
         raise InputError(
-            f"law must depend on the velocity where inertia or radiation damping counts, got "
-            f"{slider.law.name}; leave both out or choose another law"
+            "law",
+            "depend on the velocity with inertia or radiation damping",
+            slider.law.name,
+            "leave both out or choose another law",
         )
     if inertia:
         _require_positive("slider.M", slider.M, "kg", "give the mass, as mass='1.6 kg'")
@@ -79,7 +81,7 @@ def _require_positive(name: str, value: ArrayLike | None, unit: str, remedy: str
     array = np.asarray(value, float)
     bad = array[~(array > 0)]
     if bad.size:
-        raise InputError(f"{name} must be positive, got {bad.flat[0]:g} {unit}; {remedy}")
+        raise InputError(name, "be positive", f"{bad.flat[0]:g} {unit}", remedy)
 
 
 def _elastic(slider: Slider) -> bool:
@@ -87,8 +89,10 @@ def _elastic(slider: Slider) -> bool:
     length = np.asarray(slider.law.elastic_length)
     if np.any(length > 0) and np.any(length == 0):
         raise InputError(
-            "law.lambda must be positive at all points or 0 at all points when inertia or "
-            "radiation damping counts, got both: the states differ; solve the two groups separately"
+            "law.lambda",
+            "be positive at all points or 0 at all points with inertia or radiation damping",
+            "both: the states differ",
+            "solve the two groups separately",
         )
     return bool(np.all(length > 0))
 
@@ -146,8 +150,10 @@ def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation
     if (epsilon is None) == (modulation is None):
         given = "neither" if epsilon is None else "both"
         raise InputError(
-            f"exactly one of epsilon and modulation must be given, got {given}; "
-            "give epsilon for a harmonic load and modulation for any other"
+            "exactly one of epsilon and modulation",
+            "be given",
+            given,
+            "give epsilon for a harmonic load and modulation for any other",
         )
     if modulation is None:
         return Harmonic(DRIVE["epsilon"].check(epsilon))
@@ -180,8 +186,10 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     except ValueError:
         shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
         raise InputError(
-            f"{name} must have shapes that broadcast, got {', '.join(shapes)}; "
-            "give arrays of one shape, or add axes of length 1"
+            name,
+            "have shapes that broadcast",
+            ", ".join(shapes),
+            "give arrays of one shape, or add axes of length 1",
         ) from None
     return (
         jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), problem),

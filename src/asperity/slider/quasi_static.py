@@ -8,7 +8,7 @@ joint. Their joint elongation over W0/K,
     kappa = V K / (omega W0),
 
 contains no dW/dt, so that z is continuous through a step of the load. p is the pulling velocity
-over V. With a shear force s W0 besides the spring's, F_i/W = (f + s) / w, and
+over V. With an additional shear force s W0, F_i/W = (f + s) / w, and
 
     F_i/W = (z + s) / (w + l),      f = (z w - l s) / (w + l).
 

@@ -12,9 +12,8 @@ from asperity._lazy import lazy_names
 if TYPE_CHECKING:
     from asperity.study.estimate import dry_run
     from asperity.study.export import export_store
-    from asperity.study.grid import load_plan
     from asperity.study.outcome import reasons
-    from asperity.study.plan import SweepPlan
+    from asperity.study.plan import SweepPlan, load_plan
     from asperity.study.results import SweepStatus, open_store, store_status, summary_statistics
     from asperity.study.run import SweepSummary, run_sweep
 
@@ -25,7 +24,7 @@ _HOMES = {
     "SweepSummary": "run",
     "dry_run": "estimate",
     "export_store": "export",
-    "load_plan": "grid",
+    "load_plan": "plan",
     "open_store": "results",
     "reasons": "outcome",
     "run_sweep": "run",

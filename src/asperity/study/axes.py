@@ -1,6 +1,6 @@
 """The axes of a sweep: rows of numbers that belong together, listed or drawn.
 
-`axis_record` reads an axis as a plan writes it; a `SweepAxis` gives its rows.
+`axis_record` reads an axis as a plan writes it; a `SweepAxis` has its rows.
 """
 
 from __future__ import annotations
@@ -8,9 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from asperity.errors import InputError
 from asperity.laws import get_law, known_law
 from asperity.parameters import Parameter, canonical_name, obeying, suggestion
 from asperity.parameters.arguments import shown
-from asperity.study.plan import AxisTable, SweepPlan
+from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
 
@@ -39,149 +37,59 @@ SOBOL_BITS = 30
 MOST_LISTED = 1_000_000
 
 
-class SweepAxis(ABC):
-    """One axis: a name, a length, and the columns that vary along it.
+class SweepAxis:
+    """One axis of a sweep: rows that are listed, or random or quasi-random draws.
+
+    Parameters
+    ----------
+    name : str
+    record : mapping
+        From `axis_record`.
 
     Attributes
     ----------
     name : str
-    length : int
     names : tuple of str
-        Names of the columns: parameters, ratios, or ``law``.
+        Names of the columns: parameters, ratios, ``law`` or ``data``.
+    length : int
+        Number of rows.
     """
 
-    name: str
+    def __init__(self, name: str, record: Mapping[str, Any]) -> None:
+        self.name, self._record = name, record
+        self.names = columns_of(record)
+        columns = record.get("columns", {})
+        self._listed = {column: _listed_values(column, v) for column, v in columns.items()}
+        self.length = record["count"] if "over" in record else len(columns[self.names[0]])
 
-    @property
-    @abstractmethod
-    def length(self) -> int:
-        """Number of rows."""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-
-    @abstractmethod
     def rows(self, start: int, stop: int) -> dict[str, Column]:
         """The columns from row `start` to before `stop`: SI, NaN where a row has no value.
 
-        A column of texts holds "" where a row has no value.
+        A column of texts holds "" where a row has no value. A row is drawn without the rows before
+        it.
         """
-
-    @property
-    def labelled(self) -> bool:
-        """Whether the axis is named after its only column, which then labels the dimension."""
-        return self.names == (self.name,)
-
-
-@dataclass(frozen=True)
-class ListedAxis(SweepAxis):
-    """An axis whose rows the plan lists.
-
-    Attributes
-    ----------
-    name : str
-    columns : mapping of str to array, shape (length,)
-    """
-
-    name: str
-    columns: Mapping[str, Column]
-
-    @property
-    def length(self) -> int:
-        """Number of rows."""
-        return len(next(iter(self.columns.values())))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.columns)
-
-    def rows(self, start: int, stop: int) -> dict[str, Column]:
-        """As in `SweepAxis`."""
-        return {name: values[start:stop] for name, values in self.columns.items()}
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Distribution of a drawn number.
-
-    Attributes
-    ----------
-    low, high : float
-        Ends of a uniform distribution; mean and standard deviation of a normal one.
-    kind : {"linear", "log", "normal"}
-        Uniform in the number, uniform in its logarithm, or normal.
-    """
-
-    low: float
-    high: float
-    kind: str
-
-    def at(self, u: Column) -> Column:
-        """The quantile `u`, 0 < u < 1."""
-        from scipy.special import ndtri
-
-        if self.kind == "normal":
-            return np.asarray(self.low + self.high * ndtri(u))
-        if self.kind == "log":
-            return np.asarray(np.exp(np.log(self.low) + u * np.log(self.high / self.low)))
-        return np.asarray(self.low + u * (self.high - self.low))
-
-
-@dataclass(frozen=True)
-class DrawnAxis(SweepAxis):
-    """An axis of random or quasi-random draws; a row is drawn without the rows before it.
-
-    Attributes
-    ----------
-    name : str
-    method : {"random", "sobol", "halton"}
-        Sobol and Halton sequences are scrambled by the seed.
-    seed, count : int
-    spreads : mapping of str to Spread
-        Distribution of each column; a column is one dimension of the draws, in this order.
-    """
-
-    name: str
-    method: str
-    seed: int
-    count: int
-    spreads: Mapping[str, Spread]
-
-    @property
-    def length(self) -> int:
-        """Number of rows."""
-        return self.count
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.spreads)
-
-    def rows(self, start: int, stop: int) -> dict[str, Column]:
-        """As in `SweepAxis`."""
-        u = self._uniform(start, stop)
+        if self._listed:
+            return {name: values[start:stop] for name, values in self._listed.items()}
         # The normal distribution has no quantile at 0 and at 1.
-        u = np.clip(u, 2.0**-53, 1 - 2.0**-53)
-        return {n: s.at(u[:, i]) for i, (n, s) in enumerate(self.spreads.items())}
+        u = np.clip(self._uniform(start, stop), 2.0**-53, 1 - 2.0**-53)
+        spreads = self._record["over"].items()
+        return {name: _quantile(spread, u[:, i]) for i, (name, spread) in enumerate(spreads)}
 
     def _uniform(self, start: int, stop: int) -> Column:
         """Draws in the unit cube, shape (rows, columns)."""
         from scipy.stats import qmc
 
-        dimensions = len(self.spreads)
-        if self.method == "random":
+        dimensions, method, seed = len(self.names), self._record["draw"], self._record["seed"]
+        if method == "random":
             first = start // _BLOCK_ROWS
             blocks = [
-                np.random.default_rng([self.seed, block]).random((_BLOCK_ROWS, dimensions))
+                np.random.default_rng([seed, block]).random((_BLOCK_ROWS, dimensions))
                 for block in range(first, -(-stop // _BLOCK_ROWS))
             ]
             skip = start - first * _BLOCK_ROWS
             return np.concatenate(blocks)[skip : skip + stop - start]
-        scramble = np.random.default_rng(self.seed)
-        if self.method == "halton":
+        scramble = np.random.default_rng(seed)
+        if method == "halton":
             sequence: Any = qmc.Halton(dimensions, rng=scramble)
             # A Halton point follows from its number; fast_forward would compute all points before.
             sequence.num_generated = start
@@ -195,13 +103,35 @@ class DrawnAxis(SweepAxis):
             return np.asarray(sequence.random(stop - start))
 
 
+def _listed_values(column: str, values: Sequence[Any]) -> Column:
+    if column in TEXTS:
+        return np.array(values, dtype=object)
+    return np.array([math.nan if value is None else value for value in values], dtype=float)
+
+
+def _quantile(spread: Mapping[str, Any], u: Column) -> Column:
+    """The quantile `u`, 0 < u < 1, of a drawn number.
+
+    Its ``kind`` is "linear" or "log", uniform between ``low`` and ``high`` in the number or in its
+    logarithm, or "normal" with the mean ``low`` and the standard deviation ``high``.
+    """
+    from scipy.special import ndtri
+
+    low, high = spread["low"], spread["high"]
+    if spread["kind"] == "normal":
+        return np.asarray(low + high * ndtri(u))
+    if spread["kind"] == "log":
+        return np.asarray(np.exp(np.log(low) + u * np.log(high / low)))
+    return np.asarray(low + u * (high - low))
+
+
 def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the columns of an axis, from the record of the axis."""
     return tuple(axis["columns"] if "columns" in axis else axis["over"])
 
 
 def axis_record(
-    name: str, table: AxisTable, known: Mapping[str, Parameter], plan: SweepPlan
+    name: str, table: AxisTable, known: Mapping[str, Parameter], plan: Sweep
 ) -> tuple[str, dict[str, Any]]:
     """Name of an axis, and the axis as JSON values in SI.
 
@@ -306,23 +236,43 @@ def checked_value(parameter: Parameter, value: Any) -> float:
     return float(number)
 
 
+def _ends(
+    name: str, table: Mapping[str, Any], known: Mapping[str, Parameter], *others: str
+) -> tuple[float, float, str]:
+    """Ends in SI and spacing of a grid or of a uniform distribution.
+
+    Parameters
+    ----------
+    name : str
+    table : mapping
+        With ``from`` and ``to``, the fields `others`, and ``spacing`` if it is not linear.
+    known : mapping of str to Parameter
+    """
+    column, fields = _name(name, known), {"from", "to", *others}
+    if column in TEXTS or not fields <= set(table) <= {*fields, "spacing"}:
+        raise InputError(
+            f"{name} must have {', '.join(sorted(fields))}, got "
+            f"{', '.join(sorted(table)) or 'nothing'}; write it like "
+            "{ from = 0.01, to = 0.5, count = 20 }, or draw it with mean and std"
+        )
+    low, high = (checked_value(known[column], table[end]) for end in ("from", "to"))
+    spacing = table.get("spacing") or "linear"
+    if spacing not in ("linear", "log"):
+        raise InputError(f"{name}.spacing must be linear or log, got {shown(spacing)}; choose one")
+    if spacing == "log" and not low * high > 0:
+        raise InputError(
+            f"{name} must have ends above zero to be logarithmic, got {low:g} and {high:g}; "
+            "change them or the spacing"
+        )
+    return low, high, spacing
+
+
 def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> list[float]:
     """Values at equal distances or ratios, with both ends."""
-    column = _name(name, known)
-    extra = set(table) - {"from", "to", "count", "spacing"}
-    if column in TEXTS or extra or not {"from", "to", "count"} <= set(table):
-        raise InputError(
-            f"{name} must have from, to and count, got {', '.join(sorted(table))}; write it like "
-            "{ from = 0.01, to = 0.5, count = 20 }"
-        )
-    low, high = (
-        checked_value(known[column], table["from"]),
-        checked_value(known[column], table["to"]),
-    )
-    count, spacing = table["count"], table.get("spacing") or "linear"
+    low, high, spacing = _ends(name, table, known, "count")
+    count = table["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LISTED:
         raise InputError(f"count must be from 1 to {MOST_LISTED:,}, got {shown(count)}")
-    _check_spacing(name, spacing, low, high, ("linear", "log"))
     u = np.linspace(0.0, 1.0, count)
     values = low * (high / low) ** u if spacing == "log" else low + (high - low) * u
     # Rounding to 15 digits: a longer grid of the same step then has bit for bit the same values,
@@ -330,41 +280,15 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     return [float(f"{value:.15g}") for value in values]
 
 
-def _check_spacing(
-    name: str, spacing: Any, low: float, high: float, kinds: tuple[str, ...]
-) -> None:
-    if spacing not in kinds:
-        raise InputError(
-            f"{name}.spacing must be {' or '.join(kinds)}, got {shown(spacing)}; choose one"
-        )
-    if spacing == "log" and not low * high > 0:
-        raise InputError(
-            f"{name} must have ends above zero to be logarithmic, got {low:g} and {high:g}; "
-            "change them or the spacing"
-        )
-
-
 def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Fields of a `Spread`, from a plan's table of a drawn number."""
+    """Distribution of a drawn number, as for `_quantile`."""
     column = _name(name, known)
-    if column in TEXTS:
-        raise InputError(f"over must name numbers, got '{column}'; add an axis of its values")
-    if set(table) == {"mean", "std"}:
+    if set(table) == {"mean", "std"} and column not in TEXTS:
         parameter = known[column]
         mean = checked_value(parameter, table["mean"])
         std = float(obeying(table["std"], f"{parameter.name}.std", parameter.kind, "positive"))
         return {"low": mean, "high": std, "kind": "normal"}
-    if not {"from", "to"} <= set(table) <= {"from", "to", "spacing"}:
-        raise InputError(
-            f"over.{name} must have from and to, or mean and std, got "
-            f"{', '.join(sorted(table)) or 'nothing'}; write it like {{ from = 0.01, to = 0.5 }}"
-        )
-    low, high = (
-        checked_value(known[column], table["from"]),
-        checked_value(known[column], table["to"]),
-    )
-    spacing = table.get("spacing", "linear")
-    _check_spacing(f"over.{name}", spacing, low, high, ("linear", "log"))
+    low, high, spacing = _ends(name, table, known)
     return {"low": low, "high": high, "kind": spacing}
 
 

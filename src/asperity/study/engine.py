@@ -1,7 +1,8 @@
-"""The engine of tables, maps and sweeps: workers solve and write chunks, the engine counts them.
+"""The engine of tables, maps and sweeps: it hands out chunks of points, and counts them.
 
-A task is a call with several chunks. The worker solves the chunks, writes the results and returns a
-`Report`. The engine keeps no results, so that its memory does not grow with the number of chunks.
+A chunk is the unit of all work. For a sweep a worker solves it, writes it and returns a
+`DoneChunk`; the engine keeps no results, so that its memory does not grow with the number of
+chunks. Tables and maps are solved in this process, in order.
 """
 
 from __future__ import annotations
@@ -10,22 +11,16 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
-from asperity.study.workers import ThisProcess, Workers
+from asperity.study.workers import Workers
 
-#: Target duration of a task (s).
-_TASK_SECONDS = 2.0
-#: Tasks submitted for each worker: a worker that ends one task starts the next without waiting.
-_TASKS_PER_WORKER = 2
-#: Largest number of chunks in a task.
-_MOST_CHUNKS = 64
-#: A chunk whose worker process died so often is not solved. Before the last attempt the chunk runs
-#: alone, which shows whether this chunk or another of the task kills the process.
+#: Chunks submitted for each worker: a worker that ends one starts the next without waiting.
+_CHUNKS_PER_WORKER = 2
+#: A chunk whose worker process died so often is given up. Before the last attempt the chunk runs
+#: alone, which shows whether this chunk or another one kills the process or takes the memory.
 _MOST_DEATHS = 3
-#: Weight of the newest duration in the exponential moving average.
-_NEWEST = 0.3
 
 
 class WorkersGoneError(RuntimeError):
@@ -34,57 +29,38 @@ class WorkersGoneError(RuntimeError):
 
 @dataclass(frozen=True)
 class DoneChunk:
-    """A chunk that is solved and written.
+    """What a worker reports of a chunk that is solved and written.
 
     Attributes
     ----------
-    chunk, points, failed : int
-        Number of the chunk, number of its points, and of those without a converged answer.
+    points, failed : int
+        Number of its points, and of those without a converged answer.
     seconds : float, optional
         Time to solve and write without compilation; None if an earlier run solved the chunk.
-    """
-
-    chunk: int
-    points: int
-    failed: int
-    seconds: float | None
-
-
-@dataclass
-class Report:
-    """Result of a task.
-
-    Attributes
-    ----------
-    done : list of DoneChunk
-    left : tuple of int
-        Chunks not solved within the time budget of the task.
-    messages : list of str
+    messages : tuple of str
         Errors of the solver.
     memory : float
         Largest resident memory of the worker so far (bytes).
     """
 
-    done: list[DoneChunk] = field(default_factory=list)
-    left: tuple[int, ...] = ()
-    messages: list[str] = field(default_factory=list)
+    points: int
+    failed: int
+    seconds: float | None
+    messages: tuple[str, ...] = ()
     memory: float = 0.0
 
 
 class Task(Protocol):
-    """A callable that solves and writes chunks."""
+    """A callable that solves and writes a chunk; pickled where the workers are other processes."""
 
-    def __call__(self, chunks: tuple[int, ...], budget: float, give_up: bool = False, /) -> Report:
-        """Solve at least one chunk, and further chunks until `budget` seconds have passed.
-
-        With `give_up` all points of the chunks are marked as failed without being solved.
-        """
+    def __call__(self, chunk: int, give_up: bool = False, /) -> DoneChunk:
+        """Solve and write a chunk; with `give_up` mark its points as failed without solving."""
         ...
 
 
 @dataclass
 class SweepProgress:
-    """Progress of a study.
+    """Progress of a sweep.
 
     Attributes
     ----------
@@ -124,123 +100,35 @@ class SweepProgress:
     left: float = float("nan")
 
     @property
+    def solved(self) -> int:
+        """Points solved in this run."""
+        return self.points - self.kept
+
+    @property
     def rate(self) -> float:
         """Points solved per second in this run."""
-        return (self.points - self.kept) / self.seconds if self.seconds > 0 else 0.0
+        return self.solved / self.seconds if self.seconds > 0 else 0.0
 
-    def add(self, report: Report) -> None:
-        """Add the counts of a task."""
-        self.memory = max(self.memory, report.memory)
-        for done in report.done:
-            self.chunks += 1
-            self.points += done.points
-            self.failed += done.failed
-            if done.seconds is None:
-                self.kept += done.points
-            else:
-                self.spent += done.seconds
+    def add(self, done: DoneChunk) -> None:
+        """Add the counts of a chunk."""
+        self.chunks += 1
+        self.points += done.points
+        self.failed += done.failed
+        self.memory = max(self.memory, done.memory)
+        if done.seconds is None:
+            self.kept += done.points
+        else:
+            self.spent += done.seconds
 
     def estimate(self, seconds: float, workers: int) -> None:
         """Set the time since the beginning (s), and the estimate of the remaining time."""
         self.seconds = seconds
         # Checking a chunk that an earlier run solved takes next to no time.
         points_left = self.total - self.points - max(0, self.stored - self.kept)
-        solved = self.points - self.kept
         if points_left <= 0:
             self.left = 0.0
-        elif solved:
-            self.left = points_left * self.spent / solved / workers
-
-
-class _Engine:
-    """A run over chunks; the arguments are those of `solve_chunks`."""
-
-    def __init__(
-        self, task: Task, chunks: Iterable[int], workers: Workers, progress: SweepProgress,
-        log: Callable[[str], None],
-    ) -> None:  # fmt: skip
-        self.task, self.workers, self.progress, self.log = task, workers, progress, log
-        self._fresh = iter(chunks)
-        self._again: deque[int] = deque()
-        self._suspects: deque[int] = deque()
-        self._deaths: Counter[int] = Counter()
-        self._running: dict[Future[Report], tuple[int, ...]] = {}
-        self._seconds: float | None = None
-
-    def run(self, tick: Callable[[SweepProgress], None]) -> None:
-        begin = time.perf_counter()
-        while True:
-            self._fill()
-            if not self._running:
-                return
-            done, _ = wait(self._running, timeout=0.5, return_when=FIRST_COMPLETED)
-            dead: list[int] = []
-            for future in done:
-                chunks = self._running.pop(future)
-                try:
-                    self._take(future.result())
-                except self.workers.lost:
-                    dead += chunks
-                except self.workers.gone:
-                    raise WorkersGoneError from None
-            if dead:
-                self._repeat(dead)
-            self.progress.estimate(time.perf_counter() - begin, self.workers.count)
-            tick(self.progress)
-
-    def _fill(self) -> None:
-        """Submit tasks until each worker has `_TASKS_PER_WORKER`; a suspect chunk runs alone."""
-        if self._suspects:
-            if not self._running:
-                chunk = self._suspects.popleft()
-                self._submit((chunk,), give_up=self._deaths[chunk] >= _MOST_DEATHS)
-            return
-        while len(self._running) < _TASKS_PER_WORKER * self.workers.count:
-            chunks = self._next()
-            if not chunks:
-                return
-            self._submit(chunks)
-
-    def _submit(self, chunks: tuple[int, ...], give_up: bool = False) -> None:
-        try:
-            self._running[self.workers.submit(self.task, chunks, _TASK_SECONDS, give_up)] = chunks
-        except self.workers.gone:
-            raise WorkersGoneError from None
-
-    def _next(self) -> tuple[int, ...]:
-        """Chunks of the next task; chunks that a task left come before new ones."""
-        left = self.progress.chunk_total - self.progress.chunks
-        share = -(-left // (2 * self.workers.count))
-        in_time = 1 if self._seconds is None else round(_TASK_SECONDS / max(self._seconds, 1e-3))
-        chunks: list[int] = []
-        while len(chunks) < max(1, min(in_time, share, _MOST_CHUNKS)):
-            chunk = self._again.popleft() if self._again else next(self._fresh, None)
-            if chunk is None:
-                break
-            chunks.append(chunk)
-        return tuple(chunks)
-
-    def _take(self, report: Report) -> None:
-        self.progress.add(report)
-        for message in report.messages:
-            self.log(message)
-        for done in report.done:
-            if done.seconds is not None:
-                mean = done.seconds if self._seconds is None else self._seconds
-                self._seconds = mean + _NEWEST * (done.seconds - mean)
-        self._again.extendleft(reversed(report.left))
-
-    def _repeat(self, chunks: list[int]) -> None:
-        """Queue again the chunks whose worker process died."""
-        self.progress.lost += 1
-        self.log(f"a worker process died with {len(chunks)} chunks at work; they are done again")
-        self.workers.restart()
-        for chunk in chunks:
-            self._deaths[chunk] += 1
-            alone = self._deaths[chunk] >= _MOST_DEATHS - 1
-            (self._suspects if alone else self._again).append(chunk)
-            if self._deaths[chunk] == _MOST_DEATHS:
-                self.log(f"chunk {chunk} kills its process each time; its points are given up")
+        elif self.solved:
+            self.left = points_left * self.spent / self.solved / workers
 
 
 def solve_chunks(
@@ -256,7 +144,6 @@ def solve_chunks(
     Parameters
     ----------
     task : Task
-        Pickled and sent to the workers where these are other processes.
     chunks : iterable of int
         Numbers of the chunks, in the order in which they are submitted.
     workers : Workers
@@ -274,14 +161,57 @@ def solve_chunks(
     WorkersGoneError
         If the workers have ended and cannot be restarted.
     """
-    _Engine(task, chunks, workers, progress, log).run(tick)
+    begin = time.perf_counter()
+    fresh, again, alone = iter(chunks), deque[int](), deque[int]()
+    deaths: Counter[int] = Counter()
+    running: dict[Future[DoneChunk], int] = {}
+
+    def following() -> int | None:
+        """The next chunk, if the workers have room for it; a suspect chunk runs alone."""
+        if alone:
+            return None if running else alone.popleft()
+        if len(running) >= _CHUNKS_PER_WORKER * workers.count:
+            return None
+        return again.popleft() if again else next(fresh, None)
+
+    while True:
+        died = []
+        try:
+            while (chunk := following()) is not None:
+                give_up = deaths[chunk] >= _MOST_DEATHS
+                running[workers.submit(task, chunk, give_up)] = chunk
+            if not running:
+                return
+            for future in wait(running, timeout=0.5, return_when=FIRST_COMPLETED).done:
+                chunk = running.pop(future)
+                try:
+                    done = future.result()
+                except workers.lost:
+                    died.append(chunk)
+                else:
+                    progress.add(done)
+                    for message in done.messages:
+                        log(message)
+        except workers.gone:
+            raise WorkersGoneError from None
+        if died:
+            progress.lost += 1
+            log(f"a worker process died with {len(died)} chunks at work; they are done again")
+            workers.restart()
+        for chunk in died:
+            deaths[chunk] += 1
+            (alone if deaths[chunk] >= _MOST_DEATHS - 1 else again).append(chunk)
+            if deaths[chunk] == _MOST_DEATHS:
+                log(f"chunk {chunk} kills its process each time; its points are given up")
+        progress.estimate(time.perf_counter() - begin, workers.count)
+        tick(progress)
 
 
 def solve_here(
     total: int,
     size: int,
     solve: Callable[[int, int, Callable[[int], None]], None],
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None] | None = None,
     done: int = 0,
 ) -> None:
     """Solve chunks of at most `size` points in this process, in order.
@@ -294,27 +224,16 @@ def solve_here(
     solve : callable
         ``solve(start, stop, advance)`` solves and keeps the points from `start` to before `stop`,
         and calls ``advance`` with the number of points finished since its last call.
-    progress : callable
+    progress : callable, optional
         Called with the number of points done so far and of all points.
     """
-    first, count = done, -(-(total - done) // size)
-    progress(done, total)
 
     def advance(points: int) -> None:
         nonlocal done
         done += points
-        progress(done, total)
+        if progress is not None:
+            progress(done, total)
 
-    def task(chunks: tuple[int, ...], budget: float, give_up: bool = False, /) -> Report:
-        report = Report()
-        # The budget is ignored: chunks that are lines of one file must be written in order.
-        for chunk in chunks:
-            start = first + chunk * size
-            stop = min(start + size, total)
-            begin = time.perf_counter()
-            solve(start, stop, advance)
-            report.done.append(DoneChunk(chunk, stop - start, 0, time.perf_counter() - begin))
-        return report
-
-    counts = SweepProgress(total=total - first, chunk_total=count)
-    solve_chunks(task, range(count), ThisProcess(), counts, lambda now: None, lambda line: None)
+    advance(0)
+    for start in range(done, total, size):
+        solve(start, min(start + size, total), advance)

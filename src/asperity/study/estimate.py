@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.study.grid import SweepGrid, load_plan
-from asperity.study.plan import SweepPlan
+from asperity.study.grid import SweepGrid
+from asperity.study.plan import SweepPlan, load_plan
 from asperity.study.solve import SOLVES
 
 #: Chunks of the sample, and target time for the sample (s).

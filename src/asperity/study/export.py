@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
+from asperity.study.axes import TEXTS
 from asperity.study.outcome import words
 from asperity.study.store.store import SweepStore
 
+if TYPE_CHECKING:
+    import pandas
+
+#: Columns of texts.
+_TEXTS = (*TEXTS, "outcome")
 _FORMATS = (".nc", ".csv", ".parquet")
 
 
@@ -66,7 +72,7 @@ def _netcdf(store: SweepStore, file: Path) -> int:
             out.dimensions[axis.name] = axis.length
         for name, array in store.labels.items():
             dims = tuple(array.metadata.dimension_names or ())
-            if name == "law":
+            if name in TEXTS:
                 texts = np.asarray(array[...], dtype=object)
                 variable = out.create_variable(name, dims, dtype=_text_type())
                 variable[...] = texts
@@ -83,7 +89,7 @@ def _netcdf(store: SweepStore, file: Path) -> int:
             _attributes(variables[name], dict(array.attrs))
             # CF names auxiliary coordinates in each variable, not once for the file.
             variables[name].attrs["coordinates"] = store.attributes.get("coordinates", "")
-        for chunk, _ in store.done():
+        for chunk in store.done():
             slices = store.grid.slices(chunk)
             for name, values in store.read(chunk).items():
                 variables[name][slices] = values
@@ -106,41 +112,33 @@ def _attributes(variable: Any, attributes: dict[str, Any]) -> None:
         variable.attrs[name] = value
 
 
-def _rows(store: SweepStore, chunk: int) -> dict[str, np.ndarray]:
-    """Columns of a table: axes, outputs, outcome and detail."""
-    points = store.grid.at(chunk)
-    columns: dict[str, np.ndarray] = {}
-    for axis in store.grid.axes:
-        for name in axis.names:
-            columns[name] = points.laws if name == "law" else points.values[name]
-    for name, values in store.read(chunk).items():
-        columns[name] = values.ravel()
-    names = words()
-    columns["outcome"] = np.array([names[int(c)] for c in columns["outcome"]], dtype=object)
-    return columns
+def _frames(store: SweepStore) -> Iterator[pandas.DataFrame]:
+    """For each chunk that is done a table of axes, outputs, outcome and detail; first an empty one.
+
+    The empty table has the types of the columns.
+    """
+    import pandas
+
+    axes = [name for axis in store.grid.axes for name in axis.names]
+    kinds = {n: str if n in _TEXTS else float for n in (*axes, *store.arrays)}
+    yield pandas.DataFrame({name: pandas.Series(dtype=kind) for name, kind in kinds.items()})
+    meanings = words()
+    for chunk in store.done():
+        points = store.grid.at(chunk)
+        known: dict[str, Any] = {**points.values, "law": points.laws, "data": points.data}
+        columns: dict[str, Any] = {name: known[name] for name in axes}
+        columns |= {name: values.ravel() for name, values in store.read(chunk).items()}
+        columns["outcome"] = [meanings[int(code)] for code in columns["outcome"]]
+        yield pandas.DataFrame(columns)
 
 
 def _csv(store: SweepStore, file: Path) -> int:
     written = 0
     with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        for chunk, _ in store.done():
-            columns = _rows(store, chunk)
-            if not written:
-                writer.writerow(columns)
-            writer.writerows(zip(*(_cells(v) for v in columns.values()), strict=True))
-            written += store.grid.size(chunk)
-        if not written:
-            names = [n for axis in store.grid.axes for n in axis.names]
-            writer.writerow([*names, *store.arrays])
+        for i, frame in enumerate(_frames(store)):
+            frame.to_csv(stream, header=not i, index=False, lineterminator="\n")
+            written += len(frame)
     return written
-
-
-def _cells(values: np.ndarray) -> list[Any]:
-    """Cells of a column; empty for NaN."""
-    if values.dtype.kind != "f":
-        return list(values.tolist())
-    return ["" if np.isnan(v) else v for v in values.tolist()]
 
 
 def _parquet(store: SweepStore, file: Path) -> int:
@@ -152,19 +150,13 @@ def _parquet(store: SweepStore, file: Path) -> int:
             "out must be a format that is installed, got Parquet without pyarrow; install it with "
             "pip install 'asperity[parquet]', or export to .csv or .nc"
         ) from None
-    names = [n for axis in store.grid.axes for n in axis.names]
-    texts = {"law", "outcome"}
-    schema = pyarrow.schema(
-        [
-            (n, pyarrow.string() if n in texts else pyarrow.float64())
-            for n in (*names, *store.arrays)
-        ]
-    )
     written = 0
+    frames = _frames(store)
+    schema = pyarrow.schema(
+        (n, pyarrow.string() if n in _TEXTS else pyarrow.float64()) for n in next(frames).columns
+    )
     with parquet.ParquetWriter(file, schema) as writer:
-        for chunk, _ in store.done():
-            columns = _rows(store, chunk)
-            arrays = [pyarrow.array(columns[n], type=schema.field(n).type) for n in schema.names]
-            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
-            written += store.grid.size(chunk)
+        for frame in frames:
+            writer.write_table(pyarrow.Table.from_pandas(frame, schema, preserve_index=False))
+            written += len(frame)
     return written

@@ -1,85 +1,29 @@
-"""The grid of a sweep: which operating points a chunk has, by the number of the chunk.
-
-`load_plan` reads a plan from its file and checks that every quantity has a unit.
-"""
+"""The grid of a sweep: which operating points a chunk has, by the number of the chunk."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from asperity.laws import get_law
-from asperity.parameters import Parameter, all_parameters, canonical_name
+from asperity.parameters import Parameter, all_parameters
 from asperity.parameters.arguments import shown
-from asperity.questions.record import units_required, without_unit
-from asperity.study.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
-from asperity.study.plan import PlanError, SweepPlan
+from asperity.questions.sweep import PlanError, Sweep
+from asperity.study.axes import Column, SweepAxis
 from asperity.study.points import RATIOS, Points
-from asperity.study.record import known_names, laws_named, plan_record
+from asperity.study.record import plan_record
 from asperity.study.solve import SOLVES
-
-
-def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
-    """Read a plan from a TOML file, in which every quantity carries its unit.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not TOML.
-    PlanError
-        An `InputError` with all mistakes.
-    """
-    plan = SweepPlan.from_file(path, folder=Path(path).parent)
-    # `plan_record` reports mistakes in the laws; here they would be reported twice.
-    known = known_names(laws_named(plan, []), plan.solve)
-    with units_required():
-        mistakes = without_unit(
-            (place, known[name].kind, value)
-            for place, written, value in _numbers(plan)
-            if (name := canonical_name(written, known)) is not None
-        )
-    if mistakes:
-        raise PlanError(mistakes, str(path))
-    return plan
-
-
-def _numbers(plan: SweepPlan) -> Iterator[tuple[str, str, Any]]:
-    """Place, name and value of everything in a plan that may be a quantity."""
-    for name, value in plan.parameters.items():
-        yield f"parameters.{name}", name, value
-    for axis, table in plan.axes.items():
-        where = f"axes.{axis}"
-        for listed in (table.from_, table.to, *(table.values or ())):
-            yield where, axis, listed
-        for name, values in (table.zip or {}).items():
-            for value in values:
-                yield f"{where}.zip.{name}", name, value
-        for case in table.cases or ():
-            for name, value in case.items():
-                grid = isinstance(value, Mapping)
-                entries = [value.get("from"), value.get("to")] if grid else value
-                for entry in entries if isinstance(entries, list | tuple) else [entries]:
-                    yield f"{where}.cases.{name}", name, entry
-        for name, spread in (table.over or {}).items():
-            for value in spread.values():
-                yield f"{where}.over.{name}", name, value
-
 
 Slices = tuple[slice, ...]
 
-#: Up to this length an axis of laws is not divided: a chunk has points of all laws.
+#: Up to this length an axis of laws is not divided: each worker then compiles every law once, and
+#: chunks take equal times. A longer one would leave a chunk too few points of each law.
 _LAWS_APART = 64
 
 #: Largest number of points, a 64-bit integer.
@@ -105,12 +49,12 @@ class SweepGrid:
 
     def __init__(self, record: Mapping[str, Any], chunks: Sequence[int] | None = None) -> None:
         self.record = dict(record)
-        self.axes = tuple(_axis(name, axis) for name, axis in record["axes"].items())
+        self.axes = tuple(SweepAxis(name, axis) for name, axis in record["axes"].items())
         self.shape = tuple(axis.length for axis in self.axes)
         self.chunks = tuple(chunks) if chunks is not None else self._chunks()
 
     @classmethod
-    def of(cls, plan: SweepPlan) -> SweepGrid:
+    def of(cls, plan: Sweep) -> SweepGrid:
         """The grid of a plan.
 
         Raises
@@ -224,16 +168,3 @@ class SweepGrid:
             wanted = wanted // length
             lengths.append(length)
         return tuple(reversed(lengths))
-
-
-def _axis(name: str, record: Mapping[str, Any]) -> SweepAxis:
-    if "columns" in record:
-        return ListedAxis(name, {n: _values(n, v) for n, v in record["columns"].items()})
-    spreads = {n: Spread(**spread) for n, spread in record["over"].items()}
-    return DrawnAxis(name, record["draw"], record["seed"], record["count"], spreads)
-
-
-def _values(name: str, values: Sequence[Any]) -> Column:
-    if name in TEXTS:
-        return np.array(values, dtype=object)
-    return np.array([math.nan if value is None else value for value in values], dtype=float)

@@ -1,4 +1,4 @@
-"""The job of a worker: solve chunks of a sweep and write them to the store.
+"""The job of a worker: solve a chunk of a sweep and write it to the store.
 
 JAX must not be loaded before this module sets its number of threads to one: sums over several
 threads differ in their last bits from sums in one thread.
@@ -12,16 +12,19 @@ import platform
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.outputs import differences
-from asperity.study.engine import DoneChunk, Report
+from asperity.study.engine import DoneChunk
 from asperity.study.workers import ENVIRONMENT
 
 if TYPE_CHECKING:
@@ -45,7 +48,7 @@ class WorkerError(InputError):
 
 @dataclass(frozen=True)
 class Job:
-    """The `Task` of a sweep: called with numbers of chunks, it solves and writes these chunks.
+    """The `Task` of a sweep: called with the number of a chunk, it solves and writes the chunk.
 
     Attributes
     ----------
@@ -71,10 +74,10 @@ class Job:
     retry: bool = False
     laws: tuple[str, ...] = ()
     folder: str = ""
-    numerics: Mapping[str, str] | None = None
+    numerics: Mapping[str, str] | None = field(default=None, hash=False)
 
-    def __call__(self, chunks: tuple[int, ...], budget: float, give_up: bool = False) -> Report:
-        """Solve and write at least one chunk, and further chunks until `budget` seconds are over.
+    def __call__(self, chunk: int, give_up: bool = False) -> DoneChunk:
+        """Solve and write a chunk, unless the store has it and its files are undamaged.
 
         Raises
         ------
@@ -85,119 +88,61 @@ class Job:
         WorkerError
             If this process has several threads, other versions than the driver, or lacks a law.
         """
-        _require_one_thread()
-        self._require_same_numerics()
+        store = _opened(self)
         from asperity._jax import spare_mappings
+        from asperity.study.outcome import Answers, SweepOutcome
+        from asperity.study.store.lock import current_token
 
-        self._require_laws()
-        report = Report()
-        begin = time.perf_counter()
-        for i, chunk in enumerate(chunks):
-            if i and time.perf_counter() - begin > budget:
-                report.left = chunks[i:]
-                break
-            self._complete(chunk, give_up, report)
-            spare_mappings()
-        report.memory = _largest_memory()
-        return report
-
-    @property
-    def _store(self) -> SweepStore:
-        return _opened(self.store, self.digest, self.token)
-
-    def _require_same_numerics(self) -> None:
-        here = numerics()
-        if self.numerics is not None and self.numerics != here:
-            raise WorkerError(
-                "workers must have the versions of the driver, got "
-                f"{differences(self.numerics, here)} ({platform.node()}); start them from the same "
-                "environment"
-            )
-
-    def _require_laws(self) -> None:
-        """Register the laws of the plan that are not part of the package."""
-        from asperity.laws import get_law, known_law
-
-        for place in self.laws:
-            known_law(place)
-        for name in self._store.record["laws"]:
-            try:
-                get_law(name)
-            except InputError:
-                raise WorkerError(
-                    f"law must be known to the workers, got '{name}', which only the program that "
-                    "started them has registered; name its file, like law = 'my_law.py:MyLaw'"
-                ) from None
-
-    def _complete(self, chunk: int, give_up: bool, report: Report) -> None:
-        """Solve and write a chunk, unless the store has it and its files are undamaged."""
-        store = self._store
+        messages: list[str] = []
         size, failed = store.grid.size(chunk), store.failed_in(chunk)
         if failed >= 0 and not (self.retry and failed):
             if store.is_sound(chunk):
-                report.done.append(DoneChunk(chunk, size, failed, None))
-                return
-            report.messages.append(f"chunk {chunk} was damaged and is solved again")
+                return DoneChunk(size, failed, None)
+            messages.append(f"chunk {chunk} was damaged and is solved again")
         begin = compiler_free_clock()
-        points = store.grid.at(chunk)
-        answers = self._worker_lost(points) if give_up else self._solved(points, report)
-        self._write(chunk, answers)
-        seconds = compiler_free_clock() - begin
-        report.done.append(DoneChunk(chunk, size, answers.failed, seconds))
-
-    def _worker_lost(self, points: Points) -> Answers:
-        """Outcomes of points whose process died at every attempt."""
-        from asperity.study.outcome import Answers, SweepOutcome
-
-        answers = Answers.empty(self._store.record["outputs"], len(points))
-        answers.fail(slice(None), SweepOutcome.WORKER_LOST)
-        return answers
-
-    def _solved(self, points: Points, report: Report) -> Answers:
-        """Solve points; after an error of the solver, find the failing points by bisection."""
-        from asperity.study.outcome import Answers, SweepOutcome
-        from asperity.study.solve import SOLVES
-
-        record = self._store.record
-        try:
-            # The folder is not part of the record, because store and data may be moved.
-            return SOLVES[record["solve"]].solve(points, {**record, "folder": self.folder})
-        except (MemoryError, OSError):
-            raise
-        except Exception as error:
-            answers = Answers.empty(record["outputs"], len(points))
-            if len(points) == 1:
-                refused = isinstance(error, InputError)
-                answers.fail(0, SweepOutcome.REFUSED if refused else SweepOutcome.SOLVER_ERROR)
-                values = ", ".join(f"{n} = {v[0]:.9g}" for n, v in points.values.items())
-                report.messages.append(f"{type(error).__name__}: {error} ({values})")
-                return answers
-            half = len(points) // 2
-            for part in (slice(None, half), slice(half, None)):
-                answers.put(part, self._solved(points.take(part), report))
-            return answers
-
-    def _write(self, chunk: int, answers: Answers) -> None:
-        from asperity.study.store.lock import current_token
-
-        store = self._store
+        answers = Answers.empty(store.record["outputs"], size)
+        if give_up:
+            answers.fail(slice(None), SweepOutcome.WORKER_LOST)
+        else:
+            self._solve(store.grid.at(chunk), answers, np.arange(size), messages)
         if self.token and current_token(store.path) != self.token:
             raise SupersededError(f"{store.path} belongs to another driver now")
         store.write(chunk, answers)
+        seconds = compiler_free_clock() - begin
+        spare_mappings()
+        return DoneChunk(size, answers.failed, seconds, tuple(messages), _largest_memory())
+
+    def _solve(
+        self, points: Points, answers: Answers, rows: NDArray[np.intp], messages: list[str]
+    ) -> None:
+        """Solve the points `rows`; after an error find the failing points by bisection."""
+        from asperity.study.outcome import SweepOutcome
+        from asperity.study.solve import SOLVES
+
+        record = _opened(self).record
+        try:
+            # The folder is not part of the record, because store and data may be moved.
+            solved = SOLVES[record["solve"]].solve(
+                points.take(rows), {**record, "folder": self.folder}
+            )
+        except (MemoryError, OSError):
+            raise
+        except Exception as error:
+            if len(rows) > 1:
+                for half in np.array_split(rows, 2):
+                    self._solve(points, answers, half, messages)
+                return
+            refused = isinstance(error, InputError)
+            answers.fail(rows, SweepOutcome.REFUSED if refused else SweepOutcome.SOLVER_ERROR)
+            values = ", ".join(f"{n} = {v[rows[0]]:.9g}" for n, v in points.values.items())
+            messages.append(f"{type(error).__name__}: {error} ({values})")
+        else:
+            answers.put(rows, solved)
 
 
 @lru_cache(maxsize=1)
-def _opened(path: str, digest: str, token: str) -> SweepStore:
-    """The open store; opened again for each `token`, as the next driver may have repaired it."""
-    from asperity.study.store.store import SweepStore
-
-    store = SweepStore(Path(path))
-    if store.grid.digest != digest:
-        raise SupersededError(f"{store.path} has another plan now")
-    return store
-
-
-def _require_one_thread() -> None:
+def _opened(job: Job) -> SweepStore:
+    """The store of a job, after checks of this process; opened again for the next driver's job."""
     if "jax" not in sys.modules:
         os.environ.update(ENVIRONMENT)
     elif os.environ.get("NPROC") != "1":
@@ -205,6 +150,30 @@ def _require_one_thread() -> None:
             "workers must have one thread of JAX, got a process that loaded it with more; start "
             "the workers with the environment variable NPROC=1"
         )
+    here = numerics()
+    if job.numerics is not None and job.numerics != here:
+        raise WorkerError(
+            "workers must have the versions of the driver, got "
+            f"{differences(job.numerics, here)} ({platform.node()}); start them from the same "
+            "environment"
+        )
+    from asperity.laws import get_law, known_law
+    from asperity.study.store.store import SweepStore
+
+    for place in job.laws:
+        known_law(place)
+    store = SweepStore(Path(job.store))
+    if store.grid.digest != job.digest:
+        raise SupersededError(f"{store.path} has another plan now")
+    for name in store.record["laws"]:
+        try:
+            get_law(name)
+        except InputError:
+            raise WorkerError(
+                f"law must be known to the workers, got '{name}', which only the program that "
+                "started them has registered; name its file, like law = 'my_law.py:MyLaw'"
+            ) from None
+    return store
 
 
 def compiler_free_clock() -> float:

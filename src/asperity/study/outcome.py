@@ -155,6 +155,12 @@ class Answers:
         numbers = {name: values[index] for name, values in self.numbers.items()}
         return Answers(numbers, self.outcome[index], self.detail[index])
 
+    def with_others(self, others: Answers) -> Answers:
+        """These answers, followed by others of the same outputs."""
+        numbers = {n: np.concatenate([v, others[n]]) for n, v in self.numbers.items()}
+        outcome = np.concatenate([self.outcome, others.outcome])
+        return Answers(numbers, outcome, np.concatenate([self.detail, others.detail]))
+
     def put(self, index: Any, others: Answers) -> None:
         """Replace the answers at `index` by `others`."""
         for name, values in others.numbers.items():

@@ -1,173 +1,20 @@
-"""The plan of a sweep as it stands in a file; pydantic checks the type of each field."""
+"""A plan checked for what only the laws can say: in a file every quantity carries its unit."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-from pydantic import Field, PositiveInt, model_validator
+from pydantic import model_validator
 
-from asperity.errors import InputError, MistakesError
-from asperity.questions.fit import Estimation
-from asperity.questions.record import Given, Names, Question, Record
-
-
-class PlanError(MistakesError):
-    """A plan that cannot be run."""
-
-    subject = "plan"
+from asperity.parameters import canonical_name
+from asperity.questions.record import without_unit
+from asperity.questions.sweep import PlanError, Sweep
+from asperity.study.record import known_names, laws_named
 
 
-class AxisTable(Record):
-    """An axis as a plan writes it, in exactly one of five forms.
-
-    Attributes
-    ----------
-    from_, to, count, spacing
-        A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
-    values : tuple
-        All values.
-    zip : mapping of str to tuple
-        Several numbers that vary together, all of one length.
-    cases : tuple of mapping
-        Rows; a case with lists gives a row for every combination of their values.
-    draw : {"random", "sobol", "halton"}
-        ``count`` draws of the numbers in ``over``.
-    over : mapping of str to mapping
-        For each drawn number ``from``, ``to`` and ``spacing``, or ``mean`` and ``std``.
-    """
-
-    from_: Given | None = Field(default=None, alias="from")
-    to: Given | None = None
-    count: PositiveInt | None = None
-    spacing: Literal["linear", "log"] | None = None
-    values: tuple[Given, ...] | None = None
-    zip: Mapping[str, tuple[Given, ...]] | None = None
-    cases: tuple[Mapping[str, Any], ...] | None = None
-    draw: Literal["random", "sobol", "halton"] | None = None
-    over: Mapping[str, Mapping[str, Any]] | None = None
-
-    @model_validator(mode="after")
-    def _one_form(self) -> AxisTable:
-        allowed = {
-            "from": {"from_", "to", "count", "spacing"},
-            "values": {"values"},
-            "zip": {"zip"},
-            "cases": {"cases"},
-            "draw": {"draw", "over", "count"},
-        }
-        fields = {name for name in type(self).model_fields if getattr(self, name) is not None}
-        forms = [form for form in allowed if form.replace("from", "from_") in fields]
-        if len(forms) != 1 or fields - allowed[forms[0]]:
-            shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
-            raise InputError(
-                f"axis must have one of from-to-count, values, zip, cases or draw, got {shown}; "
-                "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
-            )
-        needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
-        missing = [name for name in needed if getattr(self, name) is None]
-        if missing:
-            raise InputError(
-                f"axis must have {' and '.join(needed)} together with {forms[0]}, got no "
-                f"{' and no '.join(missing)}; add it"
-            )
-        return self
-
-
-class ThresholdTable(Record):
-    """Settings of the search for stiffness thresholds.
-
-    Attributes
-    ----------
-    between : pair of float
-        Limits of the search, in units of K_c = (B - A) W0/D0 of the same point.
-    scan : int
-        Number of stiffnesses solved before the search, at equal ratios.
-    """
-
-    between: tuple[float, float] = (0.3, 4.0)
-    scan: PositiveInt = 24
-
-
-class NumberTable(Record):
-    """A number computed from a transient.
-
-    Attributes
-    ----------
-    of : str
-        A channel: ``friction``, ``force``, ``load``, ``velocity``, ``slip_velocity``,
-        ``displacement``.
-    take : str
-        ``mean``, ``min``, ``max``, ``range``, ``std``, ``first`` or ``last``.
-    from_, to : float or str, optional
-        First and last time (s) of the samples, written ``from`` and ``to``; all by default.
-    """
-
-    of: str
-    take: str
-    from_: float | str | None = Field(default=None, alias="from")
-    to: float | str | None = None
-
-
-class TransientTable(Record):
-    """A transient, and the numbers that are computed from it.
-
-    Attributes
-    ----------
-    steps : tuple of str
-        Lines of a protocol; ``{epsilon}`` stands for the value at the point.
-    numbers : mapping of str to NumberTable
-    sampling : float or str
-        Samples per second (Hz).
-    rtol : float
-    most_steps : float
-    """
-
-    steps: tuple[str, ...]
-    numbers: Mapping[str, NumberTable]
-    sampling: float | str
-    rtol: float = 1e-9
-    most_steps: float = 2e6
-
-
-class FitTable(Estimation):
-    """Settings of a fit at every point.
-
-    Attributes
-    ----------
-    data : tuple of str
-        Tables of readings, all in one likelihood; left out where an axis has a column ``data``.
-    """
-
-    data: Names | None = None
-
-
-class SweepPlan(Question):
-    """What a sweep computes.
-
-    Attributes
-    ----------
-    axes : mapping of str to AxisTable
-        In the order of the dimensions. The grid is the product of the axes.
-    law : str
-        Friction law; left out where an axis has a column ``law``.
-    material : str
-        Material whose numbers apply where neither an axis nor `parameters` has one.
-    parameters : mapping of str to float, str or bool
-        Numbers and ratios that are the same at every point, by name.
-    solve : {"periodic", "threshold", "transient", "fit"}
-    outputs : tuple of str
-        Outputs to keep of each point; the default outputs of `solve` if left out.
-    seed : int
-        Seed of drawn axes.
-    chunk : int, optional
-        Approximate number of points that are solved and written together.
-    threshold, transient, fit
-        Settings of these kinds of solve.
-    title : str
-    folder : Path
-        Folder of the files that the plan names.
+class SweepPlan(Sweep):
+    """A sweep that can be run: the fields of `asperity.questions.sweep.Sweep`.
 
     Raises
     ------
@@ -175,41 +22,44 @@ class SweepPlan(Question):
         An `InputError` with all mistakes.
     """
 
-    subject = "plan"
-    mistakes_error = PlanError
+    @model_validator(mode="after")
+    def _with_units(self) -> SweepPlan:
+        if mistakes := without_unit(_quantities(self)):
+            raise PlanError(mistakes)
+        return self
 
-    axes: Mapping[str, AxisTable]
-    law: str = ""
-    material: str = ""
-    parameters: Mapping[str, Given] = {}
-    solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
-    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    seed: int = Field(default=0, ge=0)
-    chunk: PositiveInt | None = None
-    threshold: ThresholdTable = ThresholdTable()
-    transient: TransientTable | None = None
-    fit: FitTable | None = None
-    title: str = ""
-    folder: Path = Path()
 
-    @property
-    def columns(self) -> dict[str, tuple[Any, ...]]:
-        """Columns of the axes as the plan writes them; drawn columns have no values."""
-        columns: dict[str, tuple[Any, ...]] = {}
-        for name, table in self.axes.items():
-            if table.values is not None or table.from_ is not None:
-                columns[name] = (*columns.get(name, ()), *(table.values or ()))
-            for column, values in (table.zip or {}).items():
-                columns[column] = (*columns.get(column, ()), *values)
-            for case in table.cases or ():
-                for column, value in case.items():
-                    values = tuple(value) if isinstance(value, list | tuple) else (value,)
-                    columns[column] = (*columns.get(column, ()), *values)
-            for column in table.over or {}:
-                columns.setdefault(column, ())
-        return columns
+#: Reads a plan from a TOML file; raises `InputError`, with all mistakes a `PlanError`.
+load_plan = SweepPlan.from_file
 
-    @property
-    def laws(self) -> list[str]:
-        """Laws as the plan writes them, in their order."""
-        return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]
+
+def _quantities(plan: Sweep) -> Iterator[tuple[str, str, Any]]:
+    """Place, kind and value of every quantity in a plan."""
+    # `plan_record` reports mistakes in the laws; here they would be reported twice.
+    known = known_names(laws_named(plan, []), plan.solve)
+    for place, written, value in _numbers(plan):
+        name = canonical_name(written, known)
+        if name is not None:
+            yield place, known[name].kind, value
+
+
+def _numbers(plan: Sweep) -> Iterator[tuple[str, str, Any]]:
+    """Place, name and value of everything in a plan that may be a quantity."""
+    for name, value in plan.parameters.items():
+        yield f"parameters.{name}", name, value
+    for axis, table in plan.axes.items():
+        where = f"axes.{axis}"
+        for listed in (table.from_, table.to, *(table.values or ())):
+            yield where, axis, listed
+        for name, values in (table.zip or {}).items():
+            for value in values:
+                yield f"{where}.zip.{name}", name, value
+        for case in table.cases or ():
+            for name, value in case.items():
+                grid = isinstance(value, Mapping)
+                entries = [value.get("from"), value.get("to")] if grid else value
+                for entry in entries if isinstance(entries, list | tuple) else [entries]:
+                    yield f"{where}.cases.{name}", name, entry
+        for name, spread in (table.over or {}).items():
+            for value in spread.values():
+                yield f"{where}.over.{name}", name, value

@@ -9,16 +9,16 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from asperity import materials
 from asperity.errors import InputError
 from asperity.laws import get_law, known_law
-from asperity.operating_point import known_parameters, sourced_numbers
+from asperity.operating_point import known_parameters, material_of, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters
+from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
-from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS
 from asperity.study.solve import SOLVES
 
@@ -30,7 +30,7 @@ ATTRIBUTES = "attributes"
 _RESERVED = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
 
 
-def plan_record(plan: SweepPlan) -> dict[str, Any]:
+def plan_record(plan: Sweep) -> dict[str, Any]:
     """The record of a plan.
 
     Raises
@@ -58,25 +58,20 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
     numbers: dict[str, float] = {}
     origins: dict[str, str] = {}
-    try:
-        numbers, origins = _numbers(plan, axes, laws, known)
-    except InputError as error:
-        mistakes.append(str(error))
-    solve = SOLVES[plan.solve]
     settings: dict[str, Any] = {}
     outputs: tuple[str, ...] = ()
     supplied: tuple[str, ...] = ()
-    try:
+    with _noted(mistakes):
+        numbers, origins = _numbers(plan, axes, laws, known)
+    with _noted(mistakes):
+        solve = SOLVES[plan.solve]
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
         outputs = solve.chosen_outputs(named)
         supplied = solve.supplied(named)
-    except InputError as error:
-        mistakes.append(str(error))
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
-        mistakes += _repeated_columns(axes)
-        mistakes += _misnamed(axes, {*known, *outputs, *_RESERVED})
+        mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
         raise PlanError(mistakes)
     return {
@@ -92,19 +87,28 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     }
 
 
+@contextmanager
+def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
+    """Add an `InputError` to the mistakes of a plan, which are reported together."""
+    try:
+        yield
+    except InputError as error:
+        mistakes.append(str(error))
+
+
 def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
     """All names that an axis or a fixed number may have."""
     parameters = {**known_parameters(laws[0] if laws else None), **SOLVES[solve].parameters()}
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
 
 
-def law_places(plan: SweepPlan) -> tuple[str, ...]:
+def law_places(plan: Sweep) -> tuple[str, ...]:
     """Laws that the plan names by module or file; a file by its absolute path."""
     named = dict.fromkeys(law_place(law, plan.folder) for law in plan.laws)
     return tuple(text for text in named if ":" in text)
 
 
-def _law_files(plan: SweepPlan) -> dict[str, str]:
+def _law_files(plan: Sweep) -> dict[str, str]:
     """SHA-256 of the file of each law that the plan names by module or file, by law name."""
     digests = {}
     for place in law_places(plan):
@@ -114,14 +118,12 @@ def _law_files(plan: SweepPlan) -> dict[str, str]:
     return digests
 
 
-def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
+def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):
-        try:
+        with _noted(mistakes):
             names.append(law_name(law, plan.folder))
-        except InputError as error:
-            mistakes.append(str(error))
     if not plan.laws:
         mistakes.append(
             "law must be given, got nothing; add law = 'elasto-plastic' or an axis of laws"
@@ -130,13 +132,13 @@ def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
 
 
 def _numbers(
-    plan: SweepPlan,
+    plan: Sweep,
     axes: Mapping[str, Any],
     laws: Sequence[str],
     known: Mapping[str, Parameter],
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Numbers that are the same at every point, in SI, and the origin of each."""
-    material = materials.load_from(plan.folder, plan.material) if plan.material else None
+    material = material_of(plan)
     ratios = {
         ratio: checked_value(RATIOS[ratio].parameter, value)
         for name, value in plan.parameters.items()
@@ -218,34 +220,29 @@ def _present(axis: Mapping[str, Any], law: str) -> set[str]:
     return present
 
 
-def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
-    """Mistakes of axes of several columns whose name is invalid or belongs to a variable."""
-    for name, axis in axes.items():
-        if columns_of(axis) == (name,):
-            continue
-        if not name.isidentifier():
-            yield (
-                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
-                "rename it"
-            )
-        elif name in taken:
-            yield (
-                f"axes.{name} must have a name of its own, got '{name}', the name of a variable of "
-                "the store; rename it, like 'sample'"
-            )
-
-
-def _repeated_columns(axes: Mapping[str, Any]) -> Iterator[str]:
-    """Mistakes of columns that two axes have."""
+def _mistakes_of_names(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
+    """Mistakes of columns that two axes have, and of axes whose name is invalid or taken."""
     owners: dict[str, str] = {}
     for name, axis in axes.items():
-        for column in columns_of(axis):
+        columns = columns_of(axis)
+        for column in columns:
             if column in owners:
                 yield (
                     f"axes.{name} must have columns of its own, got '{column}', which "
                     f"axes.{owners[column]} has too; leave one out"
                 )
             owners[column] = name
+        # An axis with the name of its only column labels the dimension.
+        if columns != (name,) and not name.isidentifier():
+            yield (
+                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
+                "rename it"
+            )
+        elif columns != (name,) and name in taken:
+            yield (
+                f"axes.{name} must have a name of its own, got '{name}', the name of a variable of "
+                "the store; rename it, like 'sample'"
+            )
 
 
 def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.laws import Law, get_law
+from asperity.laws import Law
 from asperity.operating_point import lowest_loads, motions, respond, without_mass
 from asperity.orbit import PeriodicResponse
 from asperity.orbit.floquet import kind_of_crossing
@@ -15,25 +15,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.parameters import RULES, point_parameters
 from asperity.parameters.arguments import increments
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import Float, Index, Points
-
-
-def periodic_answers(
-    points: Points, outputs: Sequence[str], progress: Callable[[int], None] | None = None
-) -> Answers:
-    """Periodic responses at points with any registered laws.
-
-    Parameters
-    ----------
-    points : Points
-    outputs, progress
-        As for `answers_of_law`.
-    """
-    answers = Answers.empty(outputs, len(points))
-    for law, rows in points.by_law():
-        values = points.take(rows).of_law(law)
-        answers.put(rows, answers_of_law(get_law(law), values, outputs, progress))
-    return answers
+from asperity.study.points import Float, Index
 
 
 def answers_of_law(
@@ -56,11 +38,10 @@ def answers_of_law(
     progress : callable, optional
         Called with the number of points finished since the last call.
     """
-    rows = np.arange(len(values["V"]))
-    answers = Answers.empty(outputs, len(rows))
-    sound = solvable(law, values, rows, answers)
-    if progress is not None and len(sound) < len(rows):
-        progress(len(rows) - len(sound))
+    answers = Answers.empty(outputs, len(values["V"]))
+    sound = solvable(law, values, answers)
+    if progress is not None and len(sound) < len(answers):
+        progress(len(answers) - len(sound))
     for group in motions({n: v[sound] for n, v in values.items()}) if len(sound) else []:
         index = sound[group]
         of_group = {n: v[index] for n, v in values.items()}
@@ -69,7 +50,7 @@ def answers_of_law(
     return answers
 
 
-def solvable(law: type[Law], values: Mapping[str, Float], rows: Index, answers: Answers) -> Index:
+def solvable(law: type[Law], values: Mapping[str, Float], answers: Answers) -> Index:
     """Indices of the points that can be solved; `answers` gets the outcome of the others."""
     wrong = without_mass(values)
     for name, parameter in point_parameters(law).items():
@@ -79,11 +60,11 @@ def solvable(law: type[Law], values: Mapping[str, Float], rows: Index, answers: 
             wrong = wrong | ~(np.isfinite(values[name]) & holds)
     if not law.rate_dependent:
         wrong = wrong | (values["inertia"] > 0) | (values["eta"] > 0)
-    answers.fail(rows[wrong], Outcome.INVALID)
+    answers.fail(wrong, Outcome.INVALID)
     sound = np.flatnonzero(~wrong)
     lowest = lowest_loads({n: v[sound] for n, v in values.items()})
     lost = ~(lowest > 0)
-    answers.fail(rows[sound[lost]], SweepOutcome.CONTACT_LOST, lowest[lost])
+    answers.fail(sound[lost], SweepOutcome.CONTACT_LOST, lowest[lost])
     return sound[~lost]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 from collections import Counter
@@ -15,8 +14,7 @@ import numpy as np
 
 from asperity.parameters.arguments import file_path
 from asperity.study.outcome import SweepOutcome, words
-from asperity.study.store.layout import NOT_DONE
-from asperity.study.store.lock import holder_of, is_held, lock_file
+from asperity.study.store.lock import running_driver
 from asperity.study.store.store import SweepStore
 
 if TYPE_CHECKING:
@@ -92,21 +90,17 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
     opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     outcomes: Counter[int] = Counter()
     chunks = done = failed = damaged = 0
-    for chunk in range(opened.grid.chunk_count):
-        count = opened.failed_in(chunk)
-        if count == NOT_DONE:
-            continue
-        if opened.is_damaged(chunk):
+    for chunk, count, sound in opened.states():
+        if not sound:
             damaged += 1
             continue
         chunks, done, failed = chunks + 1, done + opened.grid.size(chunk), failed + count
         codes, counts = np.unique(opened.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    lock = lock_file(opened.path)
-    holder = holder_of(lock)
+    holder = running_driver(opened.path)
     running = ""
-    if holder and is_held(lock):
+    if holder:
         running = f"process {holder['process']} on {holder['host']} since {holder['since']}"
     return SweepStatus(
         store=opened.path,
@@ -134,40 +128,6 @@ def _bytes_in(path: Path) -> int:
     return total
 
 
-@dataclass
-class _Moments:
-    """Running count, mean and sum of squared deviations (Chan, Golub and LeVeque, 1979)."""
-
-    count: int = 0
-    mean: float = 0.0
-    square: float = 0.0
-    low: float = math.inf
-    high: float = -math.inf
-
-    def add(self, values: np.ndarray) -> None:
-        """Add the finite values of an array."""
-        values = values[np.isfinite(values)]
-        if not values.size:
-            return
-        count, mean = values.size, float(values.mean())
-        square = float(((values - mean) ** 2).sum())
-        total, shift = self.count + count, mean - self.mean
-        self.square += square + shift**2 * self.count * count / total
-        self.mean += shift * count / total
-        self.count = total
-        self.low = min(self.low, float(values.min()))
-        self.high = max(self.high, float(values.max()))
-
-    def record(self) -> dict[str, float]:
-        """The statistics by name; NaN without a value."""
-        if not self.count:
-            return {"count": 0, **dict.fromkeys(("mean", "std", "min", "max"), math.nan)}
-        std = math.sqrt(self.square / self.count)
-        return {
-            "count": self.count, "mean": self.mean, "std": std, "min": self.low, "max": self.high,
-        }  # fmt: skip
-
-
 def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
     """Count, mean, standard deviation, smallest and largest value of every output.
 
@@ -181,15 +141,23 @@ def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, flo
     """
     opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     names = tuple(opened.record["outputs"])
-    moments = {name: _Moments() for name in names}
-    for chunk, _ in opened.done():
+    parts: dict[str, list[tuple[float, ...]]] = {name: [] for name in names}
+    for chunk in opened.done():
         values = opened.read(chunk, (*names, "outcome"))
         solved = values["outcome"] == SweepOutcome.CONVERGED
         for name in names:
-            moments[name].add(values[name][solved])
-    return {name: m.record() for name, m in moments.items()}
+            x = values[name][solved & np.isfinite(values[name])]
+            if x.size:
+                parts[name].append((x.size, x.mean(), x.var(), x.min(), x.max()))
+    return {name: _whole(part) for name, part in parts.items()}
 
 
-def status_record(status: SweepStatus) -> dict[str, Any]:
-    """The status as JSON values."""
-    return json.loads(json.dumps({**vars(status), "store": str(status.store)}))
+def _whole(parts: list[tuple[float, ...]]) -> dict[str, float]:
+    """Statistics of all values from those of the chunks; NaN without a value."""
+    if not parts:
+        return {"count": 0, **dict.fromkeys(("mean", "std", "min", "max"), math.nan)}
+    count, mean, variance, low, high = np.array(parts).T
+    total = float(np.average(mean, weights=count))
+    square = np.average(variance + (mean - total) ** 2, weights=count)
+    return {"count": int(count.sum()), "mean": total, "std": math.sqrt(square),
+            "min": float(low.min()), "max": float(high.max())}  # fmt: skip

@@ -9,7 +9,7 @@ import platform
 import shutil
 import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +24,9 @@ from asperity.outputs import differences, free_disk, require_disk, require_short
 from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
-from asperity.study.grid import SweepGrid, load_plan
+from asperity.study.grid import SweepGrid
 from asperity.study.job import Job, numerics, package_version
-from asperity.study.plan import SweepPlan
+from asperity.study.plan import SweepPlan, load_plan
 from asperity.study.record import is_extension, law_places
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out
 from asperity.study.store.lock import StoreLock, lock_file
@@ -34,10 +34,12 @@ from asperity.study.store.root import read_root
 from asperity.study.store.store import SweepStore
 from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
 
-#: Seconds between updates of the lock file, which show that the driver runs.
+#: Seconds between updates of the lock file, which show that the driver runs: a twelfth of the time
+#: after which the lock counts as left behind.
 _REFRESH = 5.0
-#: Packages whose versions the store records.
-_PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
+_TIME = "%Y-%m-%dT%H:%M:%S%z"
+#: Packages whose versions a run records, besides those of `numerics`.
+_PACKAGES = ("zarr", "loky", "distributed")
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ def run_sweep(
     """
     path = Path(out).resolve()
     require_short(path, (fresh_folder(path), lock_file(path)))
-    log = log or _silent
+    log = log or (lambda line: None)
     text = ""
     if not isinstance(plan, SweepPlan):
         file, plan = plan, load_plan(plan)
@@ -150,11 +152,11 @@ def run_sweep(
 def _workers(
     workers: int | Workers | None, cluster: int | None, address: str | None
 ) -> AbstractContextManager[Workers]:
-    choices = [n for n, v in (("workers", workers), ("cluster", cluster), ("scheduler", address))
-             if v is not None]  # fmt: skip
-    if len(choices) > 1:
+    choices = {"workers": workers, "cluster": cluster, "scheduler": address}
+    chosen = [name for name, value in choices.items() if value is not None]
+    if len(chosen) > 1:
         raise InputError(
-            f"{choices[0]} must be the only choice of where to run, got {' and '.join(choices)}; "
+            f"{chosen[0]} must be the only choice of where to run, got {' and '.join(chosen)}; "
             "leave all but one out"
         )
     if cluster is not None:
@@ -163,12 +165,7 @@ def _workers(
         return scheduler(address)
     if isinstance(workers, Workers):
         return nullcontext(workers)
-    count = available_cores() if workers is None else workers
-    return local_processes(count)
-
-
-def _silent(line: str) -> None:
-    """No log."""
+    return local_processes(available_cores() if workers is None else workers)
 
 
 def _opened(
@@ -184,11 +181,6 @@ def _opened(
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         if path.exists():
             path.rmdir()
-        if not path.parent.is_dir():
-            raise InputError(
-                f"out must lie in a folder that exists, got '{path}'; make the folder or choose "
-                "another"
-            )
         create(path, grid, _attributes(plan, text, grid))
         return SweepStore(path)
     root = read_root(path)
@@ -287,13 +279,22 @@ def _run(
         ) from None
     finally:
         with contextlib.suppress(OSError):
-            runs[-1] |= _ended(counts)
+            runs[-1] |= {
+                "ended": time.strftime(_TIME),
+                "seconds": round(counts.seconds, 3),
+                "points_solved": counts.solved,
+                "points_kept": counts.kept,
+                "failed": counts.failed,
+                "worker_seconds": round(counts.spent, 3),
+                "worker_memory": round(counts.memory),
+                "workers_lost": counts.lost,
+            }
             store.update_attributes(runs=runs)
     return SweepSummary(
         out=store.path,
         points=counts.points,
         failed=counts.failed,
-        solved=counts.points - counts.kept,
+        solved=counts.solved,
         seconds=counts.seconds,
         memory=counts.memory,
         lost=counts.lost,
@@ -306,7 +307,7 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        room = size_text(free_disk(path))
+        room = size_text(free_disk(path.parent))
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         why = "the disk is full" if full else (error.strerror or str(error)).lower()
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
@@ -318,25 +319,12 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
 
 def _started(workers: Workers) -> dict[str, Any]:
     return {
-        "started": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "started": time.strftime(_TIME),
         "ended": None,
         "host": socket.gethostname(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "workers": workers.about,
-        "asperity": __version__,
+        **numerics(),
         "python": platform.python_version(),
         **{name: number for name in _PACKAGES if (number := package_version(name))},
-    }
-
-
-def _ended(counts: SweepProgress) -> Mapping[str, Any]:
-    return {
-        "ended": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        "seconds": round(counts.seconds, 3),
-        "points_solved": counts.points - counts.kept,
-        "points_kept": counts.kept,
-        "failed": counts.failed,
-        "worker_seconds": round(counts.spent, 3),
-        "worker_memory": round(counts.memory),
-        "workers_lost": counts.lost,
     }

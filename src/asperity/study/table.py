@@ -14,24 +14,26 @@ import difflib
 import hashlib
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.laws import Law, get_law
-from asperity.operating_point import known_parameters, without_mass
+from asperity.laws import Law, get_law, registered
+from asperity.operating_point import known_parameters
+from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
 from asperity.study.engine import solve_here
 from asperity.study.outcome import Answers
+from asperity.study.points import Points
 from asperity.study.responses import answers_of_law
 
 Row = list[str]
@@ -98,64 +100,53 @@ def run_table(
     """
     filled = dict(filled or {})
     out = output_file(out, inputs={"table": source})
-    table = _open_table(source, law, filled)
+    table = TableSource(source, law, filled)
     output = UnfinishedText(out, {"table": table.digest, "law": law, "filled": filled})
     output.start(resume)
     chunks = table.blocks(block, skip=output.rows)
 
     def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
-        rows, reasons = zip(
-            *(_fit_width(row, len(table.header)) for row in next(chunks)), strict=True
-        )
-        answers, results = _solved(table, rows, list(reasons), law, filled, advance)
+        rows = next(chunks)
+        answers, results = _solved(table, rows, advance)
         header = None if start else [*table.header, *RESULT_COLUMNS]
-        lines = [(*row, *cells) for row, cells in zip(rows, _cells(answers, results), strict=True)]
+        cells = zip(rows, _cells(answers, results), strict=True)
+        lines = [(*_of_width(row, len(table.header)), *answer) for row, answer in cells]
         output.append_rows(lines, table.delimiter, header, failed=answers.failed)
 
     with output.interruptible("rows", table.rows):
-        solve_here(table.rows, block, solve, progress or (lambda done, total: None), output.rows)
+        solve_here(table.rows, block, solve, progress, output.rows)
         output.finish()
     return TableSummary(table.rows, int(output.progress["failed"]), out)
 
 
 def _solved(
-    table: TableSource,
-    rows: Sequence[Row],
-    reasons: list[str],
-    law: str | None,
-    filled: Mapping[str, float],
-    advance: Callable[[int], None],
+    table: TableSource, rows: Sequence[Row], advance: Callable[[int], None]
 ) -> tuple[Answers, list[str]]:
-    """Answers of rows, and the column ``result``; rows that have a reason are not solved."""
+    """Answers of rows, and the column ``result``."""
+    results = [_mistake_of_width(row, len(table.header)) for row in rows]
+    sound = [i for i, result in enumerate(results) if not result]
+    advance(len(rows) - len(sound))
+    points = _points(table, [rows[i] for i in sound])
     answers = Answers.empty(_OUTPUTS, len(rows))
-    advance(sum(bool(reason) for reason in reasons))
-    for name, members in _by_law(rows, table.columns.get("law"), law, reasons).items():
+    for name, members in points.by_law():
         try:
-            kind = get_law(name)
-            values, refused = _read_numbers([rows[i] for i in members], kind, table.columns, filled)
+            law = get_law(name)
         except InputError as error:
-            refused = [str(error)] * len(members)
-        for i, reason in zip(members, refused, strict=True):
-            reasons[i] = reason
-        advance(sum(bool(reason) for reason in refused))
-        sound = np.array([k for k, reason in enumerate(refused) if not reason], dtype=np.intp)
-        if len(sound):
-            valid = {n: v[sound] for n, v in values.items()}
-            answers.put(members[sound], answers_of_law(kind, valid, _OUTPUTS, advance))
-    results = [reason or str(text) for reason, text in zip(reasons, answers.result, strict=True)]
-    return answers, results
-
-
-def _by_law(
-    rows: Sequence[Row], place: int | None, law: str | None, reasons: Sequence[str]
-) -> dict[str, np.ndarray]:
-    """Indices of the rows without a reason, by law."""
-    members: dict[str, list[int]] = {}
-    for i, row in enumerate(rows):
-        if not reasons[i]:
-            written = "" if place is None else row[place].strip()
-            members.setdefault(written or law or "", []).append(i)
-    return {name: np.array(index, dtype=np.intp) for name, index in members.items()}
+            mistakes = dict.fromkeys(members.tolist(), str(error))
+            advance(len(members))
+        else:
+            values = points.take(members).of_law(name)
+            solved = answers_of_law(law, values, _OUTPUTS, advance)
+            answers.put(np.array(sound)[members], solved)
+            mistakes = {}
+            for k in np.flatnonzero(solved.outcome == Outcome.INVALID):
+                row = rows[sound[members[k]]]
+                cells = {n: row[place].strip() for n, place in table.columns.items()}
+                point = {n: float(v[k]) for n, v in values.items()}
+                mistakes[int(members[k])] = _mistake(law, point, cells)
+        for k, mistake in mistakes.items():
+            results[sound[k]] = mistake
+    return answers, [mine or str(told) for mine, told in zip(results, answers.result, strict=True)]
 
 
 def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, ...]]:
@@ -171,13 +162,19 @@ def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, .
 # The file
 
 
-@dataclass(frozen=True)
 class TableSource:
-    """A checked table.
+    """A table, read once to count its rows and checked as a whole.
+
+    Parameters
+    ----------
+    path : Path
+    law : str or None
+        Law of the rows without a law.
+    filled : mapping of str to float
+        SI numbers for missing columns and empty cells, by name.
 
     Attributes
     ----------
-    path : Path
     delimiter : str
     header : list of str
         As read.
@@ -187,14 +184,46 @@ class TableSource:
         Number of rows of data, without blank lines.
     digest : str
         SHA-256 of the file.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read, has no rows, or lacks a column that all its laws need.
     """
 
-    path: Path
-    delimiter: str
-    header: Row
-    columns: Mapping[str, int]
-    rows: int
-    digest: str
+    def __init__(self, path: Path, law: str | None, filled: Mapping[str, float]) -> None:
+        self.path, self.law, self.filled = path, law or "", filled
+        with _opened(path) as stream:
+            self.delimiter = _delimiter(stream.readline())
+            stream.seek(0)
+            rows = _rows(stream, self.delimiter)
+            self.header = next(rows, [])
+            if not any(name.strip() for name in self.header):
+                raise InputError(
+                    f"{path} must have a line of column names and rows, got an empty file; "
+                    "give one operating point a row"
+                )
+            self.columns = _checked_header(self.header, str(path))
+            laws: Counter[str] = Counter()
+            #: First text, and its row, of the columns in which no row so far has a number.
+            texts = {name: ("", 0) for name in self.columns if name != "law"}
+            for count, row in enumerate(rows, 1):
+                laws[self.law_of(row)] += 1
+                for name in tuple(texts):
+                    cell = "".join(row[self.columns[name] :][:1]).strip()
+                    if math.isfinite(_number(cell, known_parameters()[name], math.nan)):
+                        del texts[name]
+                    elif cell and not texts[name][0]:
+                        texts[name] = cell, count
+        self.rows = laws.total()
+        if not self.rows:
+            raise InputError(
+                f"{path} must have rows of data, got only column names; give one operating point "
+                "a row"
+            )
+        self._require_columns(list(laws), texts)
+        with path.open("rb") as file:
+            self.digest = hashlib.file_digest(file, "sha256").hexdigest()
 
     def blocks(self, size: int, skip: int = 0) -> Iterator[list[Row]]:
         """Rows of data in lists of at most `size`, without the first `skip`."""
@@ -203,54 +232,35 @@ class TableSource:
             while block := list(islice(rows, size)):
                 yield block
 
+    def law_of(self, row: Row) -> str:
+        """Name of the law of a row, or "" if it has none."""
+        place = self.columns.get("law", len(row))
+        return (row[place].strip() if place < len(row) else "") or self.law
 
-@dataclass
-class _ColumnContents:
-    """Contents of the columns, from a first pass over all rows."""
-
-    rows: int = 0
-    laws: set[str] = field(default_factory=set)
-    numeric: set[str] = field(default_factory=set)
-    first_text: dict[str, tuple[str, int]] = field(default_factory=dict)
-
-
-def _open_table(path: Path, law: str | None, filled: Mapping[str, object]) -> TableSource:
-    """Read a table once and check the file as a whole.
-
-    Parameters
-    ----------
-    path : Path
-    law : str or None
-        Law of the rows without a law.
-    filled : mapping
-        Numbers that need no column, by name.
-
-    Raises
-    ------
-    InputError
-        If the table cannot be read, has no rows, or has a column that is missing or
-        unusable in every row.
-    """
-    with _opened(path) as stream:
-        delimiter = _delimiter(stream.readline())
-        stream.seek(0)
-        rows = _rows(stream, delimiter)
-        header = next(rows, [])
-        if not any(name.strip() for name in header):
+    def _require_columns(self, laws: Sequence[str], texts: Mapping[str, tuple[str, int]]) -> None:
+        """Refuse a table in which no row can be solved; `texts` of the columns without a number."""
+        if not any(laws):
             raise InputError(
-                f"{path} must have a line of column names and rows, got an empty file; "
-                "give one operating point a row"
+                f"{self.path} must name the law of its rows, got no column 'law'; add it or give "
+                "--law"
             )
-        columns = _checked_header(header, str(path))
-        contents = _column_contents(rows, columns, law)
-    if not contents.rows:
-        raise InputError(
-            f"{path} must have rows of data, got only column names; give one operating point a row"
-        )
-    _check_columns(path, columns, contents, filled)
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return TableSource(path, delimiter, header, columns, contents.rows, digest)
+        known = [law for name, law in registered().items() if name in laws]
+        if not known:
+            get_law(max(laws))
+        everywhere = set.intersection(*(set(required(law)) for law in known))
+        for name, (text, row) in texts.items():
+            if name in everywhere and text:
+                raise InputError(
+                    f"{self.path} must have finite numbers in column '{name}', got '{text}' in "
+                    f"row {row} and none in any other; write SI numbers without units"
+                )
+        missing = everywhere - (set(self.columns) - set(texts)) - set(self.filled)
+        if missing:
+            raise InputError(
+                f"{self.path} must have the columns that its laws need, got none for "
+                f"{', '.join(n for n in known_parameters() if n in missing)}; add them or name a "
+                "material that has them"
+            )
 
 
 @contextmanager
@@ -351,190 +361,81 @@ def _nearest(name: str, known: set[str]) -> str | None:
     return lowered[near[0]] if near else None
 
 
-def _column_contents(
-    rows: Iterator[Row], columns: Mapping[str, int], law: str | None
-) -> _ColumnContents:
-    contents = _ColumnContents()
-    without_number = {name: place for name, place in columns.items() if name != "law"}
-    law_place = columns.get("law", -1)
-    for row in rows:
-        contents.rows += 1
-        written = row[law_place].strip() if 0 <= law_place < len(row) else ""
-        contents.laws.add(written or law or "")
-        # Columns that have shown a number are not examined further, for speed.
-        for name in [n for n, place in without_number.items() if place < len(row)]:
-            text = row[without_number[name]].strip()
-            if _is_number(text):
-                contents.numeric.add(name)
-                del without_number[name]
-            elif text:
-                contents.first_text.setdefault(name, (text, contents.rows))
-    return contents
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _check_columns(
-    path: Path, columns: Mapping[str, int], contents: _ColumnContents, filled: Mapping[str, object]
-) -> None:
-    """Refuse a table in which no row can be solved because a required column is missing."""
-    if contents.laws == {""}:
-        raise InputError(
-            f"{path} must name the law of its rows, got no column 'law'; add it or give --law"
-        )
-    needs = [set(required(get_law(name))) for name in contents.laws if _known_law(name)]
-    if not needs:
-        get_law(min(contents.laws - {""}))
-    everywhere = set.intersection(*needs)
-    for name in columns:
-        if name in everywhere and name not in contents.numeric and name in contents.first_text:
-            text, row = contents.first_text[name]
-            raise InputError(
-                f"{path} must have finite numbers in column '{name}', got '{text}' in row {row} "
-                "and none in any other; write SI numbers without units"
-            )
-    missing = [
-        n for n in known_parameters() if n in everywhere - contents.numeric and n not in filled
-    ]
-    if missing:
-        raise InputError(
-            f"{path} must have the columns that its laws need, got none for {', '.join(missing)}; "
-            "add them or name a material that has them"
-        )
-
-
-def _known_law(name: str) -> bool:
-    try:
-        get_law(name)
-    except InputError:
-        return False
-    return True
-
-
 # Rows to numbers
 
 
-def _fit_width(row: Row, width: int) -> tuple[Row, str]:
-    """The row with as many cells as the header, and the reason if it cannot be used."""
-    if len(row) == width:
-        return row, ""
-    kept = (row + [""] * width)[:width]
+def _of_width(row: Row, width: int) -> Row:
+    """The row with as many cells as the header."""
+    return (row + [""] * width)[:width]
+
+
+def _mistake_of_width(row: Row, width: int) -> str:
+    """Why a row with too few or too many cells cannot be used; empty for the other rows."""
     # Spreadsheets leave separators behind the last column.
-    if len(row) > width and not any(cell.strip() for cell in row[width:]):
-        return kept, ""
-    return kept, (
+    if len(row) == width or (len(row) > width and not any(cell.strip() for cell in row[width:])):
+        return ""
+    return (
         f"row must have as many cells as the header, got {len(row)} instead of {width}; "
         "correct the separators, and quote a cell that holds one"
     )
 
 
-def _read_numbers(
-    rows: Sequence[Row], law: type[Law], columns: Mapping[str, int], filled: Mapping[str, float]
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
-    """Numbers of the rows for one law.
+def _points(table: TableSource, rows: Sequence[Row]) -> Points:
+    """Operating points of rows.
 
-    Parameters
-    ----------
-    rows : sequence of rows
-    law : type of Law
-    columns : mapping of str to int
-        Position of every known column.
-    filled : mapping of str to float
-        SI numbers for missing columns and empty cells.
-
-    Returns
-    -------
-    values : dict of str to array, shape (rows,)
-        SI; undefined for a row with a reason.
-    reasons : list of str
-        Why a row cannot be solved; empty for the other rows.
+    A number that no cell and no default has is NaN; a cell without a finite number is infinite.
     """
-    reasons = [""] * len(rows)
-    values = {}
-    for name, parameter in point_parameters(law).items():
-        place = columns.get(name)
-        default = math.nan if parameter.default is None else parameter.default
-        fill = filled.get(name, default)
-        if place is None:
-            numbers = np.full(len(rows), fill)
-        else:
-            numbers = _parsed([row[place] for row in rows], name, parameter, fill, reasons)
-        absent = np.isnan(numbers)
-        if name in required(law):
-            for i in np.flatnonzero(absent):
-                reasons[i] = reasons[i] or (
-                    f"{law.name} must have {name}, got an empty cell; fill it in or name a "
-                    "material that has it"
-                )
-        _check(numbers, ~absent, parameter, reasons)
+    laws = np.array([table.law_of(row) for row in rows], dtype=object)
+    values = {name: np.full(len(rows), number) for name, number in table.filled.items()}
+    for name, place in table.columns.items():
+        if name == "law":
+            continue
+        cells, parameter = [row[place] for row in rows], known_parameters()[name]
+        try:
+            numbers = np.fromiter(map(float, cells), float, len(cells))
+            usual = bool(np.isfinite(numbers).all())
+        except ValueError:
+            usual = False
+        if not usual:
+            fill = table.filled.get(name, math.nan)
+            numbers = np.array([_number(cell.strip(), parameter, fill) for cell in cells])
         values[name] = numbers
-    for i in np.flatnonzero(without_mass(values)):
-        reasons[i] = reasons[i] or (
-            "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
-        )
-    if not law.rate_dependent:
-        for i in np.flatnonzero((values["inertia"] > 0) | (values["eta"] > 0)):
-            reasons[i] = reasons[i] or (
-                f"law must depend on the velocity where inertia or eta counts, got {law.name}; "
-                "leave both cells empty or choose another law"
-            )
-    return values, reasons
+    return Points(laws, values)
 
 
-def _parsed(
-    cells: Sequence[str], name: str, parameter: Parameter, fill: float, reasons: list[str]
-) -> NDArray[np.float64]:
-    """Numbers of a column, `fill` for empty cells; NaN where a cell has no number."""
-    try:
-        numbers = np.fromiter(map(float, cells), float, len(cells))
-        if np.isfinite(numbers).all():
-            return numbers
-    except ValueError:
-        pass
-    return np.array(
-        [_number(cell, name, parameter, fill, reasons, i) for i, cell in enumerate(cells)]
-    )
-
-
-def _number(
-    cell: str, name: str, parameter: Parameter, fill: float, reasons: list[str], i: int
-) -> float:
-    text = cell.strip()
-    if not text:
+def _number(cell: str, parameter: Parameter, fill: float) -> float:
+    if not cell:
         return fill
     try:
-        number = parameter.words[text.lower()] if text.lower() in parameter.words else float(text)
+        number = parameter.words[cell.lower()] if cell.lower() in parameter.words else float(cell)
     except ValueError:
-        number = math.nan
-    if math.isfinite(number):
-        return number
-    unit = f" in {parameter.unit}" if parameter.unit else ""
-    reasons[i] = reasons[i] or (
-        f"{name} must be a finite number{unit}, got '{text}'; write it without unit, with a "
-        "decimal point"
-    )
-    return math.nan
+        return math.inf
+    return number if math.isfinite(number) else math.inf
 
 
-def _check(
-    numbers: NDArray[np.float64],
-    present: NDArray[np.bool_],
-    parameter: Parameter,
-    reasons: list[str],
-) -> None:
-    """Check the rule of a parameter; a row that breaks the rule gets the reason."""
-    try:
-        parameter.check(numbers[present])
-        return
-    except InputError:
-        pass
-    for i in np.flatnonzero(present):
+def _mistake(law: type[Law], values: Mapping[str, float], cells: Mapping[str, str]) -> str:
+    """Why the numbers of a row are invalid; empty if they are not."""
+    for name, parameter in point_parameters(law).items():
+        if math.isnan(values[name]):
+            return (
+                f"{law.name} must have {name}, got an empty cell; fill it in or name a material "
+                "that has it"
+            )
+        if math.isinf(values[name]):
+            unit = f" in {parameter.unit}" if parameter.unit else ""
+            return (
+                f"{name} must be a finite number{unit}, got '{cells[name]}'; write it without "
+                "unit, with a decimal point"
+            )
         try:
-            parameter.check(float(numbers[i]), parameter.name)
+            parameter.check(values[name], name)
         except InputError as error:
-            reasons[i] = reasons[i] or str(error)
+            return str(error)
+    if values["inertia"] > 0 and not values["M"] > 0:
+        return "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
+    if not law.rate_dependent and (values["inertia"] > 0 or values["eta"] > 0):
+        return (
+            f"law must depend on the velocity where inertia or eta counts, got {law.name}; leave "
+            "both cells empty or choose another law"
+        )
+    return ""

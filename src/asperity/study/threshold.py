@@ -1,6 +1,6 @@
 """Stiffness thresholds: the stiffness above which modulated sliding is stable.
 
-A threshold is a zero of ln|m| of the leading multiplier along a line of operating points. Many
+A threshold is a zero of ln|m| of the leading multiplier along a line of increasing stiffness. Many
 lines are searched together.
 """
 
@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import elementwise
 
 from asperity.errors import InputError
 from asperity.laws import Law
@@ -21,134 +20,11 @@ from asperity.parameters import DRIVE, law_parameters
 from asperity.parameters.arguments import at_least, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
+from asperity.study.crossings import STABILITY, find_crossings
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.points import POINT_BYTES, Float
 from asperity.study.responses import answers_of_law, bifurcation_kinds
 from asperity.units import format_si
-
-#: Accuracy of the position of a crossing, in fractions of an axis.
-TOLERANCE = 1e-6
-_MOST_STEPS = 60
-#: ln|m| jumps over zero, and does not cross it, where |ln|m|| at the end of the search exceeds this
-#: fraction of the difference of ln|m| between the ends of the line.
-_JUMP = 1e-2
-
-#: Outputs that a search for crossings needs.
-STABILITY = ("log_multiplier", "multiplier_argument")
-
-
-class ResponseSource(Protocol):
-    """Anything that solves responses at positions, shape (points, 2), such as a `MapPlane`."""
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the numbers of each answer; `STABILITY` is a part of them."""
-        ...
-
-    def solve(self, where: Float) -> Answers:
-        """Responses at the positions `where`."""
-        ...
-
-
-@dataclass
-class Crossings:
-    """Points of a stability boundary.
-
-    Attributes
-    ----------
-    where : array, shape (points, 2)
-        Fractions of the axes; the last position of the search where no crossing is located.
-    points : Answers
-        Responses at `where`.
-    located : bool array, shape (points,)
-    reason : object array, shape (points,)
-        "converged", or why there is no crossing.
-    """
-
-    where: Float
-    points: Answers
-    located: NDArray[np.bool_]
-    reason: NDArray[np.object_]
-
-
-def find_crossings(
-    plane: ResponseSource, start: Float, end: Float, g0: Float, g1: Float
-) -> Crossings:
-    """Locate the change of stability on each line from `start` to `end`.
-
-    Chandrupatla's method (1997): inverse quadratic interpolation, and bisection where that is not
-    safe. ln|m| is continuous, with a kink where another multiplier becomes the leading one.
-
-    Parameters
-    ----------
-    plane : ResponseSource
-    start, end : array, shape (lines, 2)
-        Fractions of the axes.
-    g0, g1 : array, shape (lines,)
-        ln|m| at the ends, of opposite signs.
-    """
-    lines = _SearchLines(plane, start, end, g0, g1)
-    if not len(start):
-        return Crossings(start, lines.points, np.zeros(0, bool), np.empty(0, object))
-    root = elementwise.find_root(
-        lines.log_multiplier,
-        (np.zeros(len(start)), lines.length),
-        args=(np.arange(len(start), dtype=float),),
-        tolerances={"xatol": TOLERANCE, "xrtol": 0.0, "fatol": 0.0, "frtol": 0.0},
-        maxiter=_MOST_STEPS,
-    )
-    lines.solve_at(root.x)
-    points = lines.points
-    with np.errstate(invalid="ignore"):
-        jumps = points.converged & (np.abs(points["log_multiplier"]) > _JUMP * np.abs(g1 - g0))
-    lost = np.flatnonzero(~root.success)
-    reason = points.result
-    reason[jumps] = "the response jumps here: its branch folds away, or two branches meet"
-    reason[lost] = [f"a point on the way to the crossing has no response: {lines.failure[i]}"
-                    for i in lost]  # fmt: skip
-    return Crossings(lines.where, points, points.converged & root.success & ~jumps, reason)
-
-
-class _SearchLines:
-    """Straight lines, and the solved point of each with the smallest |ln|m||."""
-
-    def __init__(
-        self, plane: ResponseSource, start: Float, end: Float, g0: Float, g1: Float
-    ) -> None:
-        self.plane, self.start, self.vector = plane, start, end - start
-        self.length = np.hypot(self.vector[:, 0], self.vector[:, 1])
-        self.g0, self.g1 = g0, g1
-        self.points = Answers.empty(plane.outputs, len(start))
-        self.nearest = np.where(np.abs(g0) < np.abs(g1), 0.0, self.length)
-        self.failure = np.full(len(start), "no change of sign", dtype=object)
-
-    @property
-    def where(self) -> Float:
-        """Fractions of the axes of the nearest points."""
-        return self.start + (self.nearest / self.length)[:, None] * self.vector
-
-    def log_multiplier(self, s: Float, index: Float) -> Float:
-        """ln|m| at the distances `s` along the lines `index`."""
-        i = index.astype(int)
-        g = np.where(s == 0, self.g0[i], self.g1[i])
-        inside = (s != 0) & (s != self.length[i])
-        i, s = i[inside], s[inside]
-        answers = self.plane.solve(self.start[i] + (s / self.length[i])[:, None] * self.vector[i])
-        g[inside] = answers["log_multiplier"]
-        failed = ~answers.converged
-        self.failure[i[failed]] = answers.take(failed).result
-        known = np.where(self.points.converged[i], np.abs(self.points["log_multiplier"][i]), np.inf)
-        nearer = np.flatnonzero(answers.converged & (np.abs(answers["log_multiplier"]) < known))
-        self.points.put(i[nearer], answers.take(nearer))
-        self.nearest[i[nearer]] = s[nearer]
-        return g
-
-    def solve_at(self, s: Float) -> None:
-        """Solve at the distances `s`, except where that point is solved already."""
-        index = np.flatnonzero(~self.points.converged | (self.nearest != s))
-        self.nearest = np.asarray(s, dtype=float)
-        self.points.put(index, self.plane.solve(self.where[index]))
-
 
 #: Limits of the search, over K_c.
 _BETWEEN = (0.3, 4.0)
@@ -256,7 +132,13 @@ def stiffness_threshold(
             f"epsilon and frequency must have shapes that broadcast, got {np.shape(eps)} and "
             f"{np.shape(f)}; give arrays of one shape"
         ) from None
-    low, high = _ends(slider, velocity, between)
+    try:
+        critical, _ = natural_scales(slider, velocity)
+    except InputError:
+        if between is None:
+            raise
+        critical = np.nan
+    low, high = _ends(critical, between)
     values = _numbers(slider) | {
         "V": number(velocity, "velocity", "velocity", "positive"),
         "eta": 0.0
@@ -274,10 +156,9 @@ def stiffness_threshold(
         np.full(count, high),
         scan,
     )
-    ratio = searched.K / _critical(slider, velocity)
     return StiffnessThreshold(
         K=searched.K.reshape(eps.shape),
-        ratio=ratio.reshape(eps.shape),
+        ratio=searched.K.reshape(eps.shape) / critical,
         kind=searched.kind.reshape(eps.shape),
         mode_frequency=searched.turn.reshape(eps.shape) * f,
         result=searched.result.reshape(eps.shape),
@@ -341,11 +222,20 @@ def search_thresholds(
     scan : int
         Number of stiffnesses solved before the search, at equal ratios.
     """
-    lines = _StiffnessLines(law, values, low, high)
     count = len(low)
+
+    def stiffness(where: Float) -> Float:
+        line = where[:, 1].astype(int)
+        return np.asarray(low[line] * (high[line] / low[line]) ** where[:, 0])
+
+    def solve(where: Float) -> Answers:
+        """Responses at the rows of `where`: fraction of the line, number of the line."""
+        at = {name: numbers[where[:, 1].astype(int)] for name, numbers in values.items()}
+        return answers_of_law(law, at | {"K": stiffness(where)}, STABILITY)
+
     steps = np.linspace(0.0, 1.0, scan)
     grid = np.stack([a.ravel() for a in np.meshgrid(steps, np.arange(count, dtype=float))], -1)
-    scanned = lines.solve(grid)
+    scanned = solve(grid)
     g = scanned["log_multiplier"].reshape(count, scan)
     reasons = np.where(scanned.converged, "", scanned.result).reshape(count, scan)
     with np.errstate(invalid="ignore"):
@@ -357,17 +247,17 @@ def search_thresholds(
     line = np.flatnonzero(usable)
     k = last[line]
     crossings = find_crossings(
-        lines,
+        solve,
         np.stack([steps[k], line], axis=-1),
         np.stack([steps[k + 1], line], axis=-1),
         g[line, k],
         g[line, k + 1],
     )
-    stiffness, turn, where = np.full((3, count), np.nan)
+    K, turn, where = np.full((3, count), np.nan)
     kind, result = (np.full(count, "", dtype=object) for _ in range(2))
     outcome = np.zeros(count, dtype=np.int16)
-    at = lines.stiffness(crossings.where)
-    stiffness[line] = np.where(crossings.located, at, np.nan)
+    at = stiffness(crossings.where)
+    K[line] = np.where(crossings.located, at, np.nan)
     where[line] = at
     outcome[line] = np.where(crossings.located, SweepOutcome.CONVERGED, SweepOutcome.NO_CROSSING)
     turn[line] = np.abs(crossings.points["multiplier_argument"]) / (2 * np.pi)
@@ -383,7 +273,7 @@ def search_thresholds(
         else:
             outcome[i], where[i] = SweepOutcome.STABLE_THROUGHOUT, low[i]
             result[i] = f"no threshold: stable from {format_si(float(low[i]), 'stiffness')}"
-    return SearchedThresholds(stiffness, turn, kind, result, outcome, where)
+    return SearchedThresholds(K, turn, kind, result, outcome, where)
 
 
 def _numbers(slider: Slider) -> dict[str, float]:
@@ -398,18 +288,9 @@ def _numbers(slider: Slider) -> dict[str, float]:
     return {name: float(np.ravel(value)[0]) for name, value in values.items()}
 
 
-def _critical(slider: Slider, velocity: Any) -> float:
-    """K_c (N/m); NaN for a law without A, B and D0."""
-    try:
-        return natural_scales(slider, velocity)[0]
-    except InputError:
-        return np.nan
-
-
-def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tuple[float, float]:
-    """Limits of the search, in ascending order."""
+def _ends(critical: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
+    """Limits of the search (N/m), in ascending order."""
     if between is None:
-        critical, _ = natural_scales(slider, velocity)
         if critical <= 0:
             raise InputError(
                 f"between must be given for a law that strengthens with velocity, got none and "
@@ -423,27 +304,3 @@ def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tup
             "swap them"
         )
     return low, high
-
-
-class _StiffnessLines:
-    """A `ResponseSource`: a line of increasing stiffness for each operating point."""
-
-    outputs = STABILITY
-
-    def __init__(
-        self, law: type[Law], values: Mapping[str, Float], low: Float, high: Float
-    ) -> None:
-        self.law, self.values = law, values
-        self.low, self.high = low, high
-
-    def stiffness(self, where: Float) -> Float:
-        """K (N/m) at the rows of `where`: fraction of the line, number of the line."""
-        line = np.round(where[:, 1]).astype(int)
-        return np.asarray(self.low[line] * (self.high[line] / self.low[line]) ** where[:, 0])
-
-    def solve(self, where: Float) -> Answers:
-        """Responses at the rows of `where`: fraction of the line, number of the line."""
-        line = np.round(where[:, 1]).astype(int)
-        values = {name: numbers[line] for name, numbers in self.values.items()}
-        values["K"] = self.stiffness(where)
-        return answers_of_law(self.law, values, STABILITY)

@@ -59,27 +59,6 @@ class Workers(ABC):
         """Release the processes; with `kill` their running tasks are killed."""
 
 
-class ThisProcess(Workers):
-    """The process of the driver: `submit` runs the task before it returns."""
-
-    count = 1
-    about = "this process"
-    lost = ()
-    gone = ()
-
-    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
-        """As in `Workers`; Ctrl-C is raised at once."""
-        future: Future[Any] = Future()
-        try:
-            future.set_result(task(*args))
-        except Exception as error:  # an executor stores exceptions in the future, too
-            future.set_exception(error)
-        return future
-
-    def close(self, *, kill: bool) -> None:
-        """As in `Workers`."""
-
-
 class LocalProcesses(Workers):
     """Processes of this machine, each with one thread.
 
@@ -180,13 +159,7 @@ class DaskWorkers(Workers):
 @contextmanager
 def local_processes(count: int) -> Iterator[Workers]:
     """Processes of this machine, which are killed if the block ends with an exception."""
-    workers = LocalProcesses(count)
-    try:
-        yield workers
-    except BaseException:
-        workers.close(kill=True)
-        raise
-    workers.close(kill=False)
+    yield from _using(LocalProcesses(count))
 
 
 @contextmanager

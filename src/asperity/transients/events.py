@@ -83,7 +83,8 @@ class Event:
         Seconds.
     kind : str
         "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`; where a
-        level of the force is given, "fall" through it, and "peak" and "trough" of the force.
+        level of the force is given, "fall" through it, and "peak" and "trough" of the force, in
+        the place of the slips.
     """
 
     time: float
@@ -174,14 +175,13 @@ class EventDetector:
         if len(dense_output.begin) == 0:
             return [], None
         times = dense_output.refined()
-        result = [
-            Event(t, "slip start" if up else "slip end")
-            for t, up in self._crossings("slip", self._slip, times, samples, dense_output)
-        ]
-        if self._level is not None:
+        if self._level is None:
+            slips = self._crossings("slip", self._slip, times, samples, dense_output)
+            result = [Event(t, "slip start" if up else "slip end") for t, up in slips]
+        else:
             falls = self._crossings("level", self._above, times, samples, dense_output)
             extrema = self._crossings("extremum", self._ahead, times, samples, dense_output)
-            result += [Event(t, "fall") for t, up in falls if not up]
+            result = [Event(t, "fall") for t, up in falls if not up]
             result += [Event(t, "peak" if up else "trough") for t, up in extrema]
         terminations = []
         if self._may_run_away:

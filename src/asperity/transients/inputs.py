@@ -51,16 +51,20 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     if isinstance(initial, str):
         if initial != "steady":
             raise InputError(
-                f"initial must be 'steady' or an array of states, got '{initial}'; "
-                "leave it out to begin in steady sliding"
+                "initial",
+                "be 'steady' or an array of states",
+                f"'{initial}'",
+                "leave it out to begin in steady sliding",
             )
         return Checkpoint(0, 0.0, steady_start(motion, programme))
     states = np.asarray(initial, float)
     if states.shape != (motion.size,) or not np.all(np.isfinite(states)):
         names = ", ".join((*motion.mechanical, *motion.slider.law.state_names))
         raise InputError(
-            f"initial must be {motion.size} finite states ({names}), got {states.tolist()}; "
-            "take them from a trajectory or begin in steady sliding"
+            "initial",
+            f"be {motion.size} finite states ({names})",
+            states.tolist(),
+            "take them from a trajectory or begin in steady sliding",
         )
     _require_motion(motion, programme, states)
     return Checkpoint(0, 0.0, np.append(states, 0.0))
@@ -75,15 +79,19 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
     if lost:
         steady = ", ".join(f"{s + 0.0:.4g}" for s in np.asarray(motion.steady()))
         raise InputError(
-            f"initial must be states whose rates are numbers, got {_listed(states)}, of which that "
-            f"of {lost[0]} is not finite; begin nearer to steady sliding, at {steady}"
+            "initial",
+            "be states whose rates are numbers",
+            f"{_listed(states)}, of which that of {lost[0]} is not finite",
+            f"begin nearer to steady sliding, at {steady}",
         )
     # With ln v as a state the slider always moves forwards, even at the smallest velocity.
     if friction < 0 and not (motion.signed or "log_velocity" in motion.mechanical):
         raise InputError(
-            f"initial must leave an interface force that is not negative, got {_listed(states)} "
-            f"and F_i/W = {friction:.4g}, for which '{motion.slider.law.name}' is not defined; "
-            "take a law that is, such as 'regularised'"
+            "initial",
+            "leave an interface force that is not negative",
+            f"{_listed(states)} and F_i/W = {friction:.4g}, for which "
+            f"'{motion.slider.law.name}' is not defined",
+            "take a law that is, such as 'regularised'",
         )
 
 
@@ -116,8 +124,10 @@ def require_contact(programme: Programme, W0: float) -> None:
     for moment, load in (("before the first step", programme.level.load), ("at t = 0", first)):
         if not load > NO_LOAD * W0:
             raise InputError(
-                f"programme.load must press the slider on, at more than {NO_LOAD:g} of W0 = "
-                f"{W0:g} N, got {load:g} N {moment}; begin with the interface in contact"
+                "programme.load",
+                f"press the slider on, at more than {NO_LOAD:g} of W0 = {W0:g} N",
+                f"{load:g} N {moment}",
+                "begin with the interface in contact",
             )
 
 
@@ -129,8 +139,10 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     level = programme.level
     if not level.velocity > 0:
         raise InputError(
-            f"programme.velocity must be positive for a start in steady sliding, got "
-            f"{level.velocity:g} m/s; give it, or the states at rest as initial"
+            "programme.velocity",
+            "be positive for a start in steady sliding",
+            f"{level.velocity:g} m/s",
+            "give it, or the states at rest as initial",
         )
     first = SegmentEquations(motion, programme.segments[0])
     w = level.load / np.asarray(motion.slider.W0)
@@ -207,14 +219,14 @@ def checked_integration(
         eta = _positive(radiation_damping, "damping", "radiation_damping")
     rtol = _positive(rtol, "dimensionless", "rtol")
     if not 1e-13 <= rtol <= 1e-2:
-        raise InputError(
-            f"rtol must lie between 1e-13 and 0.01, got {rtol:g}; give one such as 1e-8"
-        )
+        raise InputError("rtol", "lie between 1e-13 and 0.01", f"{rtol:g}", "give one such as 1e-8")
     atol = rtol / 100 if atol is None else _positive(atol, "dimensionless", "atol")
     if not slider.law.rate_dependent:
         raise InputError(
-            f"law must depend on velocity for a transient, got '{slider.law.name}', whose force "
-            "follows the load without dynamics; take a rate-and-state law"
+            "law",
+            "depend on velocity for a transient",
+            f"'{slider.law.name}', whose force follows the load without dynamics",
+            "take a rate-and-state law",
         )
     scalar = jax.tree.map(_scalar, slider)
     fastest = programme.fastest_pull
@@ -247,8 +259,10 @@ def checked_integration(
 def _scalar(value: Any) -> jnp.ndarray:
     if np.size(value) != 1:
         raise InputError(
-            f"slider must be a single one for a transient, got parameters of shape "
-            f"{np.shape(value)}; call it once for each"
+            "slider",
+            "be a single one for a transient",
+            f"parameters of shape {np.shape(value)}",
+            "call it once for each",
         )
     number = jnp.asarray(value, float)
     return number if number.ndim == 0 else number.reshape(())

@@ -1,55 +1,69 @@
 """Limit cycles of a slider that is pulled at one velocity: stick-slip, as the motion repeats it.
 
-The motion begins far outside the cycle, as after slow sliding, and is followed from one fall of the
-spring force through its level of steady sliding to the next: under a drive of velocity V the force
-has its extrema where the slider moves at V, where only its state can make it differ from steady
-sliding, to both sides of it. The states at these falls are a return map. Stick-slip forgets the
-cycle before within a few cycles; close to the onset of stick-slip, where it does not, the states
-are extrapolated to where the changes of the last cycles tend (Aitken's method).
+The motion begins far outside the cycle, as after slow sliding, or on the cycle of a slider with
+similar parameters. It is followed from one fall of the spring force through its level of steady
+sliding to the next: under a drive of velocity V the force has its extrema where the slider moves at
+V, where only its state can make it differ from steady sliding, to both sides of it. The states at
+these falls are a return map s -> P(s), whose fixed point is found by Newton's method with the
+derivatives of `asperity.transients.variation`:
+
+    (1 - P_s) ds = P(s) - s,      P_s = (1 - f q^T / (q f)) D_s,
+
+D_s the derivatives of the states at the end to those at the beginning, f the rates at the end and q
+the gradient of the force. Eigenvalues of P_s are the multipliers of the cycle, which is taken where
+it is stable. The same equation with P_p in the place of P(s) - s gives the derivatives to the
+parameters.
+
+Source: R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010),
+chapter 7.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
 from asperity.loads import Excitation, Programme, Slide
-from asperity.slider import Slider
+from asperity.slider import Motion, Slider
+from asperity.slider.named import equation_parameters
 from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
+from asperity.transients.variation import Variation
 
 Float = NDArray[np.float64]
 
 #: Velocities of the sliding before the first cycle, over that of the drive: the second where the
 #: first slip from the first is too large for the law.
 _SLOWER = (1e-3, 0.3)
-#: Change of the states (logarithms, or relative) left to come at which a motion repeats itself, and
-#: the smallest change that is none of the errors of the steps.
-_REPEATED, _ERRORS = 1e-8, 1e-7
-#: Change over which two slips are two of one period, and not one that still changes.
-_SAME = 1e-5
 #: Difference of F/W0 between peak and trough below which sliding is steady.
 _STEADY = 1e-6
 #: Slips in a period, and slips that are followed, at most.
 _MOST_SLIPS, _MOST_CYCLES = 8, 400
 #: Longest cycles that are followed at once.
 _CYCLES = 10
-#: Cosine between two changes, and the ratio of them, from which they are extrapolated; and how far.
-_ALIGNED, _SLOW, _FAR = 0.95, 0.2, 0.5
+#: Newton's step of a logarithm, in tolerances of a step, that is none: the errors of the steps of a
+#: cycle add up to less.
+_CLOSED = 100.0
+#: Newton's step of a logarithm from which the motion is followed on instead, and most steps.
+_NEAR, _PASSES = 0.5, 8
+#: Length of the motion that is tried for a cycle, over its period as known so far.
+_LONGER = 1.2
 #: Steps in a cycle, at most.
 _MOST_STEPS = 200_000
 _TOO_MANY = (
     f"more than {_MOST_STEPS} steps do not end one; on elastic asperities the slider rings between "
     "slips, undamped: take the law without them, such as 'rice-ruina', or a faster drive"
 )
-#: Points between two samples among which the fastest is looked for, and how often.
-_FINER, _ROUNDS = 17, 3
 
 
 class CycleEnd(Enum):
@@ -59,11 +73,7 @@ class CycleEnd(Enum):
     STEADY = "no stick-slip: the slider comes to slide steadily"
     IRREGULAR = (
         f"irregular: the motion does not repeat itself after up to {_MOST_SLIPS} slips, within "
-        f"{_MOST_CYCLES}"
-    )
-    SLOW = (
-        f"not converged: the motion still changes after {_MOST_CYCLES} slips; the operating point "
-        "is too close to the onset of stick-slip"
+        f"{_MOST_CYCLES}, or is too close to the onset of stick-slip"
     )
     STOPPED = "no cycle: "
 
@@ -84,8 +94,6 @@ class LimitCycle:
         period.
     peak, lowest : float
         Largest and smallest F/W0.
-    peak_velocity : float
-        Largest velocity of the slider (m/s).
     """
 
     end: CycleEnd
@@ -96,21 +104,47 @@ class LimitCycle:
     slip_duration: float = np.nan
     peak: float = np.nan
     lowest: float = np.nan
-    peak_velocity: float = np.nan
-    _run: _Run | None = None
+    _orbit: _Orbit | None = None
     _peak: float = 0.0
-    _begin: float = 0.0
 
     @property
     def drop(self) -> float:
         """Largest less smallest F/W0."""
         return self.peak - self.lowest
 
+    @cached_property
+    def peak_velocity(self) -> float:
+        """Largest velocity of the slider (m/s)."""
+        return np.nan if self._orbit is None else self._orbit.fastest()
+
     def force(self, t: Float) -> Float:
         """F/W0 at times (s) counted from a peak, of any period."""
-        assert self._run is not None  # where the motion repeats itself
-        since = np.mod(self._peak - self._begin + np.asarray(t, float), self.period)
-        return self._run.samples(self._begin + since).force
+        return self.force_and_rate(t)[0]
+
+    def force_and_rate(self, t: Float) -> tuple[Float, Float]:
+        """F/W0 and its rate (1/s) at times (s) counted from a peak, of any period."""
+        assert self._orbit is not None  # where the motion repeats itself
+        return self._orbit.force_and_rate(self._orbit.within(self._peak + np.asarray(t))[0])
+
+    def derivatives(self, t: Float, names: Sequence[str]) -> tuple[Float, Float]:
+        """Derivatives of the force and of the period to parameters, with inertia.
+
+        Parameters
+        ----------
+        t : array, shape (n,)
+            As of `force`.
+        names : sequence of str
+            Parameters of the law, K, W0, M or eta.
+
+        Returns
+        -------
+        force : array, shape (n, parameters)
+            Derivatives of F/W0 per SI unit, at fixed times from a fall through the present level of
+            steady sliding: those from the peak differ by a shift in time.
+        period : array, shape (parameters,)
+        """
+        assert self._orbit is not None  # where the motion repeats itself
+        return self._orbit.derivatives(self._peak + np.asarray(t), names)
 
 
 class _Cycle(NamedTuple):
@@ -169,15 +203,136 @@ class _Run:
             Y[:, which == i] = self.parts[i].dense_output.evaluate(t[which == i])
         return Y
 
-    def fastest(self, begin: float, end: float) -> float:
-        """Largest velocity over V between two times (s)."""
-        times = np.concatenate([part.dense_output.refined() for part in self.parts])
-        times = np.concatenate([[begin], times[(times > begin) & (times < end)], [end]])
-        for _ in range(_ROUNDS):
-            at = int(np.argmax(self.samples(times).velocity))
-            around = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
-            times = np.linspace(*around, _FINER)
-        return float(self.samples(times).velocity.max())
+    def nodes(self, begin: float, end: float) -> Float:
+        """Beginnings of the steps between two times (s), with these."""
+        times = np.concatenate([part.dense_output.begin for part in self.parts])
+        return np.concatenate([[begin], times[(times > begin) & (times < end)], [end]])
+
+
+@dataclass(frozen=True)
+class _Orbit:
+    """A motion from one fall to another, with its return map about there.
+
+    The force and the period are those of the motion with Newton's step to first order, so that they
+    do not depend on where the motion began.
+
+    Attributes
+    ----------
+    run : _Run
+    begin, end : float
+        Seconds.
+    first, last : array, shape (size,)
+        States at the falls.
+    names : tuple of str
+        Parameters.
+    variation : Variation
+        With these parameters.
+    map : array, shape (size, size + parameters)
+        Derivatives of the last states, on the section, to the first ones and to the parameters.
+    duration : array, shape (size + parameters,)
+        Those of the time in between (s).
+    """
+
+    run: _Run
+    begin: float
+    end: float
+    first: Float
+    last: Float
+    names: tuple[str, ...]
+    variation: Variation
+    map: Float
+    duration: Float
+
+    @classmethod
+    def of(cls, run: _Run, begin: float, end: float) -> _Orbit:
+        """With derivatives to all parameters of the equations."""
+        motion = run.parts[0].system.motion
+        names = tuple(equation_parameters(motion))
+        first, last = run.states(np.array([begin, end]))[:-1].T
+        variation = Variation.along(
+            motion, lambda t: run.states(t)[:-1], run.nodes(begin, end), names
+        )
+        rates, gradient = (np.asarray(a) for a in _rates_and_gradient(motion, last))
+        ends = variation.at_end
+        later = gradient @ ends / (gradient @ rates)
+        return cls(
+            run, begin, end, first, last, names, variation, ends - np.outer(rates, later), -later
+        )
+
+    @property
+    def motion(self) -> Motion:
+        """The equation of motion."""
+        return self.run.parts[0].system.motion
+
+    @cached_property
+    def step(self) -> Float:
+        """Newton's step of the first states."""
+        return self.solve(self.last - self.first)
+
+    @property
+    def period(self) -> float:
+        """Seconds."""
+        return float(self.end - self.begin + self.duration[: len(self.first)] @ self.step)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie within the unit circle."""
+        size = len(self.first)
+        return bool(np.abs(np.linalg.eigvals(self.map[:, :size])).max() < 1)
+
+    def solve(self, change: Float) -> Float:
+        """Changes of the first states that make up for changes of the last ones."""
+        size = len(self.first)
+        return np.asarray(np.linalg.solve(np.eye(size) - self.map[:, :size], change))
+
+    def within(self, t: Float) -> tuple[Float, Float]:
+        """Times of the motion at times (s) of any period, and the number of the period."""
+        number = np.floor((t - self.begin) / self.period)
+        return t - number * self.period, number
+
+    def derivatives(self, t: Float, names: Sequence[str]) -> tuple[Float, Float]:
+        """Derivatives of F/W0, (n, parameters), and of the period, as of `LimitCycle`."""
+        size = len(self.first)
+        columns = [size + self.names.index(name) for name in names]
+        first = self.solve(self.map[:, columns])
+        period = self.duration[:size] @ first + self.duration[columns]
+        since, number = self.within(t)
+        # The force is the first state wherever there is a mass.
+        states = self.variation.evaluate(since, 0)
+        force = states[:, :size] @ first + states[:, columns]
+        return force - (number * self.force_and_rate(since)[1])[:, None] * period, period
+
+    def force_and_rate(self, t: Float) -> tuple[Float, Float]:
+        """F/W0, and K (V - v)/W0 (1/s), at times of the motion."""
+        now = self.run.samples(t)
+        later = self.variation.evaluate(t, 0)[:, : len(self.first)] @ self.step
+        return now.force + later, float(self.motion.kappa) * (1 - now.velocity)
+
+    def fastest(self) -> float:
+        """Largest velocity (m/s): the motion between steps is smooth."""
+        # Imported here because the module loads slowly.
+        from scipy.optimize import minimize_scalar
+
+        V = float(self.motion.V)
+        times = self.run.nodes(self.begin, self.end)
+        at = int(np.argmax(self.run.samples(times).velocity))
+        around = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
+        scale = around[1] - around[0]
+        best = minimize_scalar(
+            lambda share: (
+                -float(self.run.samples(np.array([around[0] + share * scale])).velocity[0])
+            ),
+            bounds=(0.0, 1.0),
+            method="bounded",
+        )
+        return V * float(-best.fun)
+
+
+@jax.jit
+def _rates_and_gradient(motion: Motion, Y: Array) -> tuple[Array, Array]:
+    """Rates (1/s) and the gradient of F/W0 at states, shapes (size,)."""
+    at = Excitation(jnp.ones(()))
+    return motion.rates(Y, at), jax.grad(lambda Y: jnp.reshape(motion.force(Y, at), ()))(Y)
 
 
 def limit_cycle(
@@ -187,6 +342,7 @@ def limit_cycle(
     inertia: bool = True,
     radiation_damping: float | None = None,
     rtol: float = 1e-9,
+    near: LimitCycle | None = None,
 ) -> LimitCycle:
     """The motion that a slider pulled at a constant velocity comes to.
 
@@ -198,6 +354,9 @@ def limit_cycle(
         Velocity of the drive (m/s), positive.
     inertia, radiation_damping, rtol
         As in `asperity.transients.transient`.
+    near : LimitCycle, optional
+        Of similar parameters and the same law: its cycle is followed to the present ones, where it
+        stays stable.
 
     Returns
     -------
@@ -220,10 +379,14 @@ def limit_cycle(
     level = float(motion.force(motion.steady(), Excitation(jnp.ones(()))))
     thresholds = replace(integration.thresholds, level=level)
     integration = replace(integration, thresholds=thresholds)
+    if near is not None and near._orbit is not None:
+        cycle = _closed(integration, near._orbit.first, near.slips, near.period)
+        if cycle is not None:
+            return cycle
     before = (Programme(slide, load=W0, velocity=share * V) for share in _SLOWER)
-    cycle = _followed(integration, steady_start(motion, next(before)))
+    cycle = _followed(integration, steady_start(motion, next(before))[:-1])
     if cycle.end is CycleEnd.STOPPED and _TOO_MANY not in cycle.result:
-        smaller = _followed(integration, steady_start(motion, next(before)))
+        smaller = _followed(integration, steady_start(motion, next(before))[:-1])
         if smaller.end is CycleEnd.STEADY:
             smaller = replace(smaller, result=f"{smaller.result}; from farther off {cycle.result}")
         cycle = cycle if smaller.end is CycleEnd.STOPPED else smaller
@@ -232,114 +395,109 @@ def limit_cycle(
 
 def _followed(integration: Integration, Y: Float) -> LimitCycle:
     """The cycle that a motion from the states comes to."""
-    motion = integration.motion
-    sections = _Sections(motion.mechanical)
-    needed, count = 2, 0
-    run = _Run(None)
+    falls: list[Float] = []
+    count = 0
     while count < _MOST_CYCLES:
-        following = replace(integration, checkpoint=Checkpoint(0, 0.0, Y))
-        for part in following.segment_parts():
-            run.add(part)
-            if part.termination is not None:
-                many = part.termination.kind == "too many steps"
-                return _stopped(_TOO_MANY if many else str(part.termination))
-            if any(event.kind == "steady" for event in part.events):
-                return LimitCycle(CycleEnd.STEADY, CycleEnd.STEADY.value)
-            if len(run.cycles) >= needed:
-                break
-            if following.steps > _MOST_STEPS:
-                return _stopped(_TOO_MANY)
+        run = _motion(integration, Y, 0.0 if falls else None, 1 if falls else 2)
+        if isinstance(run, LimitCycle):
+            return run
         if not run.cycles:
             return _stopped("the force does not come back to that of steady sliding")
         count += len(run.cycles)
-        highs, lows = (np.array([c[i] for c in run.cycles]) for i in (2, 1))
-        amplitude = (run.samples(highs).force - run.samples(lows).force)[-1]
-        if amplitude < _STEADY:
+        falls += list(run.states(np.array([c.end for c in run.cycles]))[:-1].T)
+        Y = falls[-1]
+        sizes = [
+            _size(integration.motion, Y - before, Y) for before in falls[-2 : -2 - _MOST_SLIPS : -1]
+        ]
+        slips = int(np.argmin(sizes)) + 1
+        last = run.cycles[-min(slips, len(run.cycles)) :]
+        period = (last[-1].end - last[0].begin) * slips / len(last)
+        cycle = _closed(integration, Y, slips, period)
+        if cycle is not None:
+            return cycle
+    return LimitCycle(CycleEnd.IRREGULAR, CycleEnd.IRREGULAR.value)
+
+
+def _motion(
+    integration: Integration, Y: Float, fall: float | None, needed: int
+) -> _Run | LimitCycle:
+    """The motion from states over a number of cycles, or where it ends before."""
+    following = replace(integration, checkpoint=Checkpoint(0, fall or 0.0, np.append(Y, 0.0)))
+    run = _Run(fall)
+    for part in following.segment_parts():
+        run.add(part)
+        if part.termination is not None:
+            many = part.termination.kind == "too many steps"
+            return _stopped(_TOO_MANY if many else str(part.termination))
+        if any(event.kind == "steady" for event in part.events):
             return LimitCycle(CycleEnd.STEADY, CycleEnd.STEADY.value)
-        sections.add(run.states(np.array([c.end for c in run.cycles]))[:-1].T)
-        slips = sections.repeated()
-        if slips and slips <= len(run.cycles):
-            return _described(run, slips, float(motion.V))
-        needed = max(slips, 1)
-        Y = np.append(sections.next(), 0.0)
-        run = _Run(0.0)
-    end = CycleEnd.SLOW if sections.tends else CycleEnd.IRREGULAR
-    return LimitCycle(end, end.value)
+        if len(run.cycles) >= needed:
+            break
+        if following.steps > _MOST_STEPS:
+            return _stopped(_TOO_MANY)
+    if run.cycles:
+        highs, lows = (np.array([c[i] for c in run.cycles]) for i in (2, 1))
+        if (run.samples(highs).force - run.samples(lows).force)[-1] < _STEADY:
+            return LimitCycle(CycleEnd.STEADY, CycleEnd.STEADY.value)
+    return run
+
+
+def _closed(integration: Integration, Y: Float, slips: int, period: float) -> LimitCycle | None:
+    """The stable cycle of so many slips near states at a fall, by Newton's method."""
+    tolerance = _CLOSED * integration.tolerances.rtol
+    end = integration.programme.duration
+    for _ in range(_PASSES):
+        # From where little more than a period is left, so that no steps are wasted.
+        run = _motion(integration, Y, max(end - _LONGER * period, 0.0), slips)
+        if isinstance(run, LimitCycle) or len(run.cycles) < slips:
+            return None
+        try:
+            orbit = _Orbit.of(run, run.cycles[0].begin, run.cycles[slips - 1].end)
+            size = _size(integration.motion, orbit.step, orbit.first)
+        except np.linalg.LinAlgError:  # of rates that are not finite, or at a fold
+            return None
+        if not size < _NEAR:
+            return None
+        if size < tolerance:
+            fewer = _fewer(orbit, slips, tolerance)
+            if fewer < slips:
+                return _closed(integration, orbit.first, fewer, period * fewer / slips)
+            return _described(orbit, slips) if orbit.stable else None
+        Y, period = orbit.first + orbit.step, orbit.period
+    return None
+
+
+def _fewer(orbit: _Orbit, slips: int, tolerance: float) -> int:
+    """After how many slips the states are the first ones already."""
+    for count in range(1, slips):
+        after = orbit.run.states(np.array([orbit.run.cycles[count - 1].end]))[:-1, 0]
+        if slips % count == 0 and _size(orbit.motion, after - orbit.first, after) < 2 * tolerance:
+            return count
+    return slips
+
+
+def _size(motion: Motion, change: Float, states: Float) -> float:
+    """Largest change of a state: of logarithms and of F/W0, and relative of velocities."""
+    scale = np.ones(len(states))
+    linear = [i for i, name in enumerate(motion.mechanical) if name == "velocity"]
+    scale[linear] = np.abs(states[linear])
+    return float(np.abs(change / scale).max())
 
 
 def _stopped(why: str) -> LimitCycle:
     return LimitCycle(CycleEnd.STOPPED, CycleEnd.STOPPED.value + why)
 
 
-def _described(run: _Run, slips: int, V: float) -> LimitCycle:
-    """The last period of a motion."""
-    cycles = run.cycles[-slips:]
-    begin, end = cycles[0].begin, cycles[-1].end
+def _described(orbit: _Orbit, slips: int) -> LimitCycle:
+    """A cycle from its orbit."""
+    run = orbit.run
+    cycles = run.cycles[:slips]
     lows, highs = (np.array([getattr(c, name) for c in cycles]) for name in ("trough", "peak"))
     stick = float(np.sum(highs - lows))
     peak = float(run.samples(highs).force.max())
     lowest = float(run.samples(lows).force.min())
     sentence = CycleEnd.REPEATS.value + (f", {slips} slips in a period" if slips > 1 else "")
     return LimitCycle(
-        CycleEnd.REPEATS, sentence, slips, end - begin, stick, end - begin - stick, peak, lowest,
-        V * run.fastest(begin, end), run, float(highs[-1]), begin,
+        CycleEnd.REPEATS, sentence, slips, orbit.period, stick, orbit.period - stick, peak, lowest,
+        orbit, float(highs[-1]),
     )  # fmt: skip
-
-
-class _Sections:
-    """States at the falls of the force, one after the other."""
-
-    def __init__(self, mechanical: tuple[str, ...]) -> None:
-        self._linear = [i for i, name in enumerate(mechanical) if name == "velocity"]
-        self._states: list[Float] = []
-        #: Ratio of changes over so many slips, as they showed it last.
-        self._ratios: dict[int, float] = {}
-        self.tends = False
-
-    def add(self, states: Float) -> None:
-        """Add states, shape (n, size)."""
-        self._states += list(states)
-
-    def _change(self, slips: int, before: int = 0) -> Float | None:
-        """Change over so many slips, the last of them or so many before."""
-        if len(self._states) <= slips + before:
-            return None
-        new, old = self._states[-1 - before], self._states[-1 - before - slips]
-        change = new - old
-        # A velocity counts relatively.
-        change[self._linear] /= np.abs(new[self._linear])
-        return np.asarray(change)
-
-    def repeated(self) -> int:
-        """After how many slips the motion repeats itself; 0 where it does not."""
-        for slips in range(1, _MOST_SLIPS + 1):
-            last, before = self._change(slips), self._change(slips, slips)
-            if last is None or before is None:
-                return 0
-            size, old = np.abs(last).max(), np.abs(before).max()
-            if old > _ERRORS:
-                self._ratios[slips] = size / old
-            # Where no change was larger the cycle before is forgotten within one.
-            ratio = self._ratios.get(slips, 0.0)
-            if ratio < 1 and size * max(ratio / (1 - ratio), 1.0) < _REPEATED:
-                return slips
-            if size < _SAME:
-                return 0
-        return 0
-
-    def next(self) -> Float:
-        """States from which to go on: the last ones, or those to which the changes tend."""
-        last, before = self._change(1), self._change(1, 1)
-        self.tends = False
-        if last is None or before is None:
-            return self._states[-1]
-        ratio = float(last @ before / (before @ before))
-        cosine = float(last @ before / (np.linalg.norm(last) * np.linalg.norm(before)))
-        self.tends = cosine > _ALIGNED and _SLOW < ratio < 1
-        if not self.tends:
-            return self._states[-1]
-        left = (self._states[-1] - self._states[-2]) * (ratio / (1 - ratio))
-        size = np.abs(left).max()
-        ahead = self._states[-1] + left * min(1.0, _FAR / size)
-        self._states = [ahead]
-        return ahead

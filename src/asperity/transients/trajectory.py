@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.errors import InputError
+from asperity.laws import LinkerDieterich, RiceRuina
 from asperity.loads.programme.programme import BREAK
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
@@ -199,9 +201,9 @@ Float = NDArray[np.float64]
 def row_bytes(law_states: int) -> int:
     """Bytes of one row of a trajectory, in memory and in a file, at most.
 
-    Six channels, up to three mechanical states and those of the law, 8 bytes each.
+    Seven channels, up to three mechanical states and those of the law, 8 bytes each.
     """
-    return 8 * (6 + 3 + law_states)
+    return 8 * (7 + 3 + law_states)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -271,6 +273,18 @@ class Trajectory(Drawn):
         return self.force / self.load
 
     @property
+    def age(self) -> Float | None:
+        """Age Phi of the contacts (s), theta in geophysics; None for a law whose state is none."""
+        law = self.motion.slider.law
+        ages = (RiceRuina.state_names, LinkerDieterich.state_names)
+        if not isinstance(law, RiceRuina) or law.state_names[:1] not in ages:
+            return None
+        first = len(self.motion.mechanical)
+        states = tuple(jnp.asarray(self.states[:, first:]).T)
+        w = jnp.asarray(self.load / float(self.motion.slider.W0))
+        return np.asarray(law.D0 / law.V0 * jnp.exp(law.log_age(states, w)))
+
+    @property
     def stopped(self) -> str | None:
         """Reason why the trajectory ends before the programme; None if it does not."""
         return None if self.termination is None else str(self.termination)
@@ -315,7 +329,10 @@ class Trajectory(Drawn):
             return "time", values, {"units": units, "long_name": name, **recorded}
 
         about = {"long_name": "state of the equation of motion", "units": "1"}
+        age = self.age
+        aged = {} if age is None else {"age": channel(age, "s", "age of the contacts")}
         data = {
+            **aged,
             "force": channel(self.force, "N", "spring force", "F"),
             "friction": channel(self.friction, "1", "spring force over normal load"),
             "load": channel(self.load, "N", "normal load", "W"),

@@ -186,10 +186,8 @@ def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
         )
     bad = array[~np.isfinite(array)]
     if bad.size:
-        raise InputError(
-            f"{name} must be finite, got {bad.flat[0]} {spec.si}".rstrip()
-            + f"; give a value like '{spec.example}'"
-        )
+        got = f"{bad.flat[0]} {spec.si}".rstrip()
+        raise InputError(name, "be finite", got, f"give a value like '{spec.example}'")
     if array.ndim == 0 and isinstance(value, int | float | np.generic):
         return float(value)
     if not hasattr(value, "astype"):  # a range, for one

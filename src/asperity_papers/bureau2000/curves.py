@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from asperity.ledger import FigureNumbers, figure_words
 from asperity_papers.bureau2000.machine import (
     EXT,
     PAPER,
-    STRONGEST,
+    SLOW,
     Float,
     Machine,
     steady_multiplier,
@@ -167,12 +167,71 @@ def with_inertia(name: str) -> str:
     return f"{name}, inertia"
 
 
+def speed_curves(
+    machine: Machine, law: str, applied: Float, share: float = 1.0, case: str = "", **others: Any
+) -> list[FigureCurve]:
+    """A curve at each of the two velocities; names are "`case`, 1 um/s" or "1 um/s" alone."""
+    return [
+        FigureCurve(f"{case}, {name}" if case else name, law, V, applied, share, **others)
+        for name, V in machine.speeds
+    ]
+
+
+def elastic_curves(machine: Machine, applied: Float, share: float = 1.0) -> list[FigureCurve]:
+    """The elasto-plastic law at both velocities, with the mass, and at the ends of `variations`."""
+    moved = [
+        replace(curve, name=with_inertia(curve.name), inertia=True)
+        for curve in speed_curves(machine, EXT, applied, share)
+    ]
+    # Named "1 um/s, A low" etc.
+    ends = [
+        FigureCurve(f"{SLOW}, {end}", EXT, machine.velocities[0], applied, share, None, overrides)
+        for end, overrides in variations(machine).items()
+    ]
+    return [*speed_curves(machine, EXT, applied, share), *moved, *ends]
+
+
+@dataclass(frozen=True)
+class CurveFigure:
+    """A figure made of curves.
+
+    Attributes
+    ----------
+    name : str
+    curves : function
+        The curves, from the machine.
+    read : function
+        From the machine and the solved curves to the numbers for the head of the table, and
+        further ones that the caption quotes.
+    """
+
+    name: str
+    curves: Callable[[Machine], Iterable[FigureCurve]]
+    read: Callable[[Machine, FigureNumbers], tuple[dict[str, float], dict[str, float]]]
+
+    def __call__(self, machine: Machine) -> FigureNumbers:
+        """Solve the curves, and read the numbers off them."""
+        data = solve_curves(machine, self.curves(machine))
+        scalars, quoted = self.read(machine, FigureNumbers(self.name, data, COLUMNS))
+        return figure_numbers(machine, self.name, data, scalars, quoted=quoted)
+
+
+def curve_figure(
+    name: str, curves: Callable[[Machine], Iterable[FigureCurve]]
+) -> Callable[..., CurveFigure]:
+    """Make a function that reads numbers off solved curves a `CurveFigure`."""
+    return lambda read: CurveFigure(name, curves, read)
+
+
 def figure_numbers(
     machine: Machine,
     name: str,
     data: pd.DataFrame,
     scalars: Mapping[str, float],
-    **others: Any,
+    *,
+    columns: Mapping[str, str] = COLUMNS,
+    quoted: Mapping[str, float] | None = None,
+    points: pd.DataFrame | None = None,
 ) -> FigureNumbers:
     """A figure with curves, and what the text states for its captions and marks."""
     seen = machine.stated()
@@ -182,11 +241,10 @@ def figure_numbers(
         "collapse": seen.collapse,
         "onset": machine.numbers.epsilon_onset,
     }
-    for quantity, pair in {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2}.items():
+    pairs = {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2, "ratio": seen.ratio}
+    for quantity, pair in pairs.items():
         stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
-    stated["stated ratio 1"], stated["stated ratio 2"] = seen.ratio
-    quoted = stated | others.pop("quoted", {})
-    return FigureNumbers(name, data, others.pop("columns", COLUMNS), scalars, quoted, **others)
+    return FigureNumbers(name, data, columns, scalars, stated | dict(quoted or {}), points)
 
 
 # --- How far the published uncertainties of A, B and lambda move a curve --------------------------
@@ -209,17 +267,7 @@ def variations(machine: Machine) -> dict[str, dict[str, float]]:
     return ends
 
 
-def band_curves(
-    machine: Machine, name: str, V: float, applied: Float, share: float = 1.0
-) -> list[FigureCurve]:
-    """Curves of the elasto-plastic law at the ends of `variations`, named "`name`, A low" etc."""
-    return [
-        FigureCurve(f"{name}, {end}", EXT, V, applied, share, overrides=overrides)
-        for end, overrides in variations(machine).items()
-    ]
-
-
-def band_ends(machine: Machine, numbers: FigureNumbers, name: str, column: str) -> dict[str, float]:
-    """Value at eps = 0.5 for each end of `variations`."""
-    at = STRONGEST * machine.share
-    return {end: numbers.at(f"{name}, {end}", column, at, BORNE) for end in variations(machine)}
+def band_ends(machine: Machine, numbers: FigureNumbers, column: str) -> dict[str, float]:
+    """Value at eps = 0.5 and the slow velocity for each end of `variations`."""
+    at = machine.strongest
+    return {end: numbers.at(f"{SLOW}, {end}", column, at, BORNE) for end in variations(machine)}

@@ -12,7 +12,7 @@ import pandas as pd
 import asperity as asp
 from asperity.ledger import FigureNumbers, FigureTable, PaperFigure, Section
 from asperity_papers.bureau2000 import harmonics, mean, motion, schematics, stability
-from asperity_papers.bureau2000.curves import COLUMNS, WORDS, FigureCurve
+from asperity_papers.bureau2000.curves import COLUMNS, WORDS
 from asperity_papers.bureau2000.machine import PAPER, Machine
 from asperity_papers.bureau2000.virtual import (
     POINT_COLUMNS,
@@ -26,34 +26,19 @@ from asperity_papers.bureau2000.virtual.figures import introduction, provenance,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: What computes each figure, in the order of the paper; the last four are not in it.
+#: Figures made of curves: those of the paper, and three that are not in it.
+_OF_THE_PAPER = (
+    *(mean.figure_2, mean.figure_3, mean.figure_5, mean.figure_6, mean.figure_7),
+    *(harmonics.figure_4, harmonics.figure_8, harmonics.figure_9, harmonics.figure_11),
+)
+_FURTHER = (stability.floquet_figure, harmonics.phase_figure, motion.resonance_figure)
+#: What computes each figure.
 NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
-    "figure-02": mean.figure_2,
-    "figure-03": mean.figure_3,
-    "figure-04": harmonics.figure_4,
-    "figure-05": mean.figure_5,
-    "figure-06": mean.figure_6,
-    "figure-07": mean.figure_7,
-    "figure-08": harmonics.figure_8,
-    "figure-09": harmonics.figure_9,
-    "figure-11": harmonics.figure_11,
-    "figure-12": stability.floquet_figure,
+    **{figure.name: figure for figure in (*_OF_THE_PAPER, *_FURTHER)},
     "figure-13": motion.period_figure,
-    "figure-14": harmonics.phase_figure,
-    "figure-15": motion.resonance_figure,
 }
 #: Lines of each figure of the paper.
-CURVES: Mapping[str, Callable[[Machine], list[FigureCurve]]] = {
-    "figure-02": mean.curves_2,
-    "figure-03": mean.curves_3,
-    "figure-04": harmonics.curves_4,
-    "figure-05": mean.curves_5,
-    "figure-06": mean.curves_6,
-    "figure-07": mean.curves_7,
-    "figure-08": harmonics.curves_8,
-    "figure-09": harmonics.curves_9,
-    "figure-11": harmonics.curves_11,
-}
+CURVES = {figure.name: figure.curves for figure in sorted(_OF_THE_PAPER, key=lambda f: f.name)}
 #: Figures with more than their plot.
 DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
     "figure-03": mean.draw_3,
@@ -61,8 +46,7 @@ DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
 }
 #: Figures without numbers.
 SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
-    "figure-01": schematics.draw_1,
-    "figure-10": schematics.draw_10,
+    name: partial(schematics.draw, name) for name in ("figure-01", "figure-10")
 }
 
 

@@ -8,13 +8,15 @@ from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import (
     BORNE,
     FigureCurve,
-    band_curves,
     band_ends,
-    figure_numbers,
-    solve_curves,
+    curve_figure,
+    elastic_curves,
+    speed_curves,
     with_inertia,
 )
-from asperity_papers.bureau2000.machine import EXT, FAST, LD, RR, SLOW, SPEEDS, Float, Machine
+from asperity_papers.bureau2000.machine import EXT, FAST, LD, RR, SLOW, SPEEDS, Machine
+
+Numbers = dict[str, float]
 
 
 def pulse_limit(machine: Machine, velocity: float) -> float:
@@ -42,28 +44,17 @@ def late_over_early_slope(numbers: FigureNumbers, curve: str, column: str) -> fl
     return float((y[-1] - y[-1 - tenth]) / (x[-1] - x[-1 - tenth]) / (y[-1] / x[-1]))
 
 
-def _elastic(machine: Machine, eps: Float, share: float = 1.0) -> list[FigureCurve]:
-    """Both velocities, with the mass and at the ends of the uncertainties."""
-    named = list(zip(SPEEDS, machine.velocities, strict=True))
-    return [
-        *(FigureCurve(name, EXT, V, eps, share) for name, V in named),
-        *(FigureCurve(with_inertia(name), EXT, V, eps, share, inertia=True) for name, V in named),
-        *band_curves(machine, SLOW, machine.velocities[0], eps, share),
-    ]
-
-
 def curves_4(machine: Machine) -> list[FigureCurve]:
     """The elasto-plastic law against eps."""
-    return _elastic(machine, machine.applied_amplitudes(), machine.share)
+    return elastic_curves(machine, machine.applied_amplitudes(), machine.share)
 
 
-def figure_4(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-04", curves_4)
+def figure_4(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Harmonics against eps at 120 Hz."""
-    data = solve_curves(machine, curves_4(machine))
-    read = figure_numbers(machine, "", data, {})
     mu1, mu2 = ([read.last(name, column) for name in SPEEDS] for column in ("mu1", "mu2"))
     inertial = [read.last(with_inertia(name), "mu2") for name in SPEEDS]
-    scalars = {
+    return {
         "mu1_slow": mu1[0],
         "mu1_fast": mu1[1],
         "mu2_slow": mu2[0],
@@ -72,55 +63,42 @@ def figure_4(machine: Machine) -> FigureNumbers:
         "mu2_inertia_fast": inertial[1],
         "ratio_slow": mu2[0] / mu1[0],
         "ratio_fast": mu2[1] / mu1[1],
-        **{f"mu1 {end}": v for end, v in band_ends(machine, read, SLOW, "mu1").items()},
-    }
-    quoted = {"inertia slow": inertial[0] / mu2[0], "inertia fast": inertial[1] / mu2[1]}
-    return figure_numbers(machine, "figure-04", data, scalars, quoted=quoted)
+        **{f"mu1 {end}": v for end, v in band_ends(machine, read, "mu1").items()},
+    }, {"inertia slow": inertial[0] / mu2[0], "inertia fast": inertial[1] / mu2[1]}
 
 
 def curves_8(machine: Machine) -> list[FigureCurve]:
     """Rice-Ruina at both velocities."""
-    eps = machine.borne_amplitudes()
-    return [
-        FigureCurve(name, RR, V, eps) for name, V in zip(SPEEDS, machine.velocities, strict=True)
-    ]
+    return speed_curves(machine, RR, machine.borne_amplitudes())
 
 
-def figure_8(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-08", curves_8)
+def figure_8(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Rice-Ruina: harmonics against eps_eff."""
-    data = solve_curves(machine, curves_8(machine))
-    read = figure_numbers(machine, "", data, {})
     limits = [pulse_limit(machine, V) for V in machine.velocities]
-    scalars = {
+    return {
         "growth_mu1": read.last(FAST, "mu1") / read.last(SLOW, "mu1"),
         "growth_mu2": read.last(FAST, "mu2") / read.last(SLOW, "mu2"),
         "share_of_limit": read.last(FAST, "mu1") / limits[1],
         "limit_slow": limits[0],
         "limit_fast": limits[1],
-    }
-    halves = {"limit of mu2, slow": limits[0] / 2, "limit of mu2, fast": limits[1] / 2}
-    return figure_numbers(machine, "figure-08", data, scalars, quoted=halves)
+    }, {"limit of mu2, slow": limits[0] / 2, "limit of mu2, fast": limits[1] / 2}
 
 
 def curves_9(machine: Machine) -> list[FigureCurve]:
     """Two coefficients at both velocities, and Rice-Ruina."""
     p, eps = machine.numbers, machine.borne_amplitudes()
-    named = list(zip(SPEEDS, machine.velocities, strict=True))
-    return [
-        *(
-            FigureCurve(f"alpha = {a:g}, {name}", LD, V, eps, overrides={"alpha": a})
-            for a in (p.alpha, p.alpha_low)
-            for name, V in named
-        ),
-        *(FigureCurve(f"RR, {name}", RR, V, eps) for name, V in named),
-    ]
+    high, low = (
+        speed_curves(machine, LD, eps, case=f"alpha = {a:g}", overrides={"alpha": a})
+        for a in (p.alpha, p.alpha_low)
+    )
+    return [*high, *low, *speed_curves(machine, RR, eps, case="RR")]
 
 
-def figure_9(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-09", curves_9)
+def figure_9(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Linker-Dieterich with two coefficients, and Rice-Ruina to hold it against."""
     p, seen = machine.numbers, machine.stated()
-    data = solve_curves(machine, curves_9(machine))
-    read = figure_numbers(machine, "", data, {})
 
     def at(curve: str, column: str) -> float:
         return read.at(curve, column, float(seen.epsilon_eff), BORNE)
@@ -131,32 +109,29 @@ def figure_9(machine: Machine) -> FigureNumbers:
         f"low_alpha_{n}": at(f"{low}, {FAST}", n) / at(f"RR, {FAST}", n) - 1
         for n in ("delta_mu", "mu1", "mu2")
     }
-    scalars = {
+    return {
         "share_of_drop": drops[high] / seen.drops[0],
         "low_over_high": drops[low] / drops[high],
         **near,
-    }
-    sizes = {f"size of {name}": abs(value) for name, value in near.items()}
-    return figure_numbers(machine, "figure-09", data, scalars, quoted=sizes)
+    }, {f"size of {name}": abs(value) for name, value in near.items()}
 
 
 def curves_11(machine: Machine) -> list[FigureCurve]:
     """The elasto-plastic law against eps_eff."""
-    return _elastic(machine, machine.borne_amplitudes())
+    return elastic_curves(machine, machine.borne_amplitudes())
 
 
-def figure_11(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-11", curves_11)
+def figure_11(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """The elasto-plastic law, what the uncertainties make of it, and inertia."""
-    data = solve_curves(machine, curves_11(machine))
-    read, at = figure_numbers(machine, "", data, {}), machine.stated().epsilon_eff
-    slope = elastic_slope(machine, machine.velocities[0])
+    at, slope = machine.strongest, elastic_slope(machine, machine.velocities[0])
     mu1, mu2, inertial = (
         [read.at(curve, column, at, BORNE) for curve in curves]
         for column, curves in (
             ("mu1", SPEEDS), ("mu2", SPEEDS), ("mu2", map(with_inertia, SPEEDS))
         )
     )  # fmt: skip
-    scalars = {
+    return {
         "growth_mu1": mu1[1] / mu1[0],
         "growth_mu2": mu2[1] / mu2[0],
         "late_over_early_slow": late_over_early_slope(read, SLOW, "mu1"),
@@ -165,35 +140,29 @@ def figure_11(machine: Machine) -> FigureNumbers:
         "elastic_slope": slope,
         "inertia_mu2_slow": inertial[0] / mu2[0],
         "inertia_mu2_fast": inertial[1] / mu2[1],
-        **{f"mu1 {end}": v for end, v in band_ends(machine, read, SLOW, "mu1").items()},
-    }
-    return figure_numbers(machine, "figure-11", data, scalars)
+        **{f"mu1 {end}": v for end, v in band_ends(machine, read, "mu1").items()},
+    }, {}
 
 
-def phase_figure(machine: Machine) -> FigureNumbers:
+def phase_curves(machine: Machine) -> list[FigureCurve]:
+    """Three laws, and the elasto-plastic one with the mass, at both velocities."""
+    eps, alpha = machine.borne_amplitudes(), {"alpha": float(machine.numbers.alpha)}
+    return [
+        *speed_curves(machine, RR, eps, case="RR"),
+        *speed_curves(machine, LD, eps, case="LD", overrides=alpha),
+        *speed_curves(machine, EXT, eps, case="EXT"),
+        *speed_curves(machine, EXT, eps, case=with_inertia("EXT"), inertia=True),
+    ]
+
+
+@curve_figure("figure-14", phase_curves)
+def phase_figure(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Phases against eps_eff, by law and velocity.
 
     The paper measures amplitudes with a lock-in amplifier, which gives the phases as well.
     """
-    cases: dict[str, tuple[str, dict[str, float], bool]] = {
-        "RR": (RR, {}, False),
-        "LD": (LD, {"alpha": float(machine.numbers.alpha)}, False),
-        "EXT": (EXT, {}, False),
-        with_inertia("EXT"): (EXT, {}, True),
-    }
-    eps = machine.borne_amplitudes()
-    data = solve_curves(
-        machine,
-        (
-            FigureCurve(f"{case}, {name}", law, V, eps, overrides=overrides, inertia=inertia)
-            for case, (law, overrides, inertia) in cases.items()
-            for name, V in zip(SPEEDS, machine.velocities, strict=True)
-        ),
-    )
-    read, at = figure_numbers(machine, "", data, {}), machine.stated().epsilon_eff
-    degrees = {
-        f"{column} {curve}": float(np.degrees(read.at(curve, column, at, BORNE)))
-        for curve in data["curve"].unique()
+    return {
+        f"{column} {curve}": float(np.degrees(read.at(curve, column, machine.strongest, BORNE)))
+        for curve in read.data["curve"].unique()
         for column in ("phase1", "phase2")
-    }
-    return figure_numbers(machine, "figure-14", data, degrees)
+    }, {}

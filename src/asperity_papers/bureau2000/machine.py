@@ -84,6 +84,11 @@ class Machine:
         slow, fast = self.numbers["V_data"].si_values or (np.nan, np.nan)
         return slow, fast
 
+    @property
+    def speeds(self) -> tuple[tuple[str, float], ...]:
+        """The names of the two velocities, and their values (m/s)."""
+        return tuple(zip(SPEEDS, self.velocities, strict=True))
+
     def range_of(self, name: str) -> Pair:
         """Both ends of a printed range (SI)."""
         return self.numbers[name].si_range or (np.nan, np.nan)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from asperity.figures import COLOURS
 from asperity.ledger import FigureNumbers
@@ -14,10 +13,10 @@ from asperity_papers.bureau2000.curves import (
     BORNE,
     WORDS,
     FigureCurve,
-    band_curves,
     band_ends,
-    figure_numbers,
-    solve_curves,
+    curve_figure,
+    elastic_curves,
+    speed_curves,
     with_inertia,
 )
 from asperity_papers.bureau2000.machine import EXT, RR, SLOW, SPEEDS, STRONGEST, Float, Machine
@@ -25,17 +24,14 @@ from asperity_papers.bureau2000.machine import EXT, RR, SLOW, SPEEDS, STRONGEST,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Numbers = dict[str, float]
+
 #: Velocities per decade in figure 3.
 _PER_DECADE = 12
 #: Degrees that a line is tilted in figure 3 as printed, for a slope of 1 in ln V.
 _TILT = 1180.0
 #: Curves of figure 5, with what bears the load.
 VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
-
-
-def _bare(machine: Machine, data: pd.DataFrame) -> FigureNumbers:
-    """Curves to read numbers off."""
-    return figure_numbers(machine, "", data, {})
 
 
 def drops(numbers: FigureNumbers, suffix: str = "") -> list[float]:
@@ -54,27 +50,24 @@ def relative_drops(machine: Machine, numbers: FigureNumbers, suffix: str = "") -
 
 def curves_2(machine: Machine) -> list[FigureCurve]:
     """Both velocities, with the mass and at the ends of the uncertainties; the computed layer."""
-    eps, share, slow = machine.applied_amplitudes(), machine.share, machine.velocities[0]
-    named = list(zip(SPEEDS, machine.velocities, strict=True))
+    eps, slow = machine.applied_amplitudes(), machine.velocities[0]
     layer = machine.borne(machine.numbers.frequency, machine.air_layer())
     return [
-        *(FigureCurve(name, EXT, V, eps, share) for name, V in named),
-        *(FigureCurve(with_inertia(name), EXT, V, eps, share, inertia=True) for name, V in named),
-        *band_curves(machine, SLOW, slow, eps, share),
+        *elastic_curves(machine, eps, machine.share),
         FigureCurve("air layer", EXT, slow, eps, layer),
     ]
 
 
-def figure_2(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-02", curves_2)
+def figure_2(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Change of the mean against eps at 120 Hz."""
-    data = solve_curves(machine, curves_2(machine))
-    read, mu_slow = _bare(machine, data), machine.mu_ss(machine.velocities[0])
+    mu_slow = machine.mu_ss(machine.velocities[0])
     slope, intercept, straightness = _straight_line(read, machine.numbers.epsilon_onset)
     drop = drops(read)
     relative = relative_drops(machine, read)
     inertial = relative_drops(machine, read, ", inertia")
-    ends = band_ends(machine, read, SLOW, "delta_mu")
-    scalars = {
+    ends = band_ends(machine, read, "delta_mu")
+    return {
         "drop_slow": drop[0],
         "drop_fast": drop[1],
         "relative_drop_slow": relative[0] / 100,
@@ -86,9 +79,7 @@ def figure_2(machine: Machine) -> FigureNumbers:
         "intercept": intercept,
         "departure_from_line": straightness,
         "transmission_air": machine.borne(machine.numbers.frequency, machine.air_layer()),
-    }
-    by_A = {f"relative drop A {end}": -ends[f"A {end}"] / mu_slow for end in ("low", "high")}
-    return figure_numbers(machine, "figure-02", data, scalars, quoted=by_A)
+    }, {f"relative drop A {end}": -ends[f"A {end}"] / mu_slow for end in ("low", "high")}
 
 
 def _straight_line(read: FigureNumbers, onset: float) -> tuple[float, float, float]:
@@ -116,14 +107,13 @@ def curves_3(machine: Machine) -> list[FigureCurve]:
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
 
 
-def figure_3(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-03", curves_3)
+def figure_3(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Mean against V for four amplitudes."""
-    data = solve_curves(machine, curves_3(machine))
-    scalars = {
+    return {
         f"slope_{eps:g}": float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
-        for eps, rows in data.groupby(APPLIED, sort=False)
-    }
-    return figure_numbers(machine, "figure-03", data, scalars)
+        for eps, rows in read.data.groupby(APPLIED, sort=False)
+    }, {}
 
 
 def draw_3(numbers: FigureNumbers) -> Figure:
@@ -178,23 +168,19 @@ def curves_5(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-def figure_5(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-05", curves_5)
+def figure_5(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Change of the mean in air and in vacuum, at 200 Hz."""
-    p, data = machine.numbers, solve_curves(machine, curves_5(machine))
-    vacuum, air = vacuum_shares(machine)
-    disc = machine.borne(p.frequency_vacuum, machine.air_layer())
-    read = _bare(machine, data)
-    ends = {name: read.last(name, "delta_mu") for name in data["curve"].unique()}
-    scalars = {
+    p, (vacuum, air) = machine.numbers, vacuum_shares(machine)
+    disc, mu = machine.borne(p.frequency_vacuum, machine.air_layer()), machine.mu_ss(p.V_vacuum)
+    ends = {name: read.last(name, "delta_mu") for name in read.data["curve"].unique()}
+    percent = {f"relative drop {name}": -value / mu for name, value in ends.items()}
+    return {
         "transmission_vacuum": vacuum,
         "transmission_air": disc,
         "air_over_vacuum": disc / vacuum,
         **{f"drop {name}": value for name, value in ends.items()},
-    }
-    mu = machine.mu_ss(p.V_vacuum)
-    percent = {f"relative drop {name}": -value / mu for name, value in ends.items()}
-    in_air = {"transmission in air": air}
-    return figure_numbers(machine, "figure-05", data, scalars, quoted=percent | in_air)
+    }, percent | {"transmission in air": air}
 
 
 # --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
@@ -202,27 +188,19 @@ def figure_5(machine: Machine) -> FigureNumbers:
 
 def curves_6(machine: Machine) -> list[FigureCurve]:
     """Both velocities, all of the load borne by the contacts."""
-    eps = machine.applied_amplitudes()
-    return [
-        FigureCurve(name, RR, V, eps) for name, V in zip(SPEEDS, machine.velocities, strict=True)
-    ]
+    return speed_curves(machine, RR, machine.applied_amplitudes())
 
 
-def figure_6(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-06", curves_6)
+def figure_6(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Rice-Ruina: change of the mean against eps."""
-    data = solve_curves(machine, curves_6(machine))
-    read = _bare(machine, data)
     drop, relative = drops(read), relative_drops(machine, read)
-    scalars = {
+    return {
         "drop_slow": drop[0],
         "drop_fast": drop[1],
         "relative_drop_slow": relative[0] / 100,
         "relative_drop_fast": relative[1] / 100,
-    }
-    quoted = {
-        "slow over fast": drop[0] / drop[1] - 1, "points between": relative[0] - relative[1]
-    }  # fmt: skip
-    return figure_numbers(machine, "figure-06", data, scalars, quoted=quoted)
+    }, {"slow over fast": drop[0] / drop[1] - 1, "points between": relative[0] - relative[1]}
 
 
 def curves_7(machine: Machine) -> list[FigureCurve]:
@@ -230,18 +208,16 @@ def curves_7(machine: Machine) -> list[FigureCurve]:
     return curves_6(machine)[:1]
 
 
-def figure_7(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-07", curves_7)
+def figure_7(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop."""
-    data = solve_curves(machine, curves_7(machine))
-    read, drop = _bare(machine, data), machine.stated().drops[0]
-    there = read.at(SLOW, "delta_mu", STRONGEST * machine.share, BORNE)
+    data, drop = read.data, machine.stated().drops[0]
     needed = float(np.interp(-drop, -data["delta_mu"], data[BORNE]))
-    scalars = {
-        "drop_at_scaled": there,
+    return {
+        "drop_at_scaled": read.at(SLOW, "delta_mu", machine.strongest, BORNE),
         "epsilon_needed": needed,
         "share_needed": needed / STRONGEST,
-    }
-    return figure_numbers(machine, "figure-07", data, scalars)
+    }, {}
 
 
 def draw_7(numbers: FigureNumbers) -> Figure:

@@ -17,7 +17,7 @@ import pandas as pd
 from asperity import periodic_response
 from asperity.ledger import FigureNumbers
 from asperity.orbit import over_a_period
-from asperity_papers.bureau2000.curves import FigureCurve, figure_numbers, solve_curves
+from asperity_papers.bureau2000.curves import FigureCurve, curve_figure, figure_numbers
 from asperity_papers.bureau2000.machine import EXT, EXT_AGE, Float, Machine
 
 #: Instants of the period: pulses of slip are a third of a radian wide and less.
@@ -120,16 +120,9 @@ def contact_damping(machine: Machine, quality: float = QUALITY) -> float:
     return float(np.sqrt(p.M * p.W0 / p.lambda_) / quality)
 
 
-def resonance_curves(machine: Machine, V: float, epsilon: float) -> list[FigureCurve]:
-    """Cuts over lambda and frequency; names are "lambda, inertia" and the like.
-
-    Parameters
-    ----------
-    machine : Machine
-    V, epsilon : float
-        Pulling velocity (m/s) and amplitude on the contacts, the same at all points.
-    """
-    p = machine.numbers
+def resonance_curves(machine: Machine) -> list[FigureCurve]:
+    """Cuts over lambda and frequency at 10 um/s; names are "lambda, inertia" and the like."""
+    p, V, epsilon = machine.numbers, machine.velocities[1], machine.strongest
     lengths: Float = 1e-6 * np.linspace(*_LENGTHS, _POINTS)
     # The paper's frequencies are among them: the peaks are narrower than two points.
     experiments = [p.frequency, p.frequency_vacuum]
@@ -148,11 +141,12 @@ def resonance_curves(machine: Machine, V: float, epsilon: float) -> list[FigureC
     ]
 
 
-def resonance_figure(machine: Machine) -> FigureNumbers:
+@curve_figure("figure-15", resonance_curves)
+def resonance_figure(
+    machine: Machine, read: FigureNumbers
+) -> tuple[dict[str, float], dict[str, float]]:
     """Drop, mu1 and mu2 against lambda at 120 Hz and against frequency at 0.7 um."""
-    p, V, epsilon = machine.numbers, machine.velocities[1], machine.stated().epsilon_eff
-    data = solve_curves(machine, resonance_curves(machine, V, epsilon))
-    read, f = figure_numbers(machine, "", data, {}), p.frequency_vacuum
+    p, V, f = machine.numbers, machine.velocities[1], machine.numbers.frequency_vacuum
     still, moved = (f"frequency, {name}" for name in (QUASI_STATIC, UNDAMPED))
     percent = {
         name: 100 * -at_frequency(read, name, "delta_mu", f) / machine.mu_ss(V)
@@ -163,7 +157,9 @@ def resonance_figure(machine: Machine) -> FigureNumbers:
         for column in ("delta_mu", "mu2")
         for length in _MARKED
     }
-    scalars = {
+    low, high = machine.ends_of("lambda_quasi_static")
+    marks = {"lambda low": low, "lambda high": high, "lambda fitted": p.lambda_}
+    return {
         "contact_resonance": machine.contact_resonance,
         "contact_damping": contact_damping(machine),
         "relative_drop_200Hz": percent[still] / 100,
@@ -171,10 +167,7 @@ def resonance_figure(machine: Machine) -> FigureNumbers:
         "mu2_ratio_200Hz": at_frequency(read, moved, "mu2", f)
         / at_frequency(read, still, "mu2", f),
         **changes,
-    }
-    low, high = machine.ends_of("lambda_quasi_static")
-    marks = {"lambda low": low, "lambda high": high, "lambda fitted": p.lambda_}
-    return figure_numbers(machine, "figure-15", data, scalars, quoted={"Q": QUALITY, **marks})
+    }, {"Q": QUALITY, **marks}
 
 
 def at_frequency(numbers: FigureNumbers, curve: str, column: str, frequency: float) -> float:

@@ -38,8 +38,12 @@ from asperity_papers.bureau2000.machine import PAPER, printed
 
 Float = NDArray[np.float64]
 
-#: Columns of a table of bifurcations.
-THRESHOLD_COLUMNS = ("V", "K_over_W0", "K_over_W0_err", "frequency", "frequency_err")
+#: Columns of a table of bifurcations, with the kind of quantity of each.
+THRESHOLD_COLUMNS = {
+    "V": "velocity",
+    **dict.fromkeys(("K_over_W0", "K_over_W0_err"), "per_length"),
+    **dict.fromkeys(("frequency", "frequency_err"), "frequency"),
+}
 #: Below this probability the measurements contradict the formulas that they are read with.
 _MISFIT = 0.01
 _LEVEL = 0.95
@@ -71,14 +75,11 @@ class Thresholds:
 
     def __post_init__(self) -> None:
         for column in THRESHOLD_COLUMNS:
-            values = np.asarray(getattr(self, column), float)
-            object.__setattr__(self, column, np.atleast_1d(values))
-            for row, value in enumerate(np.atleast_1d(values), start=1):
-                if not (math.isfinite(value) and value > 0):
-                    raise InputError(
-                        f"{self.name}.{column} must be positive, got {value:g} in row {row}; "
-                        "correct the cell"
-                    )
+            values = np.atleast_1d(np.asarray(getattr(self, column), float))
+            object.__setattr__(self, column, values)
+            for row in np.flatnonzero(~((values > 0) & (values < np.inf))):
+                got = f"{values[row]:g} in row {row + 1}"
+                raise InputError(f"{self.name}.{column}", "be positive", got, "correct the cell")
 
 
 def read_thresholds(path: str | Path) -> Thresholds:
@@ -87,16 +88,15 @@ def read_thresholds(path: str | Path) -> Thresholds:
     Parameters
     ----------
     path : str or Path
-        CSV in SI without units; columns `THRESHOLD_COLUMNS`.
+        CSV in SI, or with units in its heading; columns `THRESHOLD_COLUMNS`.
 
     Raises
     ------
     InputError
         If the file cannot be read, a column is missing, or a cell is no positive number.
     """
-    path = Path(path)
-    columns = read_columns(path, THRESHOLD_COLUMNS, "a bifurcation")
-    return Thresholds(path.name, **columns)
+    columns = read_columns(Path(path), THRESHOLD_COLUMNS, "a bifurcation")
+    return Thresholds(Path(path).name, **columns)
 
 
 #: Name in the paper's file of numbers, and of its uncertainty where that is another one.
@@ -424,22 +424,15 @@ def _with_published(
     name: str, value: float, se: float, se_alone: float, step: int, how: str
 ) -> RecipeNumber:
     """A number with the paper's."""
-    material = printed()
-    unit = {"D0": "m", "lambda": "m"}.get(name, "")
+    unit = "m" if name in ("D0", "lambda") else ""
+    fitted = RecipeNumber(name, unit, value, se, se_alone, step, how, None, None, "")
     if name not in _PUBLISHED:
-        return RecipeNumber(name, unit, value, se, se_alone, step, how, None, None, "")
+        return fitted
     key, uncertain = _PUBLISHED[name]
-    number, with_uncertainty = material[key], material[uncertain or key]
-    uncertainty = with_uncertainty.si_uncertainty
-    return RecipeNumber(
-        name,
-        unit,
-        value,
-        se,
-        se_alone,
-        step,
-        how,
-        float(number.si),
-        None if uncertainty is None else float(uncertainty),
-        number.place,
+    number, spread = printed()[key], printed()[uncertain or key].si_uncertainty
+    return replace(
+        fitted,
+        published=float(number.si),
+        published_uncertainty=None if spread is None else float(spread),
+        published_place=number.place,
     )

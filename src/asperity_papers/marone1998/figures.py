@@ -44,15 +44,10 @@ def figure_2(laboratory: Laboratory) -> FigureNumbers:
     slow, fast = laboratory.pair("V_2")
     for n, (name, letter) in enumerate(LAWS.items()):
         slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
-        programme = Programme(
-            Slide(2 * p.D0_2 / slow, velocity=slow),
-            Slide(7 * p.D0_2 / fast, velocity=fast),
-            Slide(6.1 * p.D0_2 / slow, velocity=slow),
-            load=1.0,
-            velocity=slow,
-        )
-        lengths = np.array([2.0, 7.0, 6.1])
-        spans = lengths * p.D0_2 / np.array([slow, fast, slow])
+        lengths, V = np.array([2.0, 7.0, 6.1]), np.array([slow, fast, slow])
+        spans = lengths * p.D0_2 / V
+        steps = (Slide(float(s), velocity=float(v)) for s, v in zip(spans, V, strict=True))
+        programme = Programme(*steps, load=1.0, velocity=slow)
         ends = np.concatenate([[0.0], np.cumsum(spans)])
         way = np.concatenate([[0.0], np.cumsum(lengths)])
         # Close to each step, where much happens, and even beyond.

@@ -74,7 +74,7 @@ def test_laws_are_compared_without_naming_what_is_free(made, pmma):
     assert found.best == "elasto-plastic"
     # Nothing says where to look for its cut-off velocities.
     assert list(found.not_compared) == ["cut-off"]
-    assert "Nothing is said of cut-off: this law has numbers that" in found.verdict
+    assert "Not compared: cut-off, for want of numbers" in found.verdict
 
 
 @pytest.mark.parametrize("law", ["linker-dieterich", "elasto-plastic"])
@@ -301,7 +301,7 @@ def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     assert found.best == "rice-ruina"
     (out,) = [j for j in found.laws.values() if j.excluded]
     lower = found.laws["rice-ruina"].fit.log_likelihood - out.fit.log_likelihood
-    assert out.why.startswith(f"its log-likelihood is {lower:.4g} lower than that of rice-ruina")
+    assert out.why.endswith(f"above that of rice-ruina, its log-likelihood {lower:.4g} lower")
     assert "chi-squared" not in found.verdict
     head, rows = laws_table(found)
     assert head[:3] == ("law", "log-likelihood", "AICc - lowest")
@@ -318,7 +318,7 @@ class _Motion(SimpleNamespace):
         return values["friction"]
 
 
-def _fit_with(law, run, friction, **about):
+def _fit_with(law, run, friction, aicc=0.0, **about):
     white = Autoregression(np.zeros(0), 1e-6)
     noise = {"whiteness_p": 0.5}
     term = _Motion(
@@ -326,7 +326,7 @@ def _fit_with(law, run, friction, **about):
     )
     vars(term).update(about)
     objective = SimpleNamespace(terms_of=lambda kind: [term])
-    return SimpleNamespace(law=law, values={"friction": friction}, objective=objective)
+    return SimpleNamespace(law=law, values={"friction": friction}, aicc=aicc, objective=objective)
 
 
 @pytest.mark.parametrize(("jumps", "doubted"), [((), False), ((41.0,), True), ((70.0,), False)])
@@ -337,13 +337,33 @@ def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps
         name="run", time=time, friction=0.6 + noise, jumps=jumps, stretches=[(0, time.size)]
     )
     wrong = np.where((time > 40) & (time < 42), 0.61, 0.6)
-    best, other = _fit_with("good", run, np.full(time.size, 0.6)), _fit_with("poor", run, wrong)
-    doubt, stretch = support(best, other)
-    begin, end = map(float, re.search(r"lies in (\S+) to (\S+) s of run", stretch).groups())
-    assert 39 < begin < 41
-    assert 41 < end < 43
-    assert ("In doubt, since the recording jumps at 41 s" in doubt) is doubted
+    best = _fit_with("good", run, np.full(time.size, 0.6))
+    # Outside the stretch the two are one law: it alone excludes the other, if that is excluded.
+    for aicc, rests in ((200.0, True), (9.0, False)):
+        doubt, stretch = support(best, _fit_with("poor", run, wrong, aicc))
+        said = doubt if rests else stretch
+        begin, end = map(float, re.search(r"(?:in|on) (\S+) to (\S+) s of run", said).groups())
+        assert 39 < begin < 41
+        assert 41 < end < 43
+        assert ("it rests on" in doubt) is rests
+        assert ("the recording jumps at 41 s" in doubt) is doubted
     # An error everywhere rests on no stretch.
-    assert support(best, _fit_with("poor", run, np.full(time.size, 0.61)))[1] == ""
-    doubt, _ = support(_fit_with("good", run, wrong, law_fails_after_changes=True), other)
+    everywhere = _fit_with("poor", run, np.full(time.size, 0.61), 1e3)
+    doubt, stretch = support(best, everywhere)
+    assert "it rests on" not in doubt + stretch
+    doubt, _ = support(_fit_with("good", run, wrong, law_fails_after_changes=True), everywhere)
     assert "even good misses what follows the velocity changes" in doubt
+
+
+def test_a_verdict_that_changes_with_the_window_says_so_first():
+    time = np.linspace(0, 100, 2001)
+    friction = np.where(time < 50, 0.6, 0.601)
+    run = SimpleNamespace(
+        name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)]
+    )
+    best = _fit_with("good", run, np.where(time < 50, 0.6, 0.6012))
+    # Squares of the halves: 0 and 40 of the better law, 250 and 0 of the other; 210 in all.
+    other = _fit_with("poor", run, np.where(time < 50, 0.6005, 0.601), 210.0)
+    doubt, _ = support(best, other)
+    assert "changes with the window: the second half of run alone is for poor, by 40" in doubt
+    assert "first half" not in doubt

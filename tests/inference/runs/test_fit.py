@@ -255,7 +255,7 @@ def test_samples_that_are_far_off_are_left_out_and_named(found):
     # Some 10 to 30 standard deviations of the noise, one just after the first step.
     spoiled[[300, 401, 705, 1100]] += [0.02, 0.04, -0.03, 0.05]
     bad = fit(replace(run, friction=spoiled), "rice-ruina", FREE, start=TRUE, starts=1)
-    (said,) = (w for w in bad.warnings if "stand out of both neighbours" in w)
+    (said,) = (w for w in bad.warnings if "are spikes, which no motion" in w)
     assert "4 samples" in said
     assert "30, 40.1, 70.5, 110 s" in said
     for name in TRUE:

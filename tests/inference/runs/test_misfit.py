@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from asperity.inference.runs.misfit import misfit_after_changes
-from asperity.inference.runs.noise import whiteness
+from asperity.inference.runs.noise import misfit_after_changes, whiteness
 
 
 def test_a_misfit_after_changes_is_told_from_chance():

@@ -198,12 +198,21 @@ def test_bifurcations_beyond_doubles_are_refused(exact, seed):
         )
 
 
+HEADING = "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("V,K_over_W0\n1e-6,3e4\n", "got none for K_over_W0_err"),
-        ("V,K_over_W0,K_over_W0_err,frequency,frequency_err\n", "must have a header and rows"),
-        ("V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,x,1,1,1\n", "got 'x' in row 1"),
+        (
+            "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n",
+            "must have a heading and a bifurcation a row",
+        ),
+        (
+            "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,x,1,1,1\n",
+            "row 1 must have a number in column K_over_W0, got 'x'",
+        ),
         ("V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,3e4,0,1,1\n", "must be positive"),
     ],
 )
@@ -213,5 +222,16 @@ def test_a_wrong_table_of_bifurcations_is_one_sentence(tmp_path, text, message):
     with pytest.raises(InputError) as raised:
         read_thresholds(path)
     assert message in str(raised.value)
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         read_thresholds(tmp_path / "absent.csv")
+
+
+def test_bifurcations_in_units_are_those_in_si(tmp_path):
+    path = tmp_path / "bifurcation.csv"
+    path.write_text(
+        "V (um/s),K_over_W0 (1/um),K_over_W0_err (1/um),frequency (mHz),frequency_err (mHz)\n"
+        "2,0.03,0.001,400,5\n"
+    )
+    read = read_thresholds(path)
+    expected = {"V": 2e-6, "K_over_W0": 3e4, "K_over_W0_err": 1e3, "frequency": 0.4}
+    assert {n: float(getattr(read, n)[0]) for n in expected} == pytest.approx(expected, rel=1e-12)

@@ -27,8 +27,6 @@ def numbers(pmma):
 class KnownPlane:
     """Stands for a `MapPlane` whose ln|m| is a formula of the positions."""
 
-    outputs = OUTPUTS
-
     def __init__(self, g: Callable, count: int, failed: Callable | None = None) -> None:
         self.g, self.failed = g, failed or (lambda x, y: np.zeros(x.shape, bool))
         self.x = self.y = Axis("epsilon", 0.0, 0.5, count)

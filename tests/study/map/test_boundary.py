@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.study.map.boundary import join, trace_boundary
+from asperity.study.map.boundary import trace_boundary
 
 
 def traced(plane):
@@ -106,11 +106,3 @@ def test_nothing_to_trace(known) -> None:
     boundary, lines = traced(known(lambda x, y: x + 1.0, 5))
     assert lines == []
     assert boundary.where.shape == (0, 2)
-
-
-def test_links_become_lines() -> None:
-    open_, closed = [[3, 4], [5, 4], [5, 6]], [[10, 11], [12, 11], [12, 10]]
-    first, second = join(np.array(closed + open_))
-    assert first.tolist() in ([3, 4, 5, 6], [6, 5, 4, 3])
-    assert second[0] == second[-1]
-    assert sorted(second[:-1].tolist()) == [10, 11, 12]

@@ -1,14 +1,12 @@
 """Pictures of maps: what is drawn, and only where the numbers have it."""
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray
 
 from asperity.figures.map import KIND_LINES, axis_unit, draw_map, keys
 from asperity.figures.style import style
 from asperity.study.map import SHOWN
-from asperity_papers.bureau2000.stability import draw_stabilisation
 
 
 def planted(**changes) -> xarray.Dataset:
@@ -71,8 +69,8 @@ def test_points_without_response_are_hatched_and_named() -> None:
     assert "no response found" not in [entry.get_label() for entry in keys(planted())]
 
 
-@pytest.mark.parametrize("show", sorted(SHOWN))
-def test_every_quantity_can_be_drawn(show, tmp_path) -> None:
+@pytest.mark.parametrize("show", ["phase1", "growth_rate", "delta_mu", "mu1"])
+def test_a_quantity_of_each_kind_of_colours_can_be_drawn(show, tmp_path) -> None:
     with style():
         draw_map(planted(), show).savefig(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
@@ -84,27 +82,3 @@ def test_axes_are_labelled_in_readable_units() -> None:
         figure = draw_map(planted())
     assert figure.axes[0].get_ylabel() == "spring stiffness $K$ (N/mm)"
     assert figure.axes[0].get_ylim() == (100.0, 300.0)
-
-
-def test_the_figure_of_the_stability_study(tmp_path) -> None:
-    cases = ("rice-ruina", "elasto-plastic", "rice-ruina, inertia", "elasto-plastic, inertia")
-    rows = [
-        {"cut": "amplitude", "case": case, "epsilon": e, "frequency": 120.0, "ratio": 1 - e}
-        for case in cases
-        for e in (0.1, 0.2)
-    ] + [
-        {"cut": "frequency", "case": cases[1], "epsilon": e, "frequency": f, "ratio": 2.0}
-        for e in (0.1, 0.2)
-        for f in (1.0, 2.0, 4.0)
-    ]
-    cuts = pd.DataFrame(rows).assign(kind="Neimark-Sacker")
-    cuts.loc[cuts["frequency"] < 3, "kind"] = "period doubling"
-    with style():
-        figure = draw_stabilisation(cuts, 0.5, planted())
-        figure.savefig(tmp_path / "figure.png")
-    curves = figure.axes[0].get_lines()[:4]
-    assert [line.get_ydata().tolist() for line in curves] == [[0.9, 0.8]] * 4
-    stretches = figure.axes[1].get_lines()[:2]
-    assert stretches[0].get_xdata().tolist() == [2.0, 4.0]
-    # Period doubling is the broad line, the step to another kind a thin one.
-    assert stretches[0].get_linewidth() > stretches[1].get_linewidth()

@@ -12,7 +12,7 @@ from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, respond
 from asperity.orbit import Outcome
 from asperity.outputs import Interrupted, targets
-from asperity.study import responses, threshold
+from asperity.study import crossings, responses
 from asperity.study.map import SHOWN, Axis, response_map, write_map
 
 EPS = Axis("epsilon", 0.0, 0.4, 7)
@@ -78,7 +78,7 @@ def test_chords_between_the_points_stay_on_the_boundary(rigid, pmma) -> None:
 
 
 def test_a_planted_mistake_in_the_search_is_seen(numbers, pmma, monkeypatch) -> None:
-    monkeypatch.setattr(threshold, "TOLERANCE", 0.3)
+    monkeypatch.setattr(crossings, "TOLERANCE", 0.3)
     found = response_map("rice-ruina", numbers, x=Axis("epsilon", 0.0, 0.4, 2), y=K)
     Kc = (pmma.B - pmma.A) * pmma.W0 / pmma.D0
     eps, stiffness = found["boundary_epsilon"].values, found["boundary_K"].values
@@ -203,15 +203,6 @@ def test_an_interrupted_map_goes_on_to_the_same_result(numbers, tmp_path) -> Non
     with xarray.open_dataset(whole) as a, xarray.open_dataset(parts) as b:
         assert a.identical(b)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["parts.nc", "whole.nc"]
-
-
-def test_an_interruption_before_the_first_block_leaves_nothing(numbers, tmp_path) -> None:
-    def stop(done: int, total: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="nothing was written"):
-        write_map(tmp_path / "m.nc", "rice-ruina", numbers, x=EPS, y=K, progress=stop)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from scipy.stats import chi2
@@ -11,7 +12,15 @@ from scipy.stats import chi2
 from asperity import materials
 from asperity.errors import InputError
 from asperity.inference import table_of
-from asperity.study import SweepPlan, job, load_plan, open_store, run_sweep, store_status
+from asperity.study import (
+    SweepPlan,
+    export_store,
+    job,
+    load_plan,
+    open_store,
+    run_sweep,
+    store_status,
+)
 from asperity.study.solve.fit import _disturbed, _fixed
 from references.closed_form_sweep import ThisProcess
 
@@ -75,6 +84,13 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
     assert store_status(out).outcomes == {"converged": 4, "refused": 2}
     assert np.isnan(found["B_fit"].sel(data="short.csv")).all()
     assert "must hold more data than free parameters" in told[0]
+    # Names of files are texts in every format.
+    for suffix in ("csv", "nc"):
+        assert export_store(out, tmp_path / f"s.{suffix}") == 6
+    names = pd.read_csv(tmp_path / "s.csv")["data"]
+    assert names.tolist() == ["a.csv", "a.csv", "b.csv", "b.csv", "short.csv", "short.csv"]
+    with xr.open_dataset(tmp_path / "s.nc") as exported:
+        assert exported["data"].values.tolist() == found["data"].values.tolist()
     # Other readings in a file of the same name are another plan.
     write(tmp_path / "b.csv", 5)
     with pytest.raises(InputError, match=r"same plan, got settings\.files\.b\.csv = "):
@@ -135,7 +151,7 @@ def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_t
     [
         ("", "fit must be given where solve is 'fit'"),
         ("[fit]\nfree = ['B']", r"fit\.data must name a table of readings"),
-        ("[fit]\nfree = ['Bee']\ndata = 'a.csv'", r"fit\.free must name parameters, got 'Bee'"),
+        ("[fit]\nfree = ['Bee']\ndata = 'a.csv'", r"fit\.free must be a known name, got 'Bee'"),
         ("[fit]\nfree = ['B']\ndata = 'b.csv'", "must be a readable table, got .*b.csv"),
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\nprior = { A = { mean = 1, std = 1 } }",
          r"fit\.prior must be of free parameters, got 'A'"),

@@ -54,7 +54,8 @@ def content_of(store: Path, consolidated: bool) -> dict[str, Any]:
                         v.values.tobytes(), repr(v.attrs))
             for name, v in found.variables.items()
         }  # fmt: skip
-        return {**variables, "": {n: v for n, v in found.attrs.items() if n != "runs"}}
+        of_runs = ("runs", "seal")
+        return {**variables, "": {n: v for n, v in found.attrs.items() if n not in of_runs}}
 
 
 class Whole:

@@ -77,13 +77,10 @@ def test_another_reader_needs_neither_asperity_nor_xarray(
     assert lines == [f"(3, 20) ('K', 'epsilon') 1 {2.0 * float(epsilon)!r}", "[]"]
 
 
-@pytest.mark.parametrize("consolidated", [None, False, True])
-def test_xarray_opens_it_as_it_is(
-    tmp_path: Path, closed_form: ClosedForm, consolidated: bool | None
-) -> None:
+def test_xarray_opens_it_as_it_is(tmp_path: Path, closed_form: ClosedForm) -> None:
     run(tmp_path / "s.zarr")
     # Warnings are errors here: nothing is to be explained to the reader first.
-    found = xarray.open_zarr(tmp_path / "s.zarr", consolidated=consolidated, chunks=None)
+    found = xarray.open_zarr(tmp_path / "s.zarr", chunks=None)
     assert set(found.dims) == {"K", "epsilon", "K_chunk", "epsilon_chunk"}
     assert {"A", "B", "law", "frequency"} <= set(found.coords)
     assert str(found["law"].values) == "rice-ruina"
@@ -151,7 +148,7 @@ def test_what_is_done_is_never_solved_again(tmp_path: Path, closed_form: ClosedF
         with pytest.raises(Killed):
             run(out)
     store = SweepStore(out)
-    done = [chunk for chunk in range(6) if store.is_done(chunk)]
+    done = list(store.done())
     assert 0 < len(done) < 6
     kept = set()
     for chunk in done:
@@ -201,8 +198,8 @@ def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm
     assert files_of(out) == before
 
 
-@pytest.mark.parametrize("name", ["mu1", "outcome", "status"])
-@pytest.mark.parametrize("fault", ["empty", "cut", "bit", "missing"])
+@pytest.mark.parametrize("name", ["mu1", "status"])
+@pytest.mark.parametrize("fault", ["cut", "bit"])
 def test_a_damaged_chunk_alone_is_solved_again(
     tmp_path: Path, closed_form: ClosedForm, name: str, fault: str
 ) -> None:
@@ -211,11 +208,8 @@ def test_a_damaged_chunk_alone_is_solved_again(
     whole = files_of(out)
     file = out / name / "c" / "1" / "0"
     content = bytearray(file.read_bytes())
-    if fault == "bit":
-        content[len(content) // 2] ^= 0x10
-    file.write_bytes(bytes(content)[: {"empty": 0, "cut": len(content) // 2}.get(fault)])
-    if fault == "missing":
-        file.unlink()
+    content[len(content) // 2] ^= 0x10
+    file.write_bytes(content if fault == "bit" else content[: len(content) // 2])
     closed_form.solved.clear()
     again = run(out)
     assert len(closed_form.solved) == again.solved == 10
@@ -250,13 +244,10 @@ def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -
     assert run(out).points == POINTS
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_lock_file_of_another_form_holds_nothing(
-    tmp_path: Path, closed_form: ClosedForm, seed: int
-) -> None:
+def test_a_lock_file_of_another_form_holds_nothing(tmp_path: Path, closed_form: ClosedForm) -> None:
     """What a killed driver, another program or a full disk may leave in its place."""
     out, lock = tmp_path / "s.zarr", tmp_path / "s.zarr.lock"
-    draw = np.random.default_rng(seed)
+    draw = np.random.default_rng(0)
     run(out, plan=plan_of(4, (1.0,)))
     record = {"token": "x", "host": "h", "process": 3, "since": "now"}
     others = [None, 7, 0.5, [], {}, ["x"], True]
@@ -285,8 +276,8 @@ def test_a_worker_of_an_older_driver_writes_nothing(
     digest = json.loads((out / "zarr.json").read_text())["attributes"]["plan_sha256"]
     reset(out, SweepStore(out).grid, 0)
     with StoreLock(out), pytest.raises(SupersededError):
-        Job(str(out), digest, "the token of another driver")((0,), 1.0)
-    assert not SweepStore(out).is_done(0)
+        Job(str(out), digest, "the token of another driver")(0)
+    assert SweepStore(out).failed_in(0) == -1
 
 
 def test_another_plan_is_refused_with_the_difference(

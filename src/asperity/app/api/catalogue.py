@@ -1,6 +1,6 @@
 """What the page can choose from: materials, laws with their equations, parameters with units.
 
-Names, units, rules and defaults are those of `asperity.parameters`, values those of the materials.
+Names, units, rules and defaults come from `asperity.parameters`, values from the materials.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from asperity.units import KINDS, to_si
 #: The documentation of a clone, once ``make docs`` has built it.
 DOCS = Path(__file__).parents[4] / "docs" / "_build" / "html"
 
-#: Numbers of the air layer and of the contacts beside it: the names under which materials have
-#: them, symbol and meaning. `asperity.air` says what each is.
+#: Numbers of the air layer and of the contacts, by their names in materials: symbol and meaning;
+#: see `asperity.air`.
 AIR = {
     "P0": ("P_0", "pressure of the air"),
     "h0": ("h_0", "gap between the surfaces"),
@@ -43,8 +43,8 @@ AIR = {
     "lambda_z": (r"\lambda_z", "normal elastic length of the contacts"),
 }
 
-#: A slider without a range of its material covers these factors on both sides of its value: one
-#: for pure numbers, one for quantities with a unit; a slider that begins at zero ends at the third.
+#: A slider without a range of its material covers the first factor on both sides of a pure number,
+#: the second on both sides of a quantity with a unit; a slider from zero ends at the third.
 _PURE, _WITH_UNIT, _FROM_ZERO = 10.0, 100.0, 4.0
 
 
@@ -93,7 +93,7 @@ def _law(name: str) -> dict[str, Any]:
     known = point_parameters(law)
     return {
         "title": _title(law.__doc__ or name),
-        # Those of the class itself: a law derived from another one has equations of its own.
+        # Of the class itself: a law derived from another law states different equations.
         "equations": [mathml(e, display=True) for e in vars(law).get("equations", ())],
         "source": [key.strip() for key in law.source.split(",") if key.strip()],
         "rate_dependent": law.rate_dependent,
@@ -103,7 +103,7 @@ def _law(name: str) -> dict[str, Any]:
 
 
 def _title(docstring: str) -> str:
-    """What a docstring says of the law, without what it says of the code."""
+    """The part of a docstring that names the law."""
     return docstring.strip().splitlines()[0].split(";")[0].rstrip(".")
 
 

@@ -35,7 +35,7 @@ class Nothing(Question):
 
 
 def overview(question: Nothing) -> dict[str, Any]:
-    """Roles of channels, protocols to begin with, and the largest file."""
+    """Roles of channels, example protocols, and the largest size of a file."""
     folder = Path(__file__).parents[1] / "protocols"
     return {
         "roles": {role: sorted(spec.kinds) for role, spec in ROLES.items()},
@@ -52,7 +52,7 @@ def _file(question: Recording, uploads: Uploads) -> dict[str, Any]:
 
 
 def check_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Mistakes of a protocol with their lines, or what it comes to."""
+    """Mistakes of a protocol with their lines, or its duration, rows and steps."""
     from asperity.app.api.protocols import checked
 
     report()
@@ -74,7 +74,7 @@ def _place_for_run(question: ProtocolText, uploads: Uploads) -> dict[str, Any]:
 
 
 def run_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Run a protocol and record it; the recording becomes a file as if it had been sent."""
+    """Run a protocol and record it; the recording becomes a file like an uploaded file."""
     from asperity.app.api.protocols import run
 
     result = run(argument["text"], Path(argument["path"]), report)

@@ -1,13 +1,13 @@
-"""Explore: everything about one operating point, at once.
+"""Explore: the response at an operating point, answered at once.
 
-What the fast methods solve is answered within milliseconds; what they do not is searched for by
-`search`, a job, once the slider rests.
+The fast methods answer within milliseconds; orbits that they do not solve are searched for by
+`search`, a job, after the last change of a slider.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from asperity.app.api.operating_point import (
     solve,
 )
 from asperity.app.endpoints import Answer, Job
-from asperity.app.preparation import Preparation
+from asperity.app.jobs.threads import Preparation
 from asperity.laws import registered
 from asperity.orbit import (
     Outcome,
@@ -40,12 +40,17 @@ _HARMONICS, _INSTANTS, _AMPLITUDES, _FREQUENCIES = 8, 256, 24, 80
 _CURVES = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
 #: Methods that take milliseconds.
 _FAST = ("fourier",)
+#: Laws with which the tab begins, and amplitudes of the grids of the fast method.
+_FIRST = ("elasto-plastic", "rice-ruina", "linker-dieterich")
+_AMPLITUDE, _LARGE = (0.1,), (0.3, 0.5)
+#: Programs that are compiled when the server starts.
+AT_START = (*_FIRST, *(f"{name} at large amplitudes" for name in _FIRST))
 #: Amplitudes that a search solves between two reports.
 _STEP = 3
 
 
 class Explored(OperatingPoint):
-    """An operating point, and what else is shown with it.
+    """An operating point, and the laws that are compared there.
 
     Attributes
     ----------
@@ -76,7 +81,7 @@ def use(preparation: Preparation) -> None:
 
 
 def explore(question: Explored) -> dict[str, Any]:
-    """Response, curves and share of the air layer, as far as the fast methods know them."""
+    """Response, curves and share of the air layer, as far as the fast methods solve them."""
     numbers = question.sourced()
     values = {name: number.value for name, number in numbers.items()}
     epsilon = epsilon_on_contacts(question, values)
@@ -88,7 +93,6 @@ def explore(question: Explored) -> dict[str, Any]:
         "origins": {name: number.origin for name, number in numbers.items()},
         "epsilon": epsilon,
         "air": _air(question, values),
-        **recipes.explore(question, values, epsilon),
     }
     waiting = [name for name in laws if not _prepared(name)]
     if waiting:
@@ -107,22 +111,32 @@ _KEPT = {"harmonics": _HARMONICS, "waveform": _INSTANTS}
 
 
 def _moves_by_inertia(values: Mapping[str, float]) -> bool:
-    """Whether the equations are others than the quasi-static ones, which have the fast method."""
+    """Whether mass or damping counts: the fast method solves the quasi-static equations only."""
     return bool(values.get("inertia", 0.0) or values.get("eta", 0.0))
 
 
 def _fast_curve(question: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
-    """Curves against the amplitude; null where only a search will know."""
+    """Curves against the amplitude; NaN where only a search finds an orbit."""
     values = question.values(name)
-    law = law_class(name)
+    others = tuple((n, v) for n, v in values.items() if n != "epsilon")
+    return _curve(name, others, tuple(grid.tolist()))
+
+
+# The amplitude, and numbers of another law, do not change a curve.
+@lru_cache(maxsize=32)
+def _curve(
+    name: str, others: tuple[tuple[str, float], ...], amplitudes: tuple[float, ...]
+) -> dict[str, Any]:
+    law, values, grid = law_class(name), dict(others), np.array(amplitudes)
     if not law.rate_dependent:
-        return _curve_record(solve(law, values, grid))
+        response = solve(law, {**values, "epsilon": 0.0}, grid)
+        return {**{n: getattr(response, n) for n in _CURVES}, "left": []}
     if _moves_by_inertia(values):
         empty = np.full(len(grid), np.nan)
         return {**dict.fromkeys(_CURVES, empty), "left": list(range(len(grid)))}
     function = _function(name)
-    own = {n: v for n, v in values.items() if n in function.parameters}
-    result = function({**own, "epsilon": grid})
+    needed = {n: v for n, v in values.items() if n in function.parameters}
+    result = function({**needed, "epsilon": grid})
     c1, c2 = np.asarray(result.harmonics).T
     return {
         "mean_friction": np.asarray(result.mean_friction),
@@ -138,11 +152,6 @@ def _fast_curve(question: Explored, name: str, grid: np.ndarray) -> dict[str, An
 @cache
 def _function(name: str) -> ResponseFunction:
     return response_function(name, harmonics=2, multipliers=False, search=False)
-
-
-def _curve_record(response: PeriodicResponse) -> dict[str, Any]:
-    record = {name: getattr(response, name) for name in _CURVES}
-    return {**record, "left": []}
 
 
 def point_record(response: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
@@ -186,7 +195,7 @@ def stability_sentence(response: PeriodicResponse) -> str:
     kind = str(response.mode[()])
     doubles = f"doubles in {_digits(np.log(2) / rate)} s" if rate else "stays"
     outcome = {
-        "fold": "; the slip runs away or comes to rest (a fold)",
+        "fold": "; the slip runs away or stops (a fold)",
         "period doubling": "; every second period becomes another (a period doubling)",
         "Neimark-Sacker": ": expect stick-slip (a Neimark-Sacker bifurcation)",
     }.get(kind, "")
@@ -213,8 +222,14 @@ def _air(question: Explored, values: Mapping[str, float]) -> dict[str, Any] | No
     }
 
 
+def text(question: Explored) -> dict[str, str]:
+    """The same operating point as Python and as a command."""
+    values = question.values()
+    return recipes.explore(question, values, epsilon_on_contacts(question, values))
+
+
 def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Search for what the fast methods left open: the point itself, then the curves.
+    """Search for the orbits that the fast methods did not solve: the point, then the curves.
 
     Each message has ``point``, or ``curve`` with the law, the indices and the values there.
     """
@@ -230,10 +245,10 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     grid = question.amplitudes()
     for name in dict.fromkeys([question.law, *question.laws]):
         left = np.asarray(_fast_curve(question, name, grid)["left"], dtype=int)
-        own = question.values(name)
+        numbers = question.values(name)
         for start in range(0, len(left), _STEP):
             rows = left[start : start + _STEP]
-            result = solve(law_class(name), own, grid[rows], progress=on_progress)
+            result = solve(law_class(name), numbers, grid[rows], progress=on_progress)
             values_there = {n: getattr(result, n) for n in _CURVES}
             reasons = [str(text) for text in result.result]
             report(
@@ -243,17 +258,22 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
 
 
 def preparations() -> dict[str, Callable[[], Any]]:
-    """Programs by law, quasi-static; others are compiled when they are asked for."""
-    first = ["elasto-plastic", "rice-ruina", "linker-dieterich"]
-    names = [*first, *(name for name in registered() if name not in first)]
-    return {name: partial(_prepare, name) for name in names if registered()[name].rate_dependent}
+    """Programs by law, quasi-static; those of `AT_START` are compiled when the server starts.
+
+    The grid of the fast method depends on the amplitude, and each grid is a program.
+    """
+    names = [name for name, law in registered().items() if law.rate_dependent]
+    tasks = {name: partial(_prepare, name, _AMPLITUDE) for name in names}
+    more = {f"{n} at large amplitudes": partial(_prepare, n, _LARGE) for n in _FIRST}
+    return tasks | more
 
 
-def _prepare(name: str) -> None:
-    numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0}
+def _prepare(name: str, amplitudes: tuple[float, ...]) -> None:
+    numbers = {"V": 1e-6, "epsilon": amplitudes[0], "frequency": 120.0}
     question = Explored.model_validate({"law": name, "numbers": numbers})
     values = question.values()
-    solve(law_class(name), values, 0.1, methods=_FAST, **_KEPT)
+    for epsilon in amplitudes:
+        solve(law_class(name), values, epsilon, methods=_FAST, **_KEPT)
     _fast_curve(question, name, question.amplitudes())
 
 
@@ -265,5 +285,6 @@ assert set(_CURVES) <= set(OUTPUTS)
 
 ENDPOINTS = (
     Answer("explore", Explored, explore),
-    Job("explore/search", Explored, "asperity.app.api.explore:search", lane="search", seconds=120),
+    Answer("explore/text", Explored, text),
+    Job("explore/search", Explored, "asperity.app.api.explore:search", lane="search", seconds=300),
 )

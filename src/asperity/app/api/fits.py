@@ -30,12 +30,13 @@ from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
+from asperity.questions.record import Seconds, Span
 from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
 #: Transients that are shown enlarged, samples that one has, and the share of its largest departure
-#: from the line after it at which it has settled.
+#: from the line after it below which it counts as settled.
 _MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
 
 Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ class Table(Question):
 
 
 class Run(Question):
-    """A recording that is fitted as a whole; the fields are those of a fit's data.
+    """A recording for a fit of its whole motion, with fields as of `asperity.questions.fit.Data`.
 
     Attributes
     ----------
@@ -62,8 +63,8 @@ class Run(Question):
 
     recording: str
     source: Source = Field(default_factory=Source)
-    window: tuple[Any, ...] | None = None
-    steps: tuple[Any, ...] | None = None
+    window: Span | None = None
+    steps: tuple[Seconds, ...] | None = None
     velocities: tuple[Any, ...] | None = None
 
 
@@ -79,7 +80,7 @@ class Fitted(Question, FitOptions):
         One is fitted, several are compared.
     tables : list of Table
     rows : list of dict
-        What measuring has given, see `asperity.measurement.campaign`.
+        Rows of a measurement, see `asperity.measurement.campaign`.
     runs : list of Run
     posterior, chains, draws
         Whether to sample the posterior of the one law, and how.
@@ -101,7 +102,7 @@ class Fitted(Question, FitOptions):
 
 
 def check(question: Fitted) -> None:
-    """Refuse what cannot be fitted, before a process is asked."""
+    """Raise `InputError` for what cannot be fitted, before a process is started."""
     from asperity.laws import get_law, registered
 
     for law in question.laws:
@@ -143,7 +144,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     """Fit a law, or compare several; the share of the work that is done is reported.
 
     The result has ``fit`` or ``comparison``, and ``sections``, what these say in words and tables,
-    of a comparison with ``laws``, those of each law; of the fit or the best one the pictures
+    with a comparison also ``laws``, the same of each law; of the fit, or the best law, the pictures
     ``bands``, ``residuals`` and ``runs``; and, if requested, ``posterior`` and ``report``, the
     folder as a ZIP file in base64.
     """
@@ -343,7 +344,7 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
 
 
 def _around(time: Array, fitted: Array, begin: float, end: float) -> slice:
-    """Samples around a change of the drive until the fitted friction has settled again."""
+    """Samples around a change of the drive until the fitted friction is steady again."""
     a, b = np.searchsorted(time, (begin, end))
     after = fitted[a:b]
     if after.size < _FEWEST:
@@ -357,19 +358,19 @@ def _around(time: Array, fitted: Array, begin: float, end: float) -> slice:
 
 
 def _fit_command(question: Fitted, recordings: list[str]) -> str:
-    """The command; measured rows are those of a table that ``asperity measure`` writes."""
+    """The command; measured rows stand in a table that ``asperity measure`` writes."""
     files = [t.name for t in question.tables] + ["campaign.csv"] * bool(question.rows) + recordings
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
     parts += [f"--law {law}" for law in question.laws]
-    own: dict[str, Any] = {}
+    of_run: dict[str, Any] = {}
     if question.runs:
-        # Of options that each recording may have of its own, those of the first one.
+        # Options that each recording can have: the command takes those of the first recording.
         run = question.runs[0]
         parts += source_options(run.source)
-        own = {name: getattr(run, name) for name in ("window", "steps", "velocities")}
+        of_run = {name: getattr(run, name) for name in ("window", "steps", "velocities")}
     chosen = question.model_dump(include={*FitOptions.model_fields}, exclude_defaults=True)
-    parts += as_options({**chosen, **own}, FIT_OPTIONS)
+    parts += as_options({**chosen, **of_run}, FIT_OPTIONS)
     if question.posterior:
         parts.append("--posterior")
         sampling = ("chains", "draws", "seed")

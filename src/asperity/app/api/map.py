@@ -16,8 +16,8 @@ from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
 from asperity.study.map import SHOWN, Axis, response_map
 
-#: Points along each axis: at once and without a boundary, then finer while one looks, up to what is
-#: asked.
+#: Points along each axis: at once and without a boundary, then ever finer, up to the
+#: number that the question states.
 _COARSE = 8
 #: Largest number of points along an axis.
 _FINEST = 128
@@ -63,7 +63,7 @@ class MapQuestion(OperatingPoint):
 
 
 def check(question: MapQuestion) -> None:
-    """Refuse what cannot be mapped, before a process is asked."""
+    """Raise `InputError` for what cannot be mapped, before a process is started."""
     if question.air is not None:
         raise InputError(
             "map.air must be left out, got an air layer; a map has epsilon on the contacts"
@@ -117,7 +117,7 @@ def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
 
 
 def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Compile what the map that the tab begins with needs, before it is asked for."""
+    """Compile the programs of the default map before the tab is opened."""
     sides = {"x": {"name": "epsilon", "low": 0.01, "high": 0.4},
              "y": {"name": "K", "low": 1e5, "high": 4e5}}  # fmt: skip
     numbers = {"V": 1e-6, "frequency": 120.0}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from asperity.air import AirLayer, effective_modulation, modulation_phase
 from asperity.app.api.catalogue import AIR, around, known_materials, slider
@@ -14,14 +14,10 @@ from asperity.app.endpoints import Question
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law, registered
 from asperity.materials import Material
-from asperity.operating_point import (
-    SourcedNumber,
-    known_parameters,
-    numbers_for,
-    sourced_numbers,
-)
+from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import obeying, point_parameters
+from asperity.questions.point import Point
 from asperity.slider.named import slider_from
 from asperity.units import KINDS
 
@@ -36,7 +32,7 @@ Value = Annotated[str, Field(max_length=60)] | float | int
 
 
 class OperatingPoint(Question):
-    """A law, where its numbers come from, and the numbers that are others.
+    """A law, its material, and numbers that replace those of the material.
 
     Attributes
     ----------
@@ -44,7 +40,7 @@ class OperatingPoint(Question):
         One that comes with the package.
     law : str
     numbers : mapping of str to number or str
-        By the names of `asperity.parameters`; the material has the rest.
+        By the names of `asperity.parameters`; other numbers are those of the material.
     air : mapping of str to number or str, optional
         Numbers of `AIR` that are not the material's; epsilon is then the amplitude of the load
         before the air layer takes its share. None: epsilon is what the contacts bear.
@@ -55,8 +51,10 @@ class OperatingPoint(Question):
     numbers: Annotated[dict[Name, Value], Field(max_length=40, default_factory=dict)]
     air: Annotated[dict[Name, Value], Field(max_length=10)] | None = None
 
+    _sourced: dict[str, dict[str, SourcedNumber]] = PrivateAttr(default_factory=dict)
+
     def chosen_material(self) -> Material:
-        """The material, of those that come with the package."""
+        """The material, which must be one of the package."""
         known = known_materials()
         if self.material not in known:
             raise InputError(
@@ -66,14 +64,18 @@ class OperatingPoint(Question):
         return known[self.material]
 
     def sourced(self, law: str | None = None) -> dict[str, SourcedNumber]:
-        """Numbers of the point with their sources, for its own law or for another one."""
+        """Numbers of the point with their sources, for its law or for another law."""
         law = law or self.law
-        get_law(law)
-        material = self.chosen_material()
-        own = point_parameters(get_law(law))
+        if law not in self._sourced:
+            self._sourced[law] = self._checked(law)
+        return self._sourced[law]
+
+    def _checked(self, law: str) -> dict[str, SourcedNumber]:
+        known = point_parameters(get_law(law))
         others = {n for result in registered().values() for n in point_parameters(result)}
-        given = {n: v for n, v in self.numbers.items() if n in own or n not in others}
-        result = numbers_for(law, sourced_numbers(given, material, "page", law))
+        given = {n: v for n, v in self.numbers.items() if n in known or n not in others}
+        material = self.chosen_material().name
+        result = point_numbers(Point(law=law, material=material, parameters=given), "page")
         for name in given:
             if name in result:
                 self.check_reach(name, result[name].value)
@@ -92,15 +94,15 @@ class OperatingPoint(Question):
     def air_values(self) -> dict[str, float]:
         """SI values of the air layer's numbers."""
         material = self.chosen_material()
-        given = dict(self.air or {})
-        for name in given:
+        numbers = dict(self.air or {})
+        for name in numbers:
             if name not in AIR:
                 raise InputError(f"air must have known numbers, got '{name}'; {closest(name, AIR)}")
         result = {
-            n: float(obeying(given.get(n, material[n].si), n, material[n].dimension, "positive"))
+            n: float(obeying(numbers.get(n, material[n].si), n, material[n].dimension, "positive"))
             for n in AIR
         }
-        for name in given:
+        for name in numbers:
             number = material[name]
             _check_reach(name, result[name], around(number.si), number.dimension)
         return result
@@ -138,7 +140,7 @@ def borne_share(point: OperatingPoint, values: Mapping[str, float], frequency: A
 def air_arguments(
     air: Mapping[str, float], values: Mapping[str, float]
 ) -> tuple[AirLayer, dict[str, float]]:
-    """The air layer, and the contacts that work beside it."""
+    """The air layer, and the numbers of the contacts that bear the load together with it."""
     layer = AirLayer(P0=air["P0"], h0=air["h0"], eta=air["eta_air"], R=air["R"])
     mass = values.get("M", 0.0)
     return layer, {"W0": values["W0"], "M": mass, "lambda_z": air["lambda_z"]}

@@ -11,17 +11,17 @@ from pydantic import Field
 
 from asperity.app.api.operating_point import Name, Value
 from asperity.app.endpoints import Answer, Job, Question
-from asperity.app.preparation import Preparation
+from asperity.app.jobs.threads import Preparation
 from asperity.errors import InputError, closest
 from asperity.ledger import Paper, altered, available, find_paper
 from asperity.materials import Material
 from asperity.parameters import obeying
 from asperity.units import KINDS, from_si
 
-#: A number is moved by this factor to both sides, where its slider says nothing else.
+#: A slider without stated ends covers this factor on both sides of the printed number.
 _FACTOR = 4.0
-#: What is written into a field may differ from the printed number by this factor: farther away the
-#: equations are so stiff that curves take minutes.
+#: Largest factor between a number and the printed number: farther away the equations are so stiff
+#: that curves take minutes.
 _BEYOND = 100.0
 
 _preparation: Preparation | None = None
@@ -71,7 +71,7 @@ def preparations() -> dict[str, Callable[[], Any]]:
         try:
             figures = list(_paper(name).tab)
         except InputError:
-            continue  # the page says what is wrong with that paper when it is opened
+            continue  # reported when the page opens that paper
         tasks |= {_task(_paper(name), f): partial(_printed_lines, name, f) for f in figures}
     return tasks
 
@@ -143,7 +143,7 @@ def _slider(paper: Paper, name: str) -> dict[str, Any]:
 
 
 def check(question: MovedFigure) -> None:
-    """Refuse what cannot be drawn, before a process is asked."""
+    """Raise `InputError` for what cannot be drawn, before a process is started."""
     known = _paper(question.paper).tab
     if question.figure not in known:
         raise InputError(
@@ -154,7 +154,7 @@ def check(question: MovedFigure) -> None:
 
 
 def _moved_numbers(question: MovedFigure) -> Material:
-    """The paper's numbers with those that are moved."""
+    """The numbers of the paper with the moved values."""
     return altered(_paper(question.paper).numbers, _changes(question))
 
 
@@ -216,7 +216,7 @@ _slow_as_printed: dict[tuple[str, str, str], dict[str, Any]] = {}
 
 
 def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Lines that take seconds, a message each: ``curve``, and ``printed`` next to it."""
+    """Lines that take seconds, a message each: ``curve``, and ``printed`` with printed numbers."""
     question = MovedFigure.model_validate(argument)
     paper, numbers = _paper(question.paper), _moved_numbers(question)
     chosen = paper.tab[question.figure]

@@ -1,6 +1,6 @@
 """Protocols of the page: checked with the line of each mistake, run, and recorded.
 
-A protocol of the page names no file: neither a law or a material of its own, nor a recording that a
+A protocol of the page names no file: no file with a law or a material, and no recording that a
 step follows.
 """
 

@@ -59,12 +59,12 @@ def plane(
         "from asperity.study.map import Axis",
         "",
         f"numbers = {{{numbers}}}",
-        "found = asp.map(",
+        "result = asp.map(",
         f'    "{point.law}",',
         "    numbers,",
         *axes,
         ")",
-        f'print(found["{show}"])',
+        f'print(result["{show}"])',
     ]
     parts = _command_of_point(point, fixed)
     for side, a in (("x", x), ("y", y)):
@@ -91,7 +91,7 @@ def _python(point: OperatingPoint, values: Mapping[str, float]) -> str:
         value = exact_text(values[name], known[name].kind)
         return f'"{value}"' if known[name].unit else value
 
-    own = "".join(
+    law_numbers = "".join(
         f", {name}_={text(name)}" if keyword.iskeyword(name) else f", {name}={text(name)}"
         for name in changed
     )
@@ -99,7 +99,7 @@ def _python(point: OperatingPoint, values: Mapping[str, float]) -> str:
         "import asperity as asp",
         "",
         f'material = asp.materials.load("{material.name}")',
-        f'law = material.law("{point.law}"{own})',
+        f'law = material.law("{point.law}"{law_numbers})',
         f"slider = asp.Slider(law, spring={text('K')}, load={text('W0')}"
         + (f", mass={text('M')})" if "M" in values else ")"),
     ]

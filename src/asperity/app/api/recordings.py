@@ -1,6 +1,6 @@
-"""Recordings: read and measured in a process of its own, with limits.
+"""Recordings: read and measured in a separate process with limits.
 
-This module imports what it needs late and nothing else: it is loaded anew for every file.
+Imports are late and few: every file is read by a new process.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ LARGEST_TABLE = 1024**2
 
 
 class Source(questions.Source):
-    """How a file that was sent is read: without a reduction file, which would be the server's."""
+    """How an uploaded file is read: without a reduction file, which would be one of the server."""
 
     @field_validator("recipe")
     @classmethod
-    def _of_the_server(cls, recipe: Path | None) -> None:
+    def _left_out(cls, recipe: Path | None) -> None:
         if recipe is not None:
             raise InputError("read.recipe", "be left out on the page", "one", "leave it out")
 
@@ -57,8 +57,8 @@ class Source(questions.Source):
 def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Read a file and measure it.
 
-    Messages: ``recording`` with what was understood, and the result with ``measured``; a lock-in
-    table is the result ``table``.
+    Messages: ``recording`` with the channels as understood. The result has ``measured``, or
+    ``table`` for a lock-in table.
     """
     path, name = Path(argument["path"]), argument["name"]
     with named(path, name):
@@ -73,7 +73,7 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
 
 @contextmanager
 def named(path: Path, name: str) -> Iterator[None]:
-    """Sentences with the name that people know in place of the server's."""
+    """Give errors the file name of the user in place of the name on the server."""
     with naming(in_labels):
         try:
             yield
@@ -83,11 +83,11 @@ def named(path: Path, name: str) -> Iterator[None]:
 
 
 def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, Any]:
-    """Channels and units as understood, what was found, and curves of each channel."""
+    """Channels and units as understood, findings of the reader, and curves of the channels."""
     kinds = {n: c.kind for n, c in trace.channels.items()}
     roles = {role: trace.roles.get(role) for role in ROLES if role != "time"}
     fitting = {r: candidates(r, kinds) for r, n in roles.items() if n is None}
-    guessed = {r: own[0] if len(own) == 1 else None for r, own in fitting.items()}
+    guessed = {r: c[0] if len(c) == 1 else None for r, c in fitting.items()}
     channels = []
     for number, (channel_name, channel) in enumerate(trace.channels.items()):
         finite = channel.values[np.isfinite(channel.values)]
@@ -245,11 +245,11 @@ def _python(name: str, source: Source, question: questions.Measurement, *, modul
         lines.append(f"trace = stress_to_force(trace, {source.area!r})")
     fields = question.model_dump(exclude={"modulated", "exact_frequency"}, exclude_defaults=True)
     words = {"whole_periods": "only_whole_periods"}
-    given = {words.get(k, k): v for k, v in fields.items()}
+    options = {words.get(k, k): v for k, v in fields.items()}
     if not modulated:
-        given["modulated"] = False
+        options["modulated"] = False
     if question.exact_frequency:
-        given["refine"] = False
-    arguments = "".join(f", {k}={v!r}" for k, v in given.items())
+        options["refine"] = False
+    arguments = "".join(f", {k}={v!r}" for k, v in options.items())
     lines += [f"measurement = asp.measure(trace{arguments})", "print(measurement)"]
     return "\n".join(lines) + "\n"

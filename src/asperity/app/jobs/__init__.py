@@ -1,1 +1,1 @@
-"""Long computations, each in a process of its own that reports progress and can be ended."""
+"""Computations of the server: short ones in threads, long ones in worker processes."""

@@ -1,4 +1,4 @@
-"""Worker processes: few at a time, reused, and ended when they do not stop by themselves."""
+"""Worker processes: few at a time, reused, and killed if they do not stop when cancelled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 #: Longest message of a worker (bytes).
 _LONGEST = 64 * 1024**2
-#: Time (s) that a cancelled job has to stop by itself.
+#: Time (s) within which a cancelled job must stop.
 _PATIENCE = 1.0
 
 
@@ -24,20 +24,20 @@ class Busy(Exception):  # noqa: N818
 class Jobs:
     """Runs jobs in worker processes.
 
-    A client has at most one job: a newer one ends the earlier.
+    A client has at most one job: a newer job ends the earlier job.
 
     Parameters
     ----------
     workers : int
-        Jobs that run at the same time; others wait.
+        Jobs that run at the same time; further jobs wait.
     most : int
         Jobs that may wait.
     preload : str
-        Module that a worker imports before its first job comes.
+        Module that a worker imports before its first job.
     laws : sequence of str
         Places of laws outside the package, which it registers.
     folder : Path, optional
-        Where workers keep temporary files: one that is killed leaves them to whoever has it.
+        For temporary files of workers: the owner of the folder removes what a killed worker leaves.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Jobs:
     ) -> AsyncGenerator[dict[str, Any], None]:
         """Messages of a job, the last of which has ``done``.
 
-        Leaving the iterator early ends the job.
+        Closing the iterator early ends the job.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Jobs:
         job : str
             ``module:function``; see `asperity.app.jobs.worker`.
         argument
-            Of JSON's own types.
+            Of the types of JSON.
         limits : mapping of str to int, optional
             ``memory`` (bytes) and ``seconds`` (of processor time); a worker with limits runs this
             job only.
@@ -123,7 +123,7 @@ class Jobs:
         seconds: float,
         newer: asyncio.Event,
     ) -> AsyncGenerator[dict[str, Any], None]:
-        """Messages of the job; the place that it took is given back when its worker is free."""
+        """Messages of the job; frees its place among the workers when its worker is idle again."""
         if self._closed:
             self._free.release()
             return
@@ -151,8 +151,7 @@ class Jobs:
                 yield message or {"error": _why_it_ended(limits), "done": True}
         finally:
             superseded.cancel()
-            # Whoever asked may be gone, and this task with them: the worker is looked after by
-            # another one.
+            # The client may be gone, and this task with it: another task looks after the worker.
             task = asyncio.get_running_loop().create_task(
                 self._look_after(worker, reusable=not limits, finished=finished)
             )
@@ -167,9 +166,9 @@ class Jobs:
         return None
 
     async def _look_after(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
-        """Keep a worker for the next job if its own is done, or stops when asked.
+        """Keep a worker for the next job if its job is done, or stops when cancelled.
 
-        Another one takes the place of a worker that had limits, and waits with its imports done.
+        A new worker replaces a worker that had limits, and does its imports ahead of the next job.
         """
         try:
             if worker is not None:
@@ -185,7 +184,7 @@ class Jobs:
             self._free.release()
 
     async def prepare(self, warm: str | None = None) -> None:
-        """Start a worker for the first job, and let it run `warm` without waiting for its end."""
+        """Start a worker for the first job, and run `warm` in it in the background."""
         worker = await _Worker.start(self._preload, self._folder)
         self._alive.add(worker)
         self._idle.append(worker)
@@ -203,9 +202,9 @@ class Jobs:
         self._closed = True
         for worker in self._alive:
             worker.kill()
-        while self._tasks:  # one that ends may leave its worker to another one
+        while self._tasks:  # a task that ends may start another task
             await asyncio.gather(*self._tasks, return_exceptions=True)
-        for worker in self._alive:  # and one that began meanwhile
+        for worker in self._alive:  # and a worker that started meanwhile
             worker.kill()
         await asyncio.gather(*(worker.ended() for worker in self._alive))
 
@@ -215,7 +214,7 @@ class _Worker:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
-        # One reader for all lines: reading may be given up between two of them.
+        # A single reader for all lines: a caller may stop waiting between two lines.
         self._lines: asyncio.Queue[bytes] = asyncio.Queue()
         self._reader = asyncio.get_running_loop().create_task(self._read_lines())
 
@@ -261,7 +260,7 @@ class _Worker:
         try:
             while line := await self._process.stdout.readline():
                 self._lines.put_nowait(line)
-        except ValueError:  # a message beyond any measure
+        except ValueError:  # a message longer than `_LONGEST`
             self.kill()
         await self._process.wait()
         self._lines.put_nowait(b"")

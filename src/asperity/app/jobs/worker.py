@@ -1,7 +1,7 @@
 """The process that runs a job: one line of JSON in a request, lines of JSON as it goes on.
 
 Started as ``python -m asperity.app.jobs.worker MODULE [LAW...]``: it imports the module and
-registers the laws, given by their places. A request is ``{"job": "module:function", "argument":
+registers the laws. A request is ``{"job": "module:function", "argument":
 ..., "limits": ...}``; the function is called with the argument and with a function that sends a
 message, and its result is the last message. ``{"cancel": true}`` on the input makes the next report
 of progress raise `Cancelled`.
@@ -34,7 +34,7 @@ except ImportError:  # Windows has no such limits
 def set_limits(limits: Mapping[str, int]) -> None:
     """Address space (``memory``, bytes) and processor time (``seconds``) until the process ends.
 
-    Both are beyond what the process has taken before. The system ends the process after its time,
+    Both count from what the process has used so far. The system ends the process after its time,
     and refuses it memory.
     """
     for kind, end in _ends(limits).items():
@@ -56,7 +56,7 @@ def limited(limits: Mapping[str, int]) -> Iterator[None]:
 
 
 def _ends(limits: Mapping[str, int]) -> dict[int, int]:
-    """Where each of the system's limits comes to lie, within those that the process has."""
+    """The new values of the limits of the system, within the present ones."""
     if resource is None:
         return {}
     used = resource.getrusage(resource.RUSAGE_SELF)
@@ -67,13 +67,13 @@ def _ends(limits: Mapping[str, int]) -> dict[int, int]:
     result = {}
     for name, more in limits.items():
         kind, before = taken[name]
-        own = [end for end in resource.getrlimit(kind) if end != resource.RLIM_INFINITY]
-        result[kind] = min([before + more, *own])
+        present = [end for end in resource.getrlimit(kind) if end != resource.RLIM_INFINITY]
+        result[kind] = min([before + more, *present])
     return result
 
 
 def _address_space() -> int:
-    """Address space (bytes) that the process has taken; 0 where the system does not say."""
+    """Address space (bytes) that the process uses; 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     except (OSError, ValueError):
@@ -88,19 +88,19 @@ Report = Callable[..., None]
 
 
 class Cancelled(BaseException):
-    """Whoever asked no longer waits.
+    """The client no longer waits for the result.
 
-    Not an `Exception`, so that nothing on the way catches it.
+    Not an `Exception`, so that no handler in between catches it.
     """
 
 
 def main() -> None:
     """Run jobs until the input ends."""
-    # What libraries print must not get between the messages.
+    # Output of libraries must not mix with the messages.
     channel = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)
     with contextlib.suppress(AttributeError, OSError):
-        os.nice(10)  # the page's own requests go first
+        os.nice(10)  # requests of the page go first
     requests: list[dict[str, Any]] = []
     arrived = threading.Semaphore(0)
     cancelled = threading.Event()
@@ -116,7 +116,7 @@ def main() -> None:
         os._exit(0)  # the server is gone
 
     threading.Thread(target=listen, daemon=True).start()
-    _import(*sys.argv[1:])  # what jobs need, before the first one comes
+    _import(*sys.argv[1:])  # what jobs need, before the first job
     while True:
         arrived.acquire()
         request = requests.pop(0)
@@ -158,7 +158,7 @@ def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Even
         import traceback
 
         traceback.print_exc()
-        text = f"the computation failed for a reason of its own ({type(error).__name__})"
+        text = f"the computation failed by a defect of the program ({type(error).__name__})"
         send(error=text, fault=True, done=True)
 
 

@@ -3,9 +3,9 @@
 import { redrawAll } from "./lib/charts.js";
 import { el, fill } from "./lib/dom.js";
 import { dropLink, flushLink, linkTo, readLink, writeLink } from "./lib/link.js";
-import { names, setNames, useNames } from "./lib/names.js";
-import { get } from "./lib/server.js";
+import { get, Refused } from "./lib/server.js";
 import { useKinds } from "./lib/units.js";
+import { names, setNames, useNames } from "./lib/words.js";
 import * as data from "./tabs/data.js";
 import * as explore from "./tabs/explore.js";
 import * as map from "./tabs/map.js";
@@ -16,6 +16,7 @@ import * as paper from "./tabs/paper.js";
 // have `hide()`, called when another tab is opened, and `renamed()`, called when numbers get other names.
 const TABS = [explore, map, data, paper];
 
+const root = document.documentElement;
 const content = document.getElementById("content");
 const bar = document.getElementById("tabs");
 const state = document.getElementById("state");
@@ -26,7 +27,9 @@ const page = {
   catalogue: null,
   /** Write a view of the tab into the address. */
   setLink(tab, parameters) {
-    if (names() === "geophysics") parameters.set("names", names());
+    parameters.set("names", names());
+    if (root.classList.contains("lecture")) parameters.set("letters", "large");
+    else parameters.delete("letters");
     if (current === tab) writeLink(tab, parameters);
     opened.get(tab).parameters = parameters;
   },
@@ -46,6 +49,7 @@ function show() {
   const { tab, parameters } = readLink();
   const module = TABS.find((t) => t.name === tab) || TABS[0];
   if (parameters.has("names")) setNames(parameters.get("names"));
+  root.classList.toggle("lecture", parameters.get("letters") === "large" || Boolean(document.fullscreenElement));
   nameNames();
   if (current && current !== module.name) opened.get(current)?.hide?.();
   current = module.name;
@@ -61,7 +65,6 @@ function show() {
 }
 
 function changeTheme() {
-  const root = document.documentElement;
   const dark = root.dataset.theme
     ? root.dataset.theme === "dark"
     : matchMedia("(prefers-color-scheme: dark)").matches;
@@ -76,15 +79,15 @@ function changeTheme() {
 function nameNames() {
   const button = document.getElementById("names");
   const geophysics = names() === "geophysics";
-  button.textContent = geophysics ? "a, b, D_c" : "A, B, D₀";
-  button.setAttribute("aria-label", geophysics ? "Names of geophysics: a, b, D_c. Change to A, B, D0" : "Names: A, B, D0. Change to those of geophysics, a, b, D_c");
+  button.textContent = geophysics ? "Names: a, b, D_c" : "Names: A, B, D₀";
+  button.title = geophysics ? "Names of geophysics; change to A, B, D₀" : "Names of the friction paper; change to those of geophysics: a, b, D_c";
 }
 
 function changeNames() {
   setNames(names() === "geophysics" ? "friction" : "geophysics");
   nameNames();
   for (const [tab, { renamed, parameters, show: again }] of opened) {
-    parameters.delete("names");
+    parameters.set("names", names());
     if (renamed) renamed();
     else if (tab === current) again(parameters);
   }
@@ -93,7 +96,14 @@ function changeNames() {
 /** Full screen, with letters for a lecture. */
 function changeScreen() {
   if (document.fullscreenElement) document.exitFullscreen();
-  else document.documentElement.requestFullscreen();
+  else if (root.classList.contains("lecture")) setLetters(false); // as a link had them
+  else root.requestFullscreen();
+}
+
+function setLetters(large) {
+  root.classList.toggle("lecture", large);
+  page.setLink(current, opened.get(current).parameters);
+  redrawAll();
 }
 
 let resized = 0;
@@ -121,10 +131,7 @@ async function start() {
   document.getElementById("theme").addEventListener("click", changeTheme);
   document.getElementById("names").addEventListener("click", changeNames);
   document.getElementById("full").addEventListener("click", changeScreen);
-  document.addEventListener("fullscreenchange", () => {
-    document.documentElement.classList.toggle("lecture", Boolean(document.fullscreenElement));
-    redrawAll();
-  });
+  document.addEventListener("fullscreenchange", () => setLetters(Boolean(document.fullscreenElement)));
   addEventListener("hashchange", show);
   addEventListener("resize", () => {
     clearTimeout(resized);
@@ -135,4 +142,7 @@ async function start() {
   show();
 }
 
-start();
+start().catch((error) => {
+  if (!(error instanceof Refused)) throw error;
+  fill(content, el("p", { class: "message", role: "alert" }, error.message));
+});

@@ -48,7 +48,7 @@ from asperity.parameters.parameter import Drawn, SummaryLine
 
 #: Called with how many laws are done, parts of one included.
 Report = Callable[[float], None]
-#: Parts that the fit of a law, and what is said beside it, count as in the progress.
+#: Parts that the fit of a law, and its evidence, count as in the progress.
 _STEPS = 100
 #: Drawn starts of a fit that is repeated without outliers.
 _STARTS_AGAIN = 16
@@ -188,7 +188,7 @@ def compare(
         raise InputError(
             f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
         )
-    # Those of laws alone; others are of the machine, the runs or unknown, which the fit says.
+    # Parameters of laws; those of machine and runs, and unknown names, are checked by the fit.
     nobodys = [
         p for p in free or () if p in _of_any_law() and not any(p in _parameters(n) for n in laws)
     ]
@@ -282,7 +282,7 @@ def compare(
 
 
 def _support(comparison: Comparison) -> tuple[str, str]:
-    """What the verdict on the best law that is not as good as the best rests on."""
+    """Doubts and deciding stretches of the verdict on the best disfavoured law."""
     for judged in comparison.laws.values():
         best = comparison.laws[comparison.best].fit if comparison.best else judged.fit
         if judged.fit.converged and judged.fit.aicc - best.aicc >= DISFAVOURED:
@@ -291,15 +291,11 @@ def _support(comparison: Comparison) -> tuple[str, str]:
 
 
 def _without_numbers(not_compared: Mapping[str, str]) -> str:
-    """That laws were not compared: the verdict is not about them."""
+    """A sentence on laws that were not compared."""
     if not not_compared:
         return ""
     names = list(not_compared)
-    which, have = ("these laws", "have") if len(names) > 1 else ("this law", "has")
-    return (
-        f" Nothing is said of {_listed(names)}: {which} {have} numbers that are neither free nor "
-        "given."
-    )
+    return f" Not compared: {_listed(names)}, for want of numbers that are neither free nor given."
 
 
 def _within_law(report: Report, laws: int, done: int, total: int) -> None:
@@ -307,7 +303,7 @@ def _within_law(report: Report, laws: int, done: int, total: int) -> None:
 
 
 def _freed(comparison: Comparison) -> str:
-    """What a free stiffness would change, where no law describes the data."""
+    """A sentence on the law that describes the data with a free stiffness, where none does."""
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     if any(f.dof <= 0 or f.p_value >= IMPOSSIBLE for f in fits):
         return ""
@@ -335,10 +331,10 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
     def excluded(comparison: Comparison) -> list[str]:
         return sorted(name for name, j in comparison.laws.items() if j.excluded)
 
-    beside = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
+    which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
     said = (
         f"No law describes {_listed(rows)} together with the other rows; check that measurement. "
-        f"With it, {beside} would be excluded. Without: "
+        f"With it, {which} are excluded. Without it: "
     )
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 
@@ -368,7 +364,7 @@ def _examined(comparison: Comparison, report: Report) -> Comparison:
 
 
 def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
-    """What evidence and cross-validation say beside the rule, about laws that are left."""
+    """Sentences on evidence and cross-validation of the laws that are not excluded."""
     said = ""
     left = [n for n, j in judged.items() if not j.excluded and j.evidence and n != best]
     top = judged[best].evidence if best in judged else None
@@ -445,8 +441,8 @@ def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tupl
         if behind < EXCLUDED:
             return False, ""
         return True, (
-            f"its log-likelihood is {best.log_likelihood - result.log_likelihood:.4g} lower than "
-            f"that of {best.law}, noise included, and its AICc {behind:.4g} above"
+            f"its AICc is {behind:.4g} above that of {best.law}, its log-likelihood "
+            f"{best.log_likelihood - result.log_likelihood:.4g} lower"
         )
     worst = max(
         result.observables,
@@ -486,11 +482,11 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
         parts.append(
             f"No law describes these data within their uncertainties: the best, {best}, has "
             f"chi-squared {f.chi2:.4g} for {f.dof} degrees of freedom; either all laws are wrong "
-            f"or the uncertainties are too small by a factor of about {factor:.3g}, beside which "
-            + (f"the data would exclude {_listed(out)}" if out else "the data could not tell")
+            f"or the uncertainties are too small by a factor of about {factor:.3g}; with that "
+            + (f"the data exclude {_listed(out)}" if out else "the data exclude no law")
         )
     elif len(left) == 1 and not unknown:
-        parts.append(f"These data leave {left[0]} and exclude {_listed(out)}")
+        parts.append(f"These data favour {left[0]} and exclude {_listed(out)}")
     else:
         lowest = min(judged[name].fit.aicc for name in left)
         behind = {name: judged[name].fit.aicc - lowest for name in left}
@@ -502,12 +498,26 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
             f"cannot tell {_listed(near)} apart" if len(near) > 1 else f"prefer {near[0]}",
         ]
         parts.append(f"These data {_listed([word for word in words if word])}")
-    parts += [f"{name}: {judged[name].why}" for name in out]
+    parts += [f"{name}: {judged[name].why}" for name in out if judged[name].fit.judged_by_chi2]
+    by_likelihood = [name for name in out if not judged[name].fit.judged_by_chi2]
+    if by_likelihood:
+        nearest = by_likelihood[0]
+        parts.append(
+            f"{nearest}, the nearest of them, has an AICc {_behind(judged, nearest, best):.3g} "
+            f"above that of {best}, and {EXCLUDED:g} excludes"
+            if len(by_likelihood) > 1
+            else f"its AICc is {_behind(judged, nearest, best):.3g} above that of {best}, and "
+            f"{EXCLUDED:g} excludes"
+        )
     if unknown:
-        parts.append(f"{_listed(unknown)}: no fit converged, so that nothing is said of it")
+        parts.append(f"{_listed(unknown)} cannot be judged: no fit converged")
     if describes and len(left) > 1:
         parts.append(what_would_tell(judged[left[0]].fit, judged[left[1]].fit))
     return "; ".join(p for p in parts if p) + "."
+
+
+def _behind(judged: Mapping[str, Judged], name: str, best: str) -> float:
+    return judged[name].fit.aicc - judged[best].fit.aicc
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The scale of verdicts on laws, which all doors use: excluded, disfavoured, cannot tell.
+"""The scale of verdicts on laws: excluded, disfavoured, cannot tell.
 
 Each word stands with the number that decides and the thresholds that it is compared with.
 """
@@ -19,7 +19,7 @@ Word = Literal["excluded", "disfavoured", "cannot tell", "no fit"]
 
 
 class Standing(NamedTuple):
-    """Where a law stands beside the best one.
+    """Where a law stands relative to the best one.
 
     Attributes
     ----------
@@ -51,16 +51,20 @@ def standing(
     """
     if math.isnan(behind):
         return Standing("no fit", "")
-    by_aicc = f"AICc {behind:.3g} above the lowest ({DISFAVOURED:g} and {EXCLUDED:g} decide)"
+    by_aicc = (
+        f"AICc {behind:.3g} above the lowest (from {DISFAVOURED:g} disfavoured, from {EXCLUDED:g} "
+        "excluded)"
+    )
     if excluded:
         if p_value is not None and p_value < IMPOSSIBLE and behind < EXCLUDED:
-            return Standing("excluded", f"p = {p_value:.2g} (below {IMPOSSIBLE:g} decides)")
+            return Standing("excluded", f"p = {p_value:.2g} (excluded below {IMPOSSIBLE:g})")
         return Standing("excluded", by_aicc)
     if behind >= DISFAVOURED:
         return Standing("disfavoured", by_aicc)
     if evidence_behind >= math.log(FACTOR):
         factor = math.exp(min(evidence_behind, 700.0))
         return Standing(
-            "disfavoured", f"evidence lower by a factor of {factor:.2g} ({FACTOR:g} decides)"
+            "disfavoured",
+            f"evidence lower by a factor of {factor:.2g} (from {FACTOR:g} disfavoured)",
         )
     return Standing("cannot tell", by_aicc)

@@ -1,10 +1,11 @@
-"""What a verdict on recordings rests on: the stretch that tells two laws apart, and its doubts."""
+"""The stretch and the half of a recording that decide between two laws, and doubts about them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from asperity.inference.fitting.result import Fit
+from asperity.inference.comparison.scale import EXCLUDED
+from asperity.inference.fitting.result import Fit, Float
 from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.term import RunTerm
 
@@ -16,7 +17,13 @@ _NOT_WHITE = 1e-3
 
 
 def support(best: Fit, other: Fit) -> tuple[str, str]:
-    """Doubts about the stretches that decide between two laws, and where these lie, as sentences.
+    """Doubts about what decides between two laws, and a stretch that decides, as sentences.
+
+    Two of the doubts are about the window. The difference of AICc is a sum over the recording, in
+    the proportion of the squared innovations: the verdict rests on a short stretch without which it
+    would not exclude the other law; and it changes with the window where one half is for the other
+    law by as much as excludes. With the better law true that has a probability below exp(-5), by
+    Markov's inequality for the ratio of likelihoods.
 
     Parameters
     ----------
@@ -31,29 +38,48 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
     doubts, stretches = [], []
     pairs = zip(best.objective.terms_of(RunTerm), other.objective.terms_of(RunTerm), strict=True)
     for first, second in pairs:
-        begin, end = _deciding(first, best, second, other)
-        span = f"{begin:.4g} to {end:.4g} s of {first.name}"
+        name, time = first.name, first.run.time
+        edges, total = _gains(first, best, second, other)
+        begin, end, _ = _shortest(edges, total, _MOST, time)
+        span = f"{begin:.4g} to {end:.4g} s of {name}"
+        whole, behind = float(time[-1] - time[0]), other.aicc - best.aicc
+        a, b, share = _shortest(edges, total, 1 - EXCLUDED / max(behind, EXCLUDED), time)
+        if behind >= EXCLUDED and b - a <= _SHORT * whole:
+            doubts.append(
+                f"it rests on {a:.4g} to {b:.4g} s of {name}, {(b - a) / whole:.1%} of the "
+                f"recording: without that stretch the AICc of {other.law} is "
+                f"{behind * (1 - share):.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
+                "(compare with a --window that leaves it out)"
+            )
+        elif end - begin <= _SHORT * whole:
+            stretches.append(
+                f"Most of what tells {best.law} from {other.law} lies in {span}, "
+                f"{(end - begin) / whole:.1%} of it"
+            )
+        middle = len(edges) // 2
+        halves = {"first": behind * total[middle], "second": behind * (1 - total[middle])}
+        doubts += [
+            f"it changes with the window: the {half} half of {name} alone is for {other.law}, by "
+            f"{-gain:.3g} in AICc"
+            for half, gain in halves.items()
+            if gain <= -EXCLUDED
+        ]
         inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
         if first.law_fails_after_changes:
             doubts.append(f"even {best.law} misses what follows the velocity changes")
         if first.noise["whiteness_p"] < _NOT_WHITE:
-            doubts.append(f"the noise of {first.name} is not the process that was fitted")
-        whole = first.run.time[-1] - first.run.time[0]
-        if end - begin <= _SHORT * whole:
-            stretches.append(
-                f"What tells {best.law} from {other.law} lies in {span}, "
-                f"{(end - begin) / whole:.1%} of it: compare without it too (--window)"
-            )
-    doubt = f"In doubt, since {' and '.join(doubts)}. " if doubts else ""
+            doubts.append(f"the noise of {name} is not the process that was fitted")
+    doubt = f"This verdict is doubtful: {'; '.join(doubts)}. " if doubts else ""
     return doubt, "".join(f" {sentence}." for sentence in stretches)
 
 
-def _deciding(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[float, float]:
-    """Times (s) of the shortest stretch with most of the difference of two log-likelihoods.
+def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Float, Float]:
+    """Edges of the parts of a recording, as samples, and the share of the gain up to each.
 
-    Both laws are judged by the noise that the better one leaves.
+    The gain is that of `best` in the sum of squared innovations. Both laws are judged by the noise
+    that the better one leaves.
     """
     run = first.run
     noise = [model.whitening for model in first.models]
@@ -64,7 +90,16 @@ def _deciding(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[f
     edges = np.linspace(0, run.time.size, min(_PARTS, run.time.size) + 1).astype(int)
     gains = np.add.reduceat(squares[1] - squares[0], edges[:-1])
     total = np.concatenate([[0.0], np.cumsum(gains)])
-    within = total[None, :] - total[:, None] >= _MOST * total[-1]
-    length = np.where(np.triu(within, 1), edges[None, :] - edges[:, None], run.time.size + 1)
+    return edges, total / total[-1]
+
+
+def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[float, float, float]:
+    """Ends (s) of the shortest stretch with so much of the gain, and how much it has.
+
+    The whole recording where no stretch does.
+    """
+    within = total[None, :] - total[:, None] >= share
+    within[0, -1] = True
+    length = np.where(np.triu(within, 1), edges[None, :] - edges[:, None], edges[-1] + 1)
     i, j = np.unravel_index(np.argmin(length), length.shape)
-    return float(run.time[edges[i]]), float(run.time[edges[j] - 1])
+    return float(time[edges[i]]), float(time[edges[j] - 1]), float(total[j] - total[i])

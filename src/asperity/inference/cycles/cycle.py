@@ -101,12 +101,16 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
     """
     machine, events = measurement.machine, measurement.events
     for field, value, example in (
-        ("V", machine.velocity, "V=42 um/s"), ("W0", machine.load, "W0=0.3 N"),
-    ):  # fmt: skip
+        ("V", machine.velocity, "--fix 'V=42 um/s'"),
+        (
+            "W0",
+            machine.load,
+            "--fix 'W0=0.3 N', or of a force over the weight --fix 'M=30 g', whose weight it is",
+        ),
+    ):
         if value is None:
             raise InputError(
-                f"{name} must have {field} for a fit of its cycles, got none; give it, as "
-                f"--fix '{example}'"
+                f"{name} must have {field} for a fit of its cycles, got none; give it, as {example}"
             )
     regular = [r for r in measurement.regimes if r.kind == REGULAR]
     if not regular:

@@ -42,14 +42,14 @@ _TOGETHER = 0.3
 _PRECISE = 0.1
 #: Decrease of chi-squared along a profile that is another minimum.
 _LOWER = 0.01
-#: Evaluations without an orbit after which a profile among searched orbits is given up where nobody
-#: has asked for it: an end of an interval at the edge takes ten, a valley along the edge hundreds.
+#: Evaluations without an orbit after which a profile among searched orbits that was not requested
+#: ends: an end of an interval at the edge takes ten, a valley along the edge hundreds.
 _MOST_UNSOLVED = 80
 #: Minima this near, in standard errors of everything but nuisances, give the same answer.
 _NEAR = 0.5
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
-#: Standard deviations between data and a prior that are worth a warning.
+#: Standard deviations between data and a prior from which a warning says so.
 _CONTRADICTED = 3.0
 #: Relative change of the coordinates that ends a fit with rows left out, and its evaluations.
 _REFITTED, _EVALUATIONS = 1e-6, 20
@@ -110,7 +110,7 @@ def described_fit(
     at = parabola_of(objective, *minima[0])
     if at is None:
         return _fit_at_the_next(objective, minima, profile=profile, described=described)
-    # Intervals under a law that the data contradict say nothing that a search would make better.
+    # A search would not improve intervals under a law that the data contradict.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
     rivals = _rivals(objective, minima, at.sd)
@@ -190,7 +190,7 @@ def _fit_at_the_next(
 ) -> Fit:
     """The fit at the second minimum.
 
-    The first was found once on another way, at the edge of the region in which there are orbits.
+    The first lies at the edge of the region in which there are orbits, and was not reached again.
     """
     if not minima[1:]:
         return failed_fit(objective)
@@ -208,7 +208,7 @@ def _ends(
 ) -> list[tuple[float, float]]:
     """Ends of the intervals of a coordinate, one for each level.
 
-    All there are; of those along a profile only up to the one that has led to a lower minimum.
+    Those along a profile stop at the first that leads to a lower minimum.
     """
     low, high = objective.unknowns[i].bounds
     ends = []
@@ -315,8 +315,8 @@ def _profiled(
 ) -> set[int]:
     """Coordinates whose intervals are by profile likelihood.
 
-    All if that was asked for; otherwise those of which the normal approximation says too little,
-    and what goes with them. Objectives with recordings take minutes for it: only if asked for.
+    All on request; otherwise those for which the normal approximation fails, and those correlated
+    with them. Objectives with recordings take minutes for it: only on request.
     """
     if everything:
         return set(range(len(objective.unknowns)))
@@ -376,7 +376,7 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
         for sign in (-1, 1):
             point = at.u + sign * _TRIED_AT * at.covariance[:, i] / sd[i]
             if (point <= low).any() or (point >= high).any():
-                continue  # an interval beside a bound
+                continue  # an interval next to a bound
             rise = objective.chi2(point) - at.chi2
             if rise > _HIGHEST_RISE:
                 # The valley may bend, and be as wide as it should be nevertheless.
@@ -444,7 +444,7 @@ def _hull(
 
 
 def _with_warnings(fit: Fit, said: list[str]) -> Fit:
-    """The fit with what its user must know beside the numbers, after what was said before."""
+    """The fit with its warnings, those in `said` first."""
     if fit.dof > 0 and fit.p_value < _MISFIT:
         worst = max(fit.observables, key=lambda n: _excess(*fit.observables[n]))
         said.append(
@@ -541,8 +541,9 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     ]
     if partners:
         return (
-            f"{name} is not determined by these data beside {' and '.join(partners)}: they change "
-            "the predictions together; fix one, give a prior, or measure what tells them apart"
+            f"{name} is not determined by these data together with {' and '.join(partners)}: they "
+            "change the predictions in the same way; fix one, give a prior, or measure what tells "
+            "them apart"
         )
     return (
         f"{name} is not determined by these data; fix it or give a prior: the intervals of the "

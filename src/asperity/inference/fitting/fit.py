@@ -125,7 +125,7 @@ def fit(
     bare : bool
         Whether `free` may be empty with tables: the law is compared with them as it stands.
     starts : int
-        Starts that are drawn and evaluated besides the given one; the best are followed.
+        Starts that are drawn and evaluated in addition to the given one; the best are followed.
     seed : int
         Of the starts.
     simpler : sequence of Fit
@@ -215,7 +215,7 @@ def fit(
     minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
     agreed = True
     if minima and recordings:
-        # Under white noise a drift passes for slow evolution, and the true minimum may be none.
+        # Under white noise a drift looks like slow evolution, and the true minimum may vanish.
         drifting = under_drift(searched) if options.order != 0 else None
         besides = minima_of(drifting, seed, drawn=starts) if drifting else []
         minima, agreed = with_noise(objective, minima, drifting, besides)
@@ -334,8 +334,12 @@ def _cycle_objective(
         law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
         priors=priors, usual=usual,
     )  # fmt: skip
+    # A cycle needs a mass.
+    unknowns = tuple(
+        replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
+    )
     terms = tuple(CycleTerm(cycle, law, constants) for cycle in cycles)
-    return Objective(terms, law, unknowns, constants, tolerance=1e-6)
+    return Objective(terms, law, unknowns, constants, curved=True)
 
 
 def _fit_alone(

@@ -41,7 +41,7 @@ from asperity.units import KINDS, to_si
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
 
-#: Velocity (m/s) that a free mu0 is told for, if no other is given.
+#: Velocity (m/s) at which a free mu0 is reported, if no other is given.
 _REFERENCE_VELOCITY = 1e-6
 
 
@@ -51,7 +51,7 @@ def free_by_default(
     fixed: Mapping[str, Any] | None,
     material: Material | None,
 ) -> list[str]:
-    """What is free where nothing is said of it: all numbers of a law that the data may show.
+    """Free parameters by default: all numbers of a law that the data may show.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def fixed_values(
 
     Without a table, what only its operating points need is left out, and runs give their load,
     their friction at the begin as mu0, and their first velocity as V0. Where mu0 is free, V0 is 1
-    um/s if it is not given: the velocity that mu0 is told for.
+    um/s if it is not given: the velocity at which mu0 is reported.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Confidence intervals: by the parabola about a minimum, beside a bound, and by profile likelihood.
+"""Confidence intervals: by the parabola about a minimum, at a bound, and by profile likelihood.
 
 Near a bound the interval of the likelihood ratio with the usual thresholds covers too often or too
 rarely. The thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) hold the coverage, and
@@ -191,7 +191,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     data = objective.data_residuals(u)
     if data is None:
         return None
-    # A delay whose range the pieces of the drive leave no room in is as good as known.
+    # A delay at its bound, as the pieces of the drive leave no room, counts as known.
     J = np.where(_held(objective, u), 0.0, J)
     covariance, missing = inverse_information(J.T @ J)
     total, freedom = _with_estimated_noise(objective, u, covariance, missing)
@@ -297,6 +297,9 @@ _ACCURACY = 1e-2
 _TOLERANCE = 1e-5
 #: Standard deviations below the threshold at which a profile that ends has an edge, not an end.
 _JUMP = 0.1
+#: Rise of chi-squared between two points of a profile that is no part of a narrow valley, ten
+#: standard deviations, and how often the way there is halved.
+_LEAP, _HALVINGS = 100.0, 4
 #: Rise of chi-squared that stands for values without a periodic orbit.
 _NO_ORBIT = 1e3
 
@@ -338,7 +341,7 @@ class Profile:
         self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
         self.search = search
         self.most = objective.unsolved + most
-        # No farther at once than a factor of e, where the approximation may be worth nothing.
+        # At most a factor of e in one step: the approximation may fail beyond.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
@@ -398,22 +401,32 @@ class Profile:
 
     def _excess(self, x: float, level: float, wider: float) -> float:
         """Root of the rise of chi-squared less that of its threshold: nearly linear in x."""
-        if x not in self.path:
-            nearest = min(self.path, key=lambda known: abs(known - x))
-            for begin in (self._start(x), self.path[nearest][0]):
-                if self.objective.searches and self.objective.unsolved > self.most:
-                    raise ProfileAtEdgeError
-                result, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
-                if math.isfinite(value):
-                    break
-            else:
-                return math.sqrt(_NO_ORBIT)
-            self.path[x] = result, value
+        if x not in self.path and not self._reached(x, _HALVINGS):
+            return math.sqrt(_NO_ORBIT)
         low, high = self.objective.unknowns[self.i].bounds
         distance = min(x - low, high - x) / (wider * self.sd)
         limit = wider**2 * bounded_threshold(distance, level)
         rise = max(self.path[x][1] - self.chi2, 0.0)
         return math.sqrt(rise) - math.sqrt(limit)
+
+    def _reached(self, x: float, halvings: int) -> bool:
+        """Whether there is a minimum over the others at x, which is kept."""
+        nearest = min(self.path, key=lambda known: abs(known - x))
+        for begin in (self._start(x), self.path[nearest][0]):
+            if self.objective.searches and self.objective.unsolved > self.most:
+                raise ProfileAtEdgeError
+            result, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
+            if math.isfinite(value):
+                break
+        far = not value < self.path[nearest][1] + _LEAP
+        if self.objective.curved and halvings and far:
+            # Off a narrow valley a minimisation may end anywhere: the way there is made in parts.
+            if self._reached((x + nearest) / 2, halvings - 1):
+                return self._reached(x, halvings - 1)
+            return False
+        if math.isfinite(value):
+            self.path[x] = result, value
+        return math.isfinite(value)
 
     def _start(self, x: float) -> Float:
         """The others on the line through the nearest points known, or by the approximation."""

@@ -1,4 +1,4 @@
-"""Minima of recordings under the noise that their own residuals show."""
+"""Minima of recordings under the noise of their residuals."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def with_noise(
 ) -> Found:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    Those of `besides`, minima of `drifting`, are followed too if the ends of the others are none
-    there. Each minimum has the noise that its own residual shows. They are compared by the
+    `besides` are minima of `drifting`; one is followed where no end of the others is a minimum of
+    `drifting` too. Each minimum has the noise that its own residual shows. They are compared by the
     likelihood, noise included: under the noise of one, which holds its misfit, another is no
     minimum.
 

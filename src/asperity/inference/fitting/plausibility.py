@@ -1,4 +1,4 @@
-"""Fits held against given stiffnesses, each other and usual contacts.
+"""Fits compared with given stiffnesses, with each other and with usual contacts.
 
 Readings by a lock-in see the stiffness to a few per cent and better: a wrong one makes every law
 fail, or has a wrong law take its place.
@@ -140,7 +140,7 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     Parameters
     ----------
     fit : Fit
-        Converged, to one table; nothing is said of one that describes it, or has K free.
+        Converged, to one table; empty for one that describes it, or has K free.
     progress : callable, optional
         Called with the number of minimisations done, and of all.
     """

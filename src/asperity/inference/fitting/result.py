@@ -1,4 +1,4 @@
-"""What a fit says: estimates with intervals, its quality and warnings, and all as a record."""
+"""The result of a fit: estimates with intervals, quality and warnings, and all as a record."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ class Shown(NamedTuple):
 
     @classmethod
     def of(cls, value: float, se: float, unit: str) -> Shown:
-        """Of a value and its standard error in SI."""
-        shown, power = display_unit(value, unit)
+        """Of a value and its standard error in SI; the larger of the two chooses the unit."""
+        shown, power = display_unit(max(abs(value), se) if math.isfinite(se) else value, unit)
         scale = 10.0**-power
         return cls(rounded(value * scale, se * scale)[0], shown, power, se * scale)
 

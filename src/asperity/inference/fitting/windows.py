@@ -214,8 +214,8 @@ def disagreeing(
     for span, value in zip(spans, over.values, strict=True):
         if abs(float(unknown.to_coordinate(value)) - mean) > _FAR_OFF * total:
             result.append(
-                f"{_shown(span)}: {over.name} is {value:.4g} {over.unit}, far outside what the "
-                "other windows say, and counts for little; look at its fit before believing theirs"
+                f"{_shown(span)}: {over.name} is {value:.4g} {over.unit}, far from the "
+                "estimates of the other windows, and has a small weight; look at its fit first"
             )
     return result
 

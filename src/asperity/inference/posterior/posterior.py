@@ -1,4 +1,4 @@
-"""What a sampled posterior says: draws, intervals, and whether the chains can be believed."""
+"""A sampled posterior: draws, intervals, and convergence of the chains."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 _AGREE = 1.01
 #: Effective draws below which quantiles are not to be believed, for each chain (the same).
 _ENOUGH = 100.0
-#: Share of trajectories without a solution at an end that is worth a warning.
+#: Share of trajectories without a solution at an end from which a warning says so.
 _FEW_FAILED = 1e-3
 
 
@@ -267,7 +267,8 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
         said.append(
             f"{failed} of {stats.failed.size} trajectories ended where the law has no motion that "
             "the program can compute (at some row of a table the fast method finds no periodic "
-            "orbit, or through a recording sliding runs away); the posterior is cut off there"
+            "orbit, or in a recording sliding accelerates without bound); the posterior is cut off "
+            "there"
         )
     return said
 

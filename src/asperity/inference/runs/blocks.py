@@ -214,7 +214,7 @@ def _needed(run: RecordedRun) -> tuple[float, bool]:
 
 
 def _within(run: RecordedRun, length: float) -> float:
-    """What differences of the halves of blocks hold beside noise, after changes of the drive.
+    """Differences of the halves of blocks in excess of noise, after changes of the drive.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""A recorded run without its defects: what is found once, before the fit, and reported by it.
+"""A recorded run without its defects, which are removed once, before the fit, and reported by it.
 
-Spikes give way to the line between their neighbours, long recordings are averaged over blocks, and
-the level behind a jump of the gauge is a nuisance of the fit. What the drive does is known here:
-friction itself is quick after a change of the velocity or the load.
+Spikes are replaced by the line between their neighbours, long recordings are averaged over blocks,
+and the level after a jump of the gauge is a nuisance of the fit. Changes of the drive are known
+here: friction itself changes quickly after them.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ Float = NDArray[np.float64]
 
 #: Changes of the load are few if there are so many samples to each.
 _FEW_CHANGES = 100
-#: Share of samples that may be spikes, besides one: noise with more of them is not normal.
+#: Share of samples, and one more, that may be spikes: noise with more of them is not normal.
 _MOST_SPIKES = 0.01
-#: Share of the segments beside a change of the drive, and samples about it, in which friction is
-#: too quick for a jump to be told.
+#: Share of the segments next to a change of the drive, and samples about it, in which friction
+#: changes too quickly to recognise a jump.
 _NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
 
 

@@ -1,5 +1,8 @@
 """Innovations of a recording's noise, tests of them, and what estimating the noise costs.
 
+Innovations are independent and normal with unit variance if law and noise are right. A law, a gauge
+or a drive that is not that of the recording shows in the samples after the changes of the drive.
+
 The covariance of generalised least squares is that under known noise. The coefficients of the noise
 are estimated from the same samples: estimates vary with them (Kackar and Harville, J. Am. Stat.
 Assoc. 79, 853, 1984), and so does the covariance itself, whose degrees of freedom (Satterthwaite,
@@ -110,6 +113,40 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
         peak = min(peak, -math.expm1(m * math.log1p(-math.exp(-spectrum.max() / spectrum.mean()))))
     count = len(innovations)
     return Whiteness(portmanteau, min(1.0, worst * count), min(1.0, peak * count))
+
+
+#: Samples after a change in which a misfit is looked for, and before it: its time is uncertain.
+_AFTER, _BEFORE = (5, 20, 80), 5
+
+
+def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, float]:
+    """Probability of innovations as large as those after the changes, and their size.
+
+    Parameters
+    ----------
+    white : array, shape (n,)
+    first : sequence of int
+        First sample after each change.
+
+    Returns
+    -------
+    (float, float)
+        Probability by chi-squared, over the spans that are looked at; root mean square of the
+        innovations in the span of the lowest one, over that of the others.
+    """
+    lowest, size = 1.0, 1.0
+    for span in _AFTER:
+        inside = np.zeros(white.size, bool)
+        for k in first:
+            inside[max(k - _BEFORE, 0) : k + span] = True
+        if not inside.any() or inside.mean() > 0.25:
+            continue
+        other = float(np.mean(white[~inside] ** 2))
+        ratio = float(np.mean(white[inside] ** 2)) / max(other, 1e-300)
+        chance = float(chdtrc(int(inside.sum()), ratio * inside.sum()))
+        if chance < lowest:
+            lowest, size = chance, ratio**0.5
+    return min(1.0, len(_AFTER) * lowest), size
 
 
 #: Samples whose derivatives are held at once.

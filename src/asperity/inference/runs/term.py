@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.misfit import misfit_after_changes
 from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
+    misfit_after_changes,
     whiteness,
 )
 from asperity.inference.runs.reading import reading_at
@@ -277,7 +277,7 @@ class RunTerm:
         return True
 
     def _estimate_noise(self, difference: Float, jacobian: Float) -> None:
-        """One step towards the noise that the residual shows beside what the fit takes off it."""
+        """One step towards the noise of the residual, corrected for what the fit takes off it."""
         left = difference + self._columns @ self._coefficients(difference)
         curves = np.column_stack([jacobian[:, np.any(jacobian, axis=0)], self._columns])
         white = self._whitened(curves)
@@ -374,8 +374,8 @@ class RunTerm:
         those = f"{len(times)} samples" if len(times) > 1 else "a sample"
         return (
             f"{those} of {self.name}, at {shown} s after the first sample, "
-            f"{'stand' if len(times) > 1 else 'stands'} out of both neighbours as no motion does, "
-            "and the line between these was read instead"
+            f"{'are spikes' if len(times) > 1 else 'is a spike'}, which no motion of the slider "
+            "makes; replaced by the line between the neighbours"
         )
 
     def inner(self, name: str) -> str | None:

@@ -150,7 +150,7 @@ def measured_stiffness(
     if not spread > _MOVES * noise:
         raise InputError(
             f"span must have a load point that moves, got {spread:.3g} m from {low:g} to {high:g} s"
-            f" beside noise of {noise:.2g} m; give a stretch of unloading or reloading"
+            f" with noise of {noise:.2g} m; give a stretch of unloading or reloading"
         )
     half = float(np.ptp(moved)) / 2
     u = (moved - moved.mean()) / half

@@ -67,12 +67,12 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
         return result
 
     def farthest_of(some: Residuals) -> set[int]:
-        return set(rows[np.argsort(-_distances(some)[rows])[:most]].tolist())
+        return set(rows[np.argsort(-row_distances(some)[rows])[:most]].tolist())
 
     try:
         now, apart = residuals, _chi2(residuals, farthest_of(residuals))
         for _ in range(_REWEIGHTED):
-            now = fitted(np.maximum(_distances(now), 1.0) ** -0.5)
+            now = fitted(np.maximum(row_distances(now), 1.0) ** -0.5)
             before, apart = apart, _chi2(now, farthest_of(now))
             if apart > _FALLING * before and _p_value(now, farthest_of(now)) < _FAR_OFF:
                 # The law is wrong for most rows, and comes no nearer to them.
@@ -91,7 +91,7 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
         return []
     if not _p_value(now, out) >= _DESCRIBED:
         return []
-    return sorted(out, key=lambda row: -_distances(now)[row])
+    return sorted(out, key=lambda row: -row_distances(now)[row])
 
 
 class _NoFitError(Exception):
@@ -109,7 +109,7 @@ def _linear_refit(residuals: Residuals, weights: Float) -> Residuals | None:
     return residuals._replace(values=residuals.values + J @ shift, jacobian=J)
 
 
-def _distances(residuals: Residuals) -> Float:
+def row_distances(residuals: Residuals) -> Float:
     """Root mean square of the residuals of each row; 0 of one without any."""
     of_rows = residuals.row >= 0
     row = residuals.row[of_rows]

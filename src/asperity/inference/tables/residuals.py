@@ -2,8 +2,8 @@
 
 Harmonics with a phase are compared as complex numbers, turned by the measured phase: the radial
 part over the uncertainty of the amplitude, the tangential part over amplitude times the uncertainty
-of the phase. A harmonic that is small beside its uncertainty then does not bias the fit, as its
-amplitude, which is never negative, would.
+of the phase. A harmonic below its uncertainty then does not bias the fit, as its amplitude, which
+is never negative, would.
 
 Every residual is a linear function of what a law predicts at its row. Where the observables of a
 row are correlated, C = S R S with the uncertainties S and the correlations R, the residuals are

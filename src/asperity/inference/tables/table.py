@@ -551,7 +551,7 @@ def _without_copies(table: LockInTable) -> LockInTable:
         del values["delta_mu"]
     remark = (
         f"mean_friction and delta_mu of {table.name} differ by a smooth mu_ss(V) without scatter: "
-        "they are one measurement, which counts once; delta_mu is left out where both are given"
+        "they are one measurement; delta_mu is left out where both are given"
     )
     return replace(table, values=values, remarks=(*table.remarks, remark))
 

@@ -28,7 +28,13 @@ from asperity.inference.tables.residuals import (
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
-from asperity.orbit import KnownOrbits, Outcome, ResponseFunction, response_function
+from asperity.orbit import (
+    KnownOrbits,
+    Outcome,
+    ResponseFunction,
+    ResponseValues,
+    response_function,
+)
 from asperity.parameters import law_parameters
 
 Float = NDArray[np.float64]
@@ -38,9 +44,7 @@ _REMEMBERED = 2048
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
 #: Evaluations of an integral, and where searched orbits take a hundred times as long.
-_SAMPLES, _SEARCHED_SAMPLES = 1024, 128
-#: How many times the rows that are kept a table must have to be thinned.
-_MANY = 4
+_SAMPLES, _SEARCHED_SAMPLES = 1024, 80
 
 
 class LockInTerm:
@@ -107,12 +111,10 @@ class LockInTerm:
         compiled = LockInLikelihood(f.law, f.inertia, f.radiation_damping, f.uses_search)
         return compiled, (f.fixed, self.weights)
 
-    def with_rows(self, kept: NDArray[np.bool_]) -> LockInTerm:
-        """The same for some of the rows."""
-        forward = copy(self.forward)
-        forward.table = self.table.without(~kept)
-        forward.forget_orbits()
-        forward.fixed = {n: v[kept] for n, v in self.forward.fixed.items()}
+    def with_rows(self, kept: NDArray[np.bool_], *, coarse: bool = False) -> LockInTerm:
+        """The same for some of the rows, by the coarse model on request."""
+        forward = self.forward.with_rows(kept)
+        forward.coarse = coarse
         return LockInTerm(forward.table, forward)
 
     def weighted(self, weights: Float) -> LockInTerm:
@@ -155,16 +157,14 @@ class LockInTerm:
         """Number of readings."""
         return sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
 
-    def thinned(self, rows: int, data: int = 0) -> LockInTerm | None:
+    def thinned(self, rows: int, data: int = 0) -> LockInTerm:
         """The same for few rows that are spread over the operating points; see `DataTerm`."""
         table = self.table
         kept = max(rows, math.ceil(data / max(self._count / table.rows, 1e-9)))
-        if table.rows < _MANY * kept:
-            return None
         # Points that lie close together repeat each other.
         order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
-        chosen = order[np.linspace(0, table.rows - 1, kept).round().astype(int)]
-        return self.with_rows(np.isin(np.arange(table.rows), chosen))
+        chosen = order[np.linspace(0, table.rows - 1, min(kept, table.rows)).round().astype(int)]
+        return self.with_rows(np.isin(np.arange(table.rows), chosen), coarse=True)
 
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
@@ -179,7 +179,7 @@ class LockInTerm:
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
-        """Outliers, and amplitudes without a phase that are small beside their uncertainty."""
+        """Outliers, and amplitudes without a phase that are below three standard uncertainties."""
         said = list(self.table.remarks)
         if outliers:
             named = " and ".join(str(self.table.row_names[row]) for row in outliers)
@@ -231,6 +231,8 @@ class Forward:
     ----------
     uses_search : bool
         Whether every call searches for the orbits that the fast method does not find.
+    coarse : bool
+        Whether these are of the coarse model of `response_function`, to look for minima with.
     """
 
     def __init__(
@@ -255,9 +257,16 @@ class Forward:
             radiation_damping=radiation_damping,
             least_points=table.rows,
         )
-        self._quick, self._whole = function(search=False), function(search="direct")
+        self._fast, self._direct, self._coarse = (
+            function(search=search) for search in (False, "direct", "coarse")
+        )
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
-        self.uses_search = False
+        self.uses_search = self.coarse = False
+
+    def _function(self, *, search: bool, coarse: bool) -> ResponseFunction:
+        if not search:
+            return self._fast
+        return self._coarse if coarse else self._direct
 
     def __call__(
         self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
@@ -275,7 +284,7 @@ class Forward:
         """
         search = self.uses_search if search is None else search
         applied = self.fixed["epsilon"]
-        function = self._whole if search else self._quick
+        function = self._function(search=search, coarse=self.coarse)
         given = parameters_at(self.fixed, free, function)
         known = self._nearest(free) if search else None
         wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
@@ -318,9 +327,10 @@ class Forward:
         repeats : int
             Number of sets.
         near : bool
-            Whether orbits are like those of the last call with derivatives, and begun there.
+            Whether orbits are like those of the last call with derivatives, and begun there. They
+            are of the coarse model then, except where it has none.
         """
-        function = self._whole if self.uses_search else self._quick
+        function = self._function(search=self.uses_search, coarse=self.coarse or near)
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
         given = parameters_at(fixed, free, function)
         last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
@@ -330,15 +340,26 @@ class Forward:
             rows = np.arange(start, start + len(part["V"])) % self.table.rows
             known = last.picked(rows) if near and self.uses_search else None
             values, mu_ss = function(part, known), _steady(self.law, part, together)[0]
+            left = np.flatnonzero(np.asarray(values.outcome) != Outcome.CONVERGED)
+            if known is not None and not self.coarse and left.size:
+                more = self._direct({n: v[left] for n, v in part.items()}, last.picked(rows[left]))
+                columns: list[Any] = [np.array(column) for column in values]
+                for column, searched in zip(columns, more, strict=True):
+                    column[left] = searched
+                values = ResponseValues(*columns)
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
         )
         return Prediction(mean, steady, harmonics), outcome
 
-    def forget_orbits(self) -> None:
-        """Search from nothing at the next call."""
-        self._visited = []
+    def with_rows(self, kept: NDArray[np.bool_]) -> Forward:
+        """The same for some of the rows, with their orbits."""
+        forward, rows = copy(self), np.flatnonzero(kept)
+        forward.table = self.table.without(~kept)
+        forward.fixed = {n: v[kept] for n, v in self.fixed.items()}
+        forward._visited = [(free, known.picked(rows)) for free, known in self._visited]
+        return forward
 
     @property
     def _most_visited(self) -> int:

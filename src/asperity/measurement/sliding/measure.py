@@ -205,7 +205,7 @@ def measure_sliding(
     read_holds = _holds(signals, cut, bounds, DRIFTS[detrend])
     doubts = [*cut.doubts, *unread]
     if times is None and signals.displacement is None:
-        doubts.append(f"no segments without motion: {signals.no_motion}")
+        doubts.append(f"velocity steps cannot be seen: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
     about = about_channels(trace, signals.names)
     checks += findings([*about, *signals.signs], len(trace), float(time[-1] - time[0]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.measurement.samples import (
     compressive,
     load_channel,
@@ -221,7 +221,10 @@ def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
             continue
         if channel.kind == kind:
             return channel, role == "velocity", ""
+        name = channel.recorded_name or role
+        unit = {"length": "um", "velocity": "um/s"}[kind]
         reasons.append(
-            f"'{channel.recorded_name or role}' has no known unit of a {kind}; give it one"
+            f"'{name}' has no known unit of a {kind}; give it one, like "
+            f"{Argument('units', name, unit)}"
         )
     return None, False, reasons[0] if reasons else "neither displacement nor velocity is recorded"

@@ -93,7 +93,7 @@ def joined(parts: list[tuple[Indices, MeshOrbits]]) -> tuple[Indices, MeshOrbits
 
 Float = NDArray[np.float64]
 
-#: Number of intervals of the meshes of stored orbits.
+#: Largest number of intervals of the meshes of stored orbits.
 KEPT = 216
 #: Intervals of the mesh that is compared with the first mesh for derivatives.
 COARSER = FIRST_MESH
@@ -128,12 +128,13 @@ class KnownOrbits:
         """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
         size = problem.system.size
         if self.orbit is None:
-            self.orbit = Orbit.empty(orbit.scheme, size, KEPT, self.points)
+            intervals = min(KEPT, len(orbit.mesh) - 1)
+            self.orbit = Orbit.empty(orbit.scheme, size, intervals, self.points)
         self.known[index] = True
-        if len(orbit.mesh) == KEPT + 1:
+        if len(orbit.mesh) == len(self.orbit.mesh):
             put(self.orbit, index, orbit)
             return
-        remesh = partial(remeshed, intervals=KEPT)
+        remesh = partial(remeshed, intervals=len(self.orbit.mesh) - 1)
         inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
@@ -165,6 +166,7 @@ def followed_orbits(
         At least 2.
     meshes : tuple of int
         Numbers of intervals, rising; an orbit is on the first that agrees with the one before.
+        Without any, orbits are on the coarser mesh, unchecked.
 
     Returns
     -------
@@ -184,8 +186,8 @@ def followed_orbits(
             change = largest_change(before[:, part], reading)
             before[:, part] = np.vstack([reading.mean_friction, reading.harmonics])
             solved = error < ACCEPTED
-            agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
-            served = solved & (change < agreement)
+            agreement = _LAST_AGREEMENT if (intervals,) == meshes[-1:] else _AGREEMENT
+            served = solved & (change < agreement) if meshes else solved
             if served.any():
                 kept = np.flatnonzero(served)
                 good.append((part[kept], take(fine, kept), take(reading, kept)))

@@ -212,7 +212,7 @@ class Program(NamedTuple):
     equations: ParametrisedProblem
     harmonics: int
     multipliers: bool
-    search: bool | Literal["direct"]
+    search: bool | Literal["direct", "coarse"]
 
     @property
     def states(self) -> int:

@@ -112,7 +112,8 @@ class DirectSearch:
         Of all points.
     harmonics : int
     meshes : tuple of int
-        Numbers of intervals of the meshes that orbits may lie on, rising.
+        Numbers of intervals of the meshes that orbits may lie on, rising; without any, orbits lie
+        on the coarser mesh, unchecked, and no transients are computed.
     result : SearchedOrbits
         To be filled.
     known : KnownOrbits or None
@@ -139,6 +140,8 @@ class DirectSearch:
         if len(left):
             self._from_averaged_limit(left)
         left = self._left(wanted)
+        if not self.meshes:
+            return
         if len(left) and not (self.every and (self.result.outcome == Outcome.OUT_OF_RANGE).any()):
             self._from_motions(left)
 
@@ -197,6 +200,7 @@ def search_orbits(
     wanted: NDArray[np.bool_],
     *,
     direct: bool = False,
+    coarse: bool = False,
     known: KnownOrbits | None = None,
     every: bool = False,
 ) -> SearchedOrbits:
@@ -211,6 +215,8 @@ def search_orbits(
     direct : bool
         Whether only to solve each point independently, without following branches. Multipliers
         are then those of the mesh, unchecked.
+    coarse : bool
+        Whether a direct search takes orbits on the coarsest mesh, unchecked, and no transients.
     known : KnownOrbits, optional
         Of the first points, for a direct search, which begins there and keeps what it finds.
     every : bool
@@ -220,7 +226,8 @@ def search_orbits(
     result = SearchedOrbits.none(len(wanted))
     index = np.flatnonzero(wanted)
     if direct:
-        DirectSearch(equations, parameters, problem, harmonics, MESHES, result, known, every).run(
+        meshes = () if coarse else MESHES
+        DirectSearch(equations, parameters, problem, harmonics, meshes, result, known, every).run(
             index
         )
         return result

@@ -152,10 +152,8 @@ def _name_of(
 ) -> str:
     if isinstance(wanted, int):
         if not -len(names) <= wanted < len(names):
-            raise InputError(
-                f"{field} must be a column, got {shown(wanted)}; the file has columns 0 to "
-                f"{len(names) - 1}"
-            )
+            rule = f"the file has columns 0 to {len(names) - 1}"
+            raise InputError(field, "be a column", shown(wanted), rule)
         return names[wanted]
     if wanted in names:
         return wanted

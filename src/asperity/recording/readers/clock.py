@@ -105,8 +105,8 @@ def _from_first_column(
             Argument("columns", "time"),
             "be a column",
             f"none among {listed(map(repr, values))} that is named like time",
-            f"say which it is, like {Argument('columns', 'time', first)}, or give the sampling "
-            f"rate, like {Argument('rate', value='10 kHz')}",
+            f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or say which column "
+            f"it is, like {Argument('columns', 'time', first)}",
         )
     clock = _from_column(first, values, units)
     assumed = Finding(

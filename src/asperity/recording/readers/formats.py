@@ -19,7 +19,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import InputError, closest
+from asperity.errors import Argument, InputError, closest
 from asperity.recording.readers.raw import RawRecording
 
 GROUP = "asperity.readers"
@@ -106,7 +106,7 @@ def format_of(path: Path) -> str:
         "recording.path",
         "be CSV or other text, HDF5, MATLAB, TDMS or LOOK",
         f"'{path.name}', which looks like none of them",
-        "name it with format= if it is one",
+        f"give {Argument('format', value='...')} if it is one of them",
     )
 
 

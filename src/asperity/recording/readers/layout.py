@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
@@ -415,7 +415,8 @@ def layout_of(
             "recording.path",
             "hold a table of numbers",
             f"'{path.name}' without one that is understood",
-            "say delimiter= and decimal=, or give a recording",
+            f"give {Argument('delimiter', value='...')} and {Argument('decimal', value='...')}, "
+            "or another file",
         )
     rows = [cells_of(text, separators[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]

@@ -279,10 +279,8 @@ def one_table(
     if chosen is not None:
         wanted = chosen.strip("/")
         if wanted not in filled:
-            refused = InputError(
-                f"read.group must be a group with columns, got '{chosen}'; "
-                + (closest(wanted, filled) if filled else f"'{path.name}' has none")
-            )
+            advice = closest(wanted, filled) if filled else f"'{path.name}' has none"
+            refused = InputError("read.group", "be a group with columns", f"'{chosen}'", advice)
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
     if not filled:

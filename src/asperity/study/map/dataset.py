@@ -11,24 +11,10 @@ import xarray
 from asperity._version import __version__
 from asperity.parameters import OUTPUTS, point_parameters
 from asperity.study.map.boundary import MapBoundary
-from asperity.study.map.plane import MapPlane
+from asperity.study.map.plane import SHOWN, MapPlane
 from asperity.study.outcome import Answers
 from asperity.study.responses import bifurcation_kinds, is_stable
 from asperity.theory import closed_forms as cf
-
-#: Names of the numbers on the grid that a figure can show.
-SHOWN = (
-    "mean_friction",
-    "delta_mu",
-    "mu1",
-    "mu2",
-    "phase1",
-    "phase2",
-    "floquet_max",
-    "log_multiplier",
-    "mode_frequency",
-    "growth_rate",
-)
 
 #: Laws whose steady sliding loses stability at a stiffness known in closed form.
 _RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
@@ -52,11 +38,8 @@ def as_dataset(
         Source of each fixed number, where known.
     """
     dims = (plane.y.name, plane.x.name)
-    nodes = plane.nodes()
-    frequency = plane.values(nodes)["frequency"]
-    derived = _derived(grid, frequency)
     data: dict[str, Any] = {
-        name: (dims, derived[name].reshape(plane.shape), OUTPUTS[name].attributes) for name in SHOWN
+        name: (dims, grid[name].reshape(plane.shape), OUTPUTS[name].attributes) for name in SHOWN
     }
     for name, values in (
         # Strings of fixed width: NetCDF has no Python objects.
@@ -81,7 +64,6 @@ def as_dataset(
 def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
     where, points = boundary.where, boundary.points
     values = plane.values(where)
-    derived = _derived(points, values["frequency"])
     kinds = np.where(boundary.line >= 0, bifurcation_kinds(points), "")
     named: dict[str, Any] = {
         "boundary_line": (
@@ -97,19 +79,8 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
         named[f"boundary_{axis.name}"] = (_POINT, values[axis.name], attributes)
     for name in ("mode_frequency", "log_multiplier"):
         attributes = _described(OUTPUTS[name].unit, f"{OUTPUTS[name].meaning}, on the boundary")
-        named[f"boundary_{name}"] = (_POINT, derived[name], attributes)
+        named[f"boundary_{name}"] = (_POINT, points[name], attributes)
     return named
-
-
-def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
-    """The numbers of `SHOWN`, some of them computed from the answers."""
-    log = points["log_multiplier"]
-    with np.errstate(over="ignore"):
-        largest = np.exp(log)
-    turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
-    derived = {"floquet_max": largest, "mode_frequency": turn * frequency,
-            "growth_rate": log * frequency}  # fmt: skip
-    return {name: derived[name] if name in derived else points[name] for name in SHOWN}
 
 
 def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:

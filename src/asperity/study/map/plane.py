@@ -14,13 +14,18 @@ from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
 from asperity.parameters.arguments import at_least, number, shown, typed
+from asperity.study.crossings import STABILITY
 from asperity.study.outcome import Answers
 from asperity.study.points import Float
 from asperity.study.responses import answers_of_law
-from asperity.study.threshold import STABILITY
 
+#: Names of the numbers on the grid that a figure can show.
+SHOWN = (
+    *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
+    *("floquet_max", "log_multiplier", "mode_frequency", "growth_rate"),
+)
 #: Outputs of each point that a map keeps.
-OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABILITY)
+OUTPUTS = tuple(dict.fromkeys((*SHOWN, *STABILITY)))
 
 _AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)(?:\s+|(?=%))(.*)")
 
@@ -161,8 +166,6 @@ class MapPlane:
     fixed: Mapping[str, float]
     x: Axis
     y: Axis
-
-    outputs = OUTPUTS
 
     @property
     def shape(self) -> tuple[int, int]:

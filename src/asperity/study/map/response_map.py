@@ -28,7 +28,7 @@ from asperity.units import KINDS
 if TYPE_CHECKING:
     import xarray
 
-#: Points of a chunk.
+#: Points of a chunk, the most that an interruption loses: five batches of the fast method.
 _CHUNK = 4800
 #: Memory of a point with its share of the boundary and of the file (bytes); without these measured
 #: 250 to 300 (largest resident memory, 250,000 to 2,250,000 points).
@@ -90,7 +90,7 @@ def response_map(
     detected.
     """
     plane, origins = _plane(law, numbers, x, y)
-    grid = _solved(plane, None, progress or _silent, _CHUNK)
+    grid = _solved(plane, None, progress, _CHUNK)
     traced = trace_boundary(plane, grid) if boundary else MapBoundary.empty()
     return as_dataset(plane, grid, traced, origins)
 
@@ -133,7 +133,7 @@ def write_map(
     kept = UnfinishedText(target, {"law": plane.law.name, "numbers": dict(plane.fixed), **axes})
     kept.start(resume)
     with kept.interruptible("points", x.count * y.count):
-        grid = _solved(plane, kept, progress or _silent, block)
+        grid = _solved(plane, kept, progress, block)
         dataset = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
         with written_file(target) as file:
             dataset.to_netcdf(file, engine="h5netcdf")
@@ -144,7 +144,7 @@ def write_map(
 def _solved(
     plane: MapPlane,
     kept: UnfinishedText | None,
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None] | None,
     chunk: int,
 ) -> Answers:
     """Responses at the points of the grid; `kept` has a line for each point of finished chunks."""
@@ -205,7 +205,3 @@ def _plane(
     plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
     plane.values(plane.nodes()[:1])
     return plane, {n: s.origin for n, s in fixed.items()}
-
-
-def _silent(done: int, total: int) -> None:
-    """No progress."""

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest
-from asperity.laws import get_law, registered
+from asperity.errors import InputError
+from asperity.laws import Law, get_law, registered
 from asperity.operating_point import respond
 from asperity.parameters import (
     MODULATION,
@@ -20,12 +20,13 @@ from asperity.parameters import (
     Parameter,
     all_parameters,
     canonical_name,
+    known_name,
     point_parameters,
 )
 from asperity.parameters.arguments import one_of
 from asperity.parameters.toml_file import file_content
+from asperity.questions.sweep import FitTable, Sweep
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import FitTable, SweepPlan
 from asperity.study.points import Points
 from asperity.study.solve.kind import SolveKind
 
@@ -83,7 +84,7 @@ class FitSolve(SolveKind):
 
         return {parameter.name: parameter for parameter in (EPS_RATIO, NOISE_SEED)}
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         table = _table(plan)
@@ -103,7 +104,7 @@ class FitSolve(SolveKind):
             "files": {name: _digest(plan.folder / name) for name in data_files(plan)},
         }
 
-    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+    def supplied(self, plan: Sweep) -> tuple[str, ...]:
         """Columns that all tables have, and the free parameters if no readings are simulated."""
         table = _table(plan)
         columns = [set(_read(str(plan.folder / n), "", ()).points) for n in data_files(plan)]
@@ -112,7 +113,7 @@ class FitSolve(SolveKind):
         # A fit chooses missing start values; a simulation needs the true value of every parameter.
         return tuple(sorted(common | (set() if simulated else set(_free(table)))))
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """As in `SolveKind`."""
         known = list(_outputs(_free(_table(plan)), {}))
         if plan.outputs is None:
@@ -124,22 +125,17 @@ class FitSolve(SolveKind):
         known = {**all_parameters(map(get_law, record["laws"])), **self.parameters()}
         return _outputs(record["settings"]["free"], known)
 
-    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """As in `SolveKind`."""
-        return max(1, min(64, points // 8))
-
-    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        for law, rows in points.by_law():
-            for row in rows:
-                point = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
-                files = [] if points.data is None else [str(points.data[row])]
-                _fit_point(law, point, files, int(row), record, answers)
+        for row in range(len(points)):
+            point = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
+            files = [] if points.data is None else [str(points.data[row])]
+            _fit_point(law, point, files, row, record, answers)
         return answers
 
 
-def data_files(plan: SweepPlan) -> list[str]:
+def data_files(plan: Sweep) -> list[str]:
     """Files of data that a plan names, without repetition.
 
     Raises
@@ -162,7 +158,7 @@ def data_files(plan: SweepPlan) -> list[str]:
     return files
 
 
-def _table(plan: SweepPlan) -> FitTable:
+def _table(plan: Sweep) -> FitTable:
     if plan.fit is None:
         raise InputError(
             "fit must be given where solve is 'fit', got nothing; add the table [fit] with data "
@@ -171,34 +167,33 @@ def _table(plan: SweepPlan) -> FitTable:
     return plan.fit
 
 
-def _all_inertial(plan: SweepPlan) -> bool:
+def _all_inertial(plan: Sweep) -> bool:
     """Whether every point of a plan includes inertia."""
     values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
     return all(value in (True, "true", "yes", 1) for value in values)
 
 
-def _free(table: FitTable) -> list[str]:
-    """Canonical names of the free parameters."""
+def _known() -> dict[str, Parameter]:
+    """Parameters of which a plan may free one or give a prior."""
     from asperity.inference.unknowns import EPS_RATIO
 
-    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    names = []
-    for name in table.free or ():
-        canonical = canonical_name(name, known)
-        if canonical is None:
-            raise InputError(f"fit.free must name parameters, got '{name}'; {closest(name, known)}")
-        names.append(canonical)
+    return {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+
+
+def _free(table: FitTable) -> list[str]:
+    """Canonical names of the free parameters."""
+    known = _known()
+    names = [known_name(name, known, "fit.free") for name in table.free or ()]
     if not names:
         raise InputError("fit.free must name parameters, got none; write it like ['A', 'B']")
     return list(dict.fromkeys(names))
 
 
-def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
+def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
     """Mean, standard deviation (SI) and source of each prior."""
     from asperity.inference.fitting.inputs import priors_of
-    from asperity.inference.unknowns import EPS_RATIO
 
-    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+    known = _known()
     written: dict[str, Any] = {}
     for name, prior in table.prior.items():
         canonical = canonical_name(name, known)
@@ -248,7 +243,7 @@ def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> Loc
 
 
 def _fit_point(
-    law: str,
+    law: type[Law],
     values: dict[str, float],
     files: Sequence[str],
     row: int,
@@ -258,7 +253,7 @@ def _fit_point(
     from asperity.inference import Prior, fit
 
     settings = record["settings"]
-    known = {**point_parameters(get_law(law)), **FitSolve().parameters()}
+    known = {**point_parameters(law), **FitSolve().parameters()}
     # A free parameter of another law of the sweep does not concern this law.
     elsewhere = set(all_parameters(map(get_law, record["laws"])))
     free = [n for n in settings["free"] if n in known or n not in elsewhere]
@@ -275,7 +270,7 @@ def _fit_point(
         simulated = [_simulated(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
         tables = [table for table in simulated if table is not None]
         if len(tables) < len(simulated):
-            answers.fail(np.array([row]), SweepOutcome.NO_READINGS)
+            answers.fail(row, SweepOutcome.NO_READINGS)
             return
     priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
     fitted = fit(
@@ -286,7 +281,7 @@ def _fit_point(
         check_stiffness=False,
     )  # fmt: skip
     if not fitted.converged:
-        answers.fail(np.array([row]), SweepOutcome.FIT_FAILED)
+        answers.fail(row, SweepOutcome.FIT_FAILED)
         return
     numbers = _numbers(fitted)
     for name in answers.numbers:
@@ -335,7 +330,7 @@ def _numbers(fitted: Fit) -> dict[str, float]:
 
 def _simulated(
     table: LockInTable,
-    law: str,
+    law: type[Law],
     truth: Mapping[str, float],
     inertia: bool,
     noise: np.random.Generator,
@@ -346,14 +341,13 @@ def _simulated(
     table. The error of a harmonic with a phase is added in the complex plane. None is returned if
     a row has no periodic response.
     """
-    known = point_parameters(get_law(law))
     at = {}
-    for name, parameter in known.items():
+    for name, parameter in point_parameters(law).items():
         value = truth.get(name, table.points.get(name, parameter.default))
         at[name] = np.broadcast_to(np.asarray(value, dtype=float), (table.rows,)).copy()
     at["epsilon"] *= truth.get("eps_ratio", 1.0)
     at["inertia"][:] = inertia
-    response = respond(get_law(law), at, workers=1)
+    response = respond(law, at, workers=1)
     if not np.all(response.converged):
         return None
     root = np.linalg.cholesky(table.correlations())

@@ -7,12 +7,16 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from asperity.errors import InputError
+from asperity.laws import Law, get_law
 from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
 from asperity.parameters.arguments import one_of
+from asperity.questions.sweep import Sweep
 from asperity.study.outcome import Answers
-from asperity.study.plan import SweepPlan
 from asperity.study.points import POINT_BYTES, Points
+
+#: Number of chunks of a small plan, so that several workers share it.
+_SHARES = 8
 
 
 class SolveKind(ABC):
@@ -28,18 +32,22 @@ class SolveKind(ABC):
         Names of the outputs that are kept if the plan names none.
     supplies : tuple of str
         Parameters of the law that a point need not have.
+    fewest, most : int
+        Smallest and largest number of points of a chunk: at most some seconds of work.
     """
 
     name: ClassVar[str]
     outputs: ClassVar[tuple[Output, ...]]
     defaults: ClassVar[tuple[str, ...]]
     supplies: ClassVar[tuple[str, ...]] = ()
+    fewest: ClassVar[int] = 1
+    most: ClassVar[int] = 64
 
     def parameters(self) -> dict[str, Parameter]:
         """Numbers that a point may have in addition to the parameters of its law, by name."""
         return {}
 
-    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+    def supplied(self, plan: Sweep) -> tuple[str, ...]:
         """Parameters of the law that a point of this plan need not have."""
         return self.supplies
 
@@ -47,7 +55,7 @@ class SolveKind(ABC):
         """Outputs of a plan with this record, by name."""
         return {output.name: output for output in self.outputs}
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """Names of the outputs that the plan keeps.
 
         Raises
@@ -60,7 +68,7 @@ class SolveKind(ABC):
         known = [output.name for output in self.outputs]
         return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """Settings of this kind of solve in a plan, as JSON values."""
         for other in ("transient", "fit"):
             if other != self.name and getattr(plan, other) is not None:
@@ -79,14 +87,21 @@ class SolveKind(ABC):
             "lower it or leave it out",
         )
 
-    @abstractmethod
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """Approximate number of points of a chunk: at most some seconds of work."""
+        """Approximate number of points of a chunk."""
+        return max(self.fewest, min(self.most, points // _SHARES))
 
-    @abstractmethod
     def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
         """Answers at the points of a chunk.
 
         They depend on the points of the chunk only, so that neither the number of workers nor an
         interruption changes a bit.
         """
+        answers = Answers.empty(record["outputs"], len(points))
+        for law, rows in points.by_law():
+            answers.put(rows, self.solve_law(get_law(law), points.take(rows), record))
+        return answers
+
+    @abstractmethod
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
+        """Answers at points with one law."""

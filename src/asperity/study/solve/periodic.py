@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from asperity.laws import Law
 from asperity.parameters import OUTPUTS
 from asperity.study.axes import columns_of
 from asperity.study.outcome import Answers
 from asperity.study.points import Points
-from asperity.study.responses import periodic_answers
+from asperity.study.responses import answers_of_law
 from asperity.study.solve.kind import SolveKind
 
 #: Outputs with one number a point.
@@ -18,11 +19,6 @@ _NAMES = (
     *("log_multiplier", "floquet_max", "mode_frequency", "growth_rate", "stable"),
 )
 
-#: Smallest and largest number of points of a chunk: one batch and half a second of the quasi-static
-#: solver.
-_FEWEST, _MOST = 960, 19_200
-#: Number of chunks of a small plan, so that several workers share it.
-_SHARES = 8
 #: Ratio of the solution times of a point with and without inertia.
 _INERTIAL = 16
 
@@ -32,6 +28,8 @@ class PeriodicSolve(SolveKind):
 
     name = "periodic"
     outputs = tuple(OUTPUTS[name] for name in _NAMES)
+    # One batch and half a second of the quasi-static solver.
+    fewest, most = 960, 19_200
     defaults = (
         *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
         *("log_multiplier", "mode_frequency", "stable"),
@@ -42,9 +40,9 @@ class PeriodicSolve(SolveKind):
         inertial = record["numbers"].get("inertia", 0) or any(
             "inertia" in columns_of(axis) for axis in record["axes"].values()
         )
-        most = _MOST // _INERTIAL if inertial else _MOST
-        return max(min(_FEWEST, most), min(most, points // _SHARES))
+        usual = super().chunk_points(points, record)
+        return min(usual, self.most // _INERTIAL) if inertial else usual
 
-    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
-        return periodic_answers(points, record["outputs"])
+        return answers_of_law(law, points.of_law(law.name), record["outputs"])

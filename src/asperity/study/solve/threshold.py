@@ -8,18 +8,15 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.laws import get_law
+from asperity.laws import Law
 from asperity.parameters import Output
+from asperity.questions.sweep import Sweep
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import SweepPlan
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
 
-#: Smallest and largest number of points of a chunk: enough to share the fixed costs of a search,
-#: and at most some seconds of work.
-_FEWEST, _MOST = 24, 480
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
 
@@ -39,8 +36,10 @@ class ThresholdSolve(SolveKind):
     )
     defaults = tuple(output.name for output in outputs)
     supplies = ("K",)
+    # Enough to share the fixed costs of a search.
+    fewest, most = 24, 480
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         low, high = plan.threshold.between
@@ -56,36 +55,28 @@ class ThresholdSolve(SolveKind):
         super().require_memory(points, record)
         require_scan(points, record["settings"]["scan"], "threshold.scan")
 
-    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """As in `SolveKind`."""
-        return max(_FEWEST, min(_MOST, points // 8))
-
-    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        between = record["settings"]["between"]
-        for law, rows in points.by_law():
-            values = points.take(rows).of_law(law)
-            critical = np.full(len(rows), np.nan)
-            if {"A", "B", "D0"} <= set(values):
-                critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
-            # A point has no stiffness; the softest one of the search is checked in its place.
-            values["K"] = between[0] * critical
-            sound = solvable(get_law(law), values, rows, answers)
-            if len(sound):
-                values = {n: v[sound] for n, v in values.items()}
-                answers.put(rows[sound], _search(law, values, critical[sound], record))
+        values = points.of_law(law.name)
+        critical = np.full(len(points), np.nan)
+        if {"A", "B", "D0"} <= set(values):
+            critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
+        # A point has no stiffness; the softest one of the search is checked in its place.
+        values["K"] = record["settings"]["between"][0] * critical
+        sound = solvable(law, values, answers)
+        if len(sound):
+            values = {n: v[sound] for n, v in values.items()}
+            answers.put(sound, _search(law, values, critical[sound], record))
         return answers
 
 
 def _search(
-    law: str, values: dict[str, np.ndarray], critical: np.ndarray, record: Mapping[str, Any]
+    law: type[Law], values: dict[str, np.ndarray], critical: np.ndarray, record: Mapping[str, Any]
 ) -> Answers:
     settings = record["settings"]
     low, high = settings["between"]
-    searched = search_thresholds(
-        get_law(law), values, low * critical, high * critical, settings["scan"]
-    )
+    searched = search_thresholds(law, values, low * critical, high * critical, settings["scan"])
     numbers = {
         "K_threshold": searched.K,
         "threshold_ratio": searched.K / critical,

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.laws import get_law
+from asperity.laws import Law, get_law
 from asperity.loads import Programme
 from asperity.parameters import EXPERIMENT, Output, all_parameters
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
+from asperity.questions.sweep import NumberTable, Sweep, TransientTable
 from asperity.slider.named import slider_from
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import NumberTable, SweepPlan, TransientTable
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
@@ -53,7 +53,7 @@ class TransientSolve(SolveKind):
     # A load programme need not have a modulation.
     supplies = ("epsilon", "frequency")
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         table = plan.transient
@@ -77,7 +77,7 @@ class TransientSolve(SolveKind):
             "numbers": numbers,
         }
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """The numbers that the plan names."""
         if plan.outputs is not None:
             raise InputError(
@@ -93,20 +93,14 @@ class TransientSolve(SolveKind):
             for name, entry in record["settings"]["numbers"].items()
         }
 
-    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """As in `SolveKind`."""
-        return max(1, min(64, points // 8))
-
-    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        for law, rows in points.by_law():
-            of_law = points.take(rows)
-            values = _values(of_law, law)
-            for k in solvable(get_law(law), values, rows, answers):
-                point = {n: float(v[k]) for n, v in values.items()}
-                named = {n: float(v[k]) for n, v in of_law.values.items()} | point
-                _integrate(law, point, named, int(rows[k]), record["settings"], answers)
+        values = _values(points, law.name)
+        for k in solvable(law, values, answers):
+            point = {n: float(v[k]) for n, v in values.items()}
+            named = {n: float(v[k]) for n, v in points.values.items()} | point
+            _integrate(law, point, named, int(k), record["settings"], answers)
         return answers
 
 
@@ -119,7 +113,7 @@ def _values(points: Points, law: str) -> dict[str, np.ndarray]:
 
 
 def _integrate(
-    law: str,
+    law: type[Law],
     values: dict[str, float],
     named: Mapping[str, float],
     row: int,
@@ -132,7 +126,7 @@ def _integrate(
         raise InputError("; ".join(map(str, mistakes)))
     programme = Programme(*(s.step for s in steps), load=values["W0"], velocity=values["V"])
     trajectory = transient(
-        slider_from(get_law(law), values),
+        slider_from(law, values),
         programme,
         sampling=settings["sampling"],
         inertia=bool(values["inertia"]),
@@ -141,7 +135,7 @@ def _integrate(
         most_steps=settings["most_steps"],
     )
     if trajectory.termination is not None:
-        answers.fail(np.array([row]), SweepOutcome.STOPPED, trajectory.termination.time)
+        answers.fail(row, SweepOutcome.STOPPED, trajectory.termination.time)
         return
     for name, entry in settings["numbers"].items():
         answers.numbers[name][row] = _statistic(trajectory, entry)
@@ -171,15 +165,8 @@ class _WithUnits(dict[str, Any]):
 def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     """A checked entry of ``transient.numbers`` as JSON values."""
     place = f"transient.numbers.{name}"
-    if entry.of not in CHANNELS:
-        raise InputError(
-            f"{place}.of must be a channel, got '{entry.of}'; {closest(entry.of, CHANNELS)}"
-        )
-    if entry.take not in TAKEN:
-        raise InputError(
-            f"{place}.take must be one of {', '.join(TAKEN)}, got '{entry.take}'; "
-            f"{closest(entry.take, TAKEN)}"
-        )
+    one_of(entry.of, CHANNELS, f"{place}.of")
+    one_of(entry.take, TAKEN, f"{place}.take")
     if not name.isidentifier():
         raise InputError(
             f"{place} must have a name of letters, digits and underscores, got '{name}'; rename it"
@@ -191,7 +178,7 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     return {"of": entry.of, "take": entry.take, **times}
 
 
-def _check_steps(plan: SweepPlan, table: TransientTable) -> None:
+def _check_steps(plan: Sweep, table: TransientTable) -> None:
     """Check the names in braces, and the lines with a number in place of each brace."""
     known = {**all_parameters([get_law(plan.law)] if plan.law else []), **EXPERIMENT}
     for line in table.steps:

@@ -19,15 +19,19 @@ def sync_folder(path: Path) -> None:
 
 
 def put(file: Path, content: bytes) -> None:
-    """Write a file by renaming a complete one; `outputs.written.to_disk` makes it durable."""
+    """Write a file by renaming a complete one; it is on the disk when this returns."""
     make_way(file)
     file.parent.mkdir(parents=True, exist_ok=True)
     fresh = file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")
     try:
-        fresh.write_bytes(content)
+        with fresh.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
         os.replace(fresh, file)
     finally:
         fresh.unlink(missing_ok=True)
+    sync_folder(file.parent)
 
 
 def make_way(file: Path) -> None:

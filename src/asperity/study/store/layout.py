@@ -19,8 +19,6 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.storage import MemoryStore
 
-from asperity.errors import InputError
-from asperity.outputs.written import to_disk
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
 from asperity.study.outcome import SweepOutcome, flag_attributes
@@ -36,7 +34,8 @@ NOT_DONE = -1
 #: Long names of the columns of texts.
 _TEXT_NAMES = {"law": "friction law", "data": "file of the readings"}
 
-#: Largest number of values of a stored coordinate that follows from a ratio.
+#: Largest number of values of a stored coordinate that follows from a ratio: readers load all
+#: coordinates, and this one is made in memory (8 MB).
 _MOST_DERIVED = 1_000_000
 
 #: Zarr leaves out files of fill values by default; such a chunk would look as if not computed.
@@ -48,7 +47,7 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
 
     Raises
     ------
-    InputError
+    OSError
         If the folder cannot be written.
     """
     fresh = fresh_folder(path)
@@ -58,12 +57,9 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
         lay_out(fresh, grid, attributes)
         fresh.rename(path)
         durable.sync_folder(path.parent)
-    except OSError as error:
+    except OSError:
         shutil.rmtree(fresh, ignore_errors=True)
-        raise InputError(
-            f"out must be a folder that can be written, got '{path}' "
-            f"({(error.strerror or str(error)).lower()}); choose another place with room"
-        ) from None
+        raise
 
 
 def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
@@ -93,8 +89,6 @@ def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[
             checksums.setdefault(array, checksum()).update(content)
         if not _holds(file, content):
             durable.put(file, content)
-            to_disk(file)
-            durable.sync_folder(file.parent)
             written.append(name)
     for folder in {(path / name).parents[1] for name in written}:
         durable.sync_folder(folder)

@@ -65,18 +65,17 @@ class StoreLock:
                     f"({(error.strerror or str(error)).lower()}); choose another folder"
                 ) from None
             try:
-                self._lock(descriptor)
+                holder = holder_of(self.path)
+                if _is_held(descriptor, holder, exclusive=True):
+                    raise self._refused(holder)
                 # The last holder may have removed the file between the opening and the locking.
-                same = os.fstat(descriptor).st_ino == self.path.stat().st_ino
+                if os.path.samestat(os.fstat(descriptor), self.path.stat()):
+                    self._descriptor = descriptor
             except FileNotFoundError:
-                same = False
-            except BaseException:
-                os.close(descriptor)
-                raise
-            if same:
-                self._descriptor = descriptor
-            else:
-                os.close(descriptor)
+                pass
+            finally:
+                if self._descriptor is None:
+                    os.close(descriptor)
         record = {
             "token": self.token,
             "host": socket.gethostname(),
@@ -85,22 +84,6 @@ class StoreLock:
         }
         os.ftruncate(self._descriptor, 0)
         os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
-
-    def _lock(self, descriptor: int) -> None:
-        holder = holder_of(self.path)
-        if fcntl is not None:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise self._refused(holder) from None
-            except OSError:
-                pass  # a file system without locks: the age of the file decides
-            else:
-                if holder.get("host") in (None, socket.gethostname()):
-                    return
-        age = time.time() - os.fstat(descriptor).st_mtime
-        if holder and age < STALE:
-            raise self._refused(holder)
 
     def _refused(self, holder: dict[str, Any]) -> InputError:
         who = (
@@ -139,26 +122,33 @@ def lock_file(store: Path) -> Path:
     return store.with_name(store.name + ".lock")
 
 
-def is_held(path: Path) -> bool:
-    """Whether a driver runs: a killed driver leaves the lock file, but holds no lock."""
-    holder = holder_of(path)
-    if not holder:
-        return False
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        if holder.get("host") == socket.gethostname() and fcntl is not None:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                return True
-            except OSError:
-                pass  # a file system without locks: the age of the file decides
-            else:
+def _is_held(descriptor: int, holder: dict[str, Any], *, exclusive: bool) -> bool:
+    """Whether another driver has the lock of an open file; if not, this process has it now."""
+    if fcntl is not None:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_NB | (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH))
+        except BlockingIOError:
+            return True
+        except OSError:
+            pass  # a file system without locks: the age of the file decides
+        else:
+            if holder.get("host") in (None, socket.gethostname()):
                 return False
-        return time.time() - os.fstat(descriptor).st_mtime < STALE
+    return bool(holder) and time.time() - os.fstat(descriptor).st_mtime < STALE
+
+
+def running_driver(store: Path) -> dict[str, Any]:
+    """Contents of the lock file while a driver runs; empty without one.
+
+    A killed driver leaves the file, but holds no lock.
+    """
+    holder = holder_of(lock_file(store))
+    try:
+        descriptor = os.open(lock_file(store), os.O_RDONLY)
+    except OSError:
+        return {}
+    try:
+        return holder if _is_held(descriptor, holder, exclusive=False) else {}
     finally:
         os.close(descriptor)
 

@@ -2,8 +2,8 @@
 
 The attributes are in ``zarr.json`` together with the metadata of all arrays. The empty group
 ``attributes`` has a second copy without the runs. Each copy has a checksum, the seal, so that
-damage to one copy is detected and repaired from the other. A store with two damaged copies is
-refused.
+damage to one copy is detected and repaired from the other, from which the runs are lost. A store
+with two damaged copies is refused.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
-from asperity.outputs.written import to_disk
 from asperity.study.grid import SweepGrid
 from asperity.study.record import ATTRIBUTES
 from asperity.study.store import durable
@@ -27,9 +26,6 @@ KIND = "asperity_sweep"
 FORMAT = 2
 #: Attribute that changes during a run, and the attribute with the seal.
 _RUNS, _SEAL = "runs", "seal"
-#: Required entries of a run and their types: when it begins, and when it ends.
-_BEGUN = dict.fromkeys(("started", "host", "workers", "asperity"), str)
-_ENDED = {"points_solved": int, "seconds": int | float}
 
 
 @dataclass(frozen=True)
@@ -57,28 +53,15 @@ class Root:
     @property
     def runs(self) -> list[dict[str, Any]]:
         """The runs so far."""
-        runs = self.attributes.get(_RUNS)
-        return [run for run in runs if _is_run(run)] if isinstance(runs, list) else []
-
-
-def _is_run(run: Any) -> bool:
-    """Whether the entry of a run is valid; the seal does not cover the runs."""
-    if not isinstance(run, dict):
-        return False
-    try:
-        json.dumps(run, ensure_ascii=False).encode()
-    except UnicodeEncodeError:  # a lone surrogate
-        return False
-    needed = _BEGUN | (_ENDED if run.get("ended") else {})
-    return all(isinstance(run.get(name), kind) for name, kind in needed.items())
+        return self.attributes.get(_RUNS) or []
 
 
 def write_root(path: Path, attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
     """Write both copies of the attributes; they are on the disk when this returns."""
     kept = {n: v for n, v in attributes.items() if n not in (_RUNS, _SEAL)}
     _write(path / ATTRIBUTES, _group({**kept, _SEAL: _seal(kept, {})}))
-    whole = {**kept, _SEAL: _seal(kept, arrays), _RUNS: attributes.get(_RUNS, [])}
-    _write(path, _group(whole, arrays))
+    whole = {**kept, _RUNS: attributes.get(_RUNS) or []}
+    _write(path, _group({**whole, _SEAL: _seal(whole, arrays)}, arrays))
 
 
 def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
@@ -91,10 +74,7 @@ def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
 
 
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
-    file = folder / "zarr.json"
-    durable.put(file, json.dumps(content, indent=2).encode())
-    to_disk(file)
-    durable.sync_folder(folder)
+    durable.put(folder / "zarr.json", json.dumps(content, indent=2).encode())
     durable.sync_folder(folder.parent)
 
 
@@ -115,14 +95,11 @@ def read_root(path: Path) -> Root:
     InputError
         If no copy is undamaged: the folder is no store, or its plan is lost.
     """
-    content, second = (json_content(folder / "zarr.json") for folder in (path, path / ATTRIBUTES))
-    first, copy = _sealed(content), _sealed(second)
+    first, copy = (_sealed(json_content(at / "zarr.json")) for at in (path, path / ATTRIBUTES))
     if first is not None:
         return Root(*first, damage="" if copy is not None else f"{ATTRIBUTES}/zarr.json")
     if copy is not None:
-        attributes = content.get("attributes") if isinstance(content, dict) else None
-        runs = attributes.get(_RUNS) if isinstance(attributes, dict) else None
-        return Root({**copy[0], _RUNS: runs}, {}, damage="zarr.json")
+        return Root(copy[0], {}, damage="zarr.json")
     raise InputError(
         f"store must be the folder of a sweep, got '{path}', which is no such folder, was made by "
         "another version, or has lost its plan; give the folder of --out of asperity sweep, or "

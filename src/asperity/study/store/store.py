@@ -101,10 +101,6 @@ class SweepStore:
         files = sum(len(names) for _, _, names in os.walk(self.path / "status" / "c"))
         return min(1.0, files / self.grid.chunk_count)
 
-    def is_done(self, chunk: int) -> bool:
-        """Whether the status of a chunk says that it is done."""
-        return self.failed_in(chunk) != NOT_DONE
-
     def is_sound(self, chunk: int) -> bool:
         """Whether the files of a chunk agree with its checksum."""
         try:
@@ -112,27 +108,30 @@ class SweepStore:
         except OSError:
             return False
 
-    def done(self) -> Iterator[tuple[int, int]]:
-        """Chunks that are done, with their failed points.
+    def states(self) -> Iterator[tuple[int, int, bool]]:
+        """Chunks that are done, with their failed points, and whether they are sound."""
+        for chunk in range(self.grid.chunk_count):
+            # A chunk that a driver is writing may appear damaged once.
+            for _ in range(2):
+                failed = self.failed_in(chunk)
+                sound = failed == NOT_DONE or self.is_sound(chunk)
+                if sound:
+                    break
+            if failed != NOT_DONE:
+                yield chunk, failed, sound
+
+    def done(self) -> Iterator[int]:
+        """Chunks that are done.
 
         Raises
         ------
         InputError
             If the files of a chunk do not agree with its checksum.
         """
-        for chunk in range(self.grid.chunk_count):
-            failed = self.failed_in(chunk)
-            if failed != NOT_DONE:
-                if self.is_damaged(chunk):
-                    raise _damaged(self.path, f"chunk {chunk}")
-                yield chunk, failed
-
-    def is_damaged(self, chunk: int) -> bool:
-        """Whether a chunk is done according to its status, but not sound.
-
-        A chunk that a driver is writing may appear damaged once; a second check is then negative.
-        """
-        return all(self.is_done(chunk) and not self.is_sound(chunk) for _ in range(2))
+        for chunk, _, sound in self.states():
+            if not sound:
+                raise _damaged(self.path, f"chunk {chunk}")
+            yield chunk
 
     def _of(self, array: Any, chunk: int, otherwise: int) -> int:
         try:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +16,7 @@ import asperity as asp
 from asperity.ledger import FigureNumbers, fill, rich, table
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
 from asperity_papers.bureau2000.harmonics import elastic_slope
-from asperity_papers.bureau2000.machine import EXT, FAST, SLOW, SPEEDS, Float
+from asperity_papers.bureau2000.machine import EXT, SLOW, SPEEDS, Float
 from asperity_papers.bureau2000.mean import AIR, VACUUM, velocity_axis
 from asperity_papers.bureau2000.virtual.recordings import (
     POINT_COLUMNS,
@@ -151,17 +154,28 @@ def _figure(
     lines: pd.DataFrame,
     points: pd.DataFrame,
     series: tuple[Series, ...],
-    recovered: Sequence[RecoveredQuantity],
+    reads: Mapping[str, Read],
     quoted: Mapping[str, float],
     **slopes: float,
 ) -> VirtualFigure:
+    recovered = tuple(
+        RecoveredQuantity(what, *reads[key], stated)
+        for key, (what, stated) in recovered_words()[name].items()
+    )
     scalars = {
         f"{quantity.what}, {part}": getattr(quantity, part)
         for quantity in recovered
         for part in ("value", "uncertainty", "true_value")
     }
     numbers = figure_numbers(PRINTED, name, lines, scalars | slopes, quoted=quoted, points=points)
-    return VirtualFigure(numbers, series, tuple(recovered))
+    return VirtualFigure(numbers, series, recovered)
+
+
+@cache
+def recovered_words() -> dict[str, dict[str, tuple[str, str]]]:
+    """Words of each recovered number, and what the paper states of it, by figure and number."""
+    file = files(__package__).joinpath("recovered.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
@@ -171,17 +185,11 @@ def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
     drops = [last_point(points, name, "delta_mu") for name in SPEEDS]
     still = [last_point(points, name, "static_friction") for name in SPEEDS]
     shares = [ratio(drop, F0) for drop, F0 in zip(drops, still, strict=True)]
-    recovered = [
-        RecoveredQuantity(
-            f"Share of the mean that ε = 0.5 takes, {name}", -value, sigma, -true_value, "20 %"
-        )
+    reads = {
+        f"share, {name}": (-value, sigma, -true_value)
         for name, (value, sigma, true_value) in zip(SPEEDS, shares, strict=True)
-    ]
-    recovered.append(
-        RecoveredQuantity(
-            f"Drop at {FAST} over that at {SLOW}", *ratio(drops[1], drops[0]), "1, within accuracy"
-        )
-    )
+    }
+    reads["fast over slow"] = ratio(drops[1], drops[0])
     weak = _of(points, SLOW).iloc[0]
     quoted = {
         **{f"drop, {name}": -share[0] for name, share in zip(SPEEDS, shares, strict=True)},
@@ -190,7 +198,7 @@ def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
         "bar of the weakest": NORMAL * weak["delta_mu_uncertainty"],
         "strongest": drops[0][0],
     }
-    return _figure("virtual-02", lines, points, pair, recovered, quoted)
+    return _figure("virtual-02", lines, points, pair, reads, quoted)
 
 
 def virtual_3(readings: SimulatedPoints) -> VirtualFigure:
@@ -216,17 +224,14 @@ def virtual_3(readings: SimulatedPoints) -> VirtualFigure:
     slopes = {e: _slope(points[points["epsilon_set"] == e]) for e in amplitudes}
     still, strong = slopes[min(slopes)], slopes[max(slopes)]
     change = strong[0] - still[0], float(np.hypot(strong[1], still[1])), strong[2] - still[2]
-    recovered = (
-        RecoveredQuantity("Slope of the mean over ln V at ε = 0", *still, "A − B"),
-        RecoveredQuantity("Change of the slope by ε = 0.5", *change, "0, within accuracy"),
-    )
     quoted = {
         "change": change[0],
         "bar of the change": NORMAL * change[1],
         "change of the model": change[2],
     }
     named = {f"slope_{e:g}": slope[0] for e, slope in slopes.items()}
-    return _figure("virtual-03", lines, points, series, recovered, quoted, **named)
+    reads = {"slope": still, "change": change}
+    return _figure("virtual-03", lines, points, series, reads, quoted, **named)
 
 
 def _still(rows: pd.DataFrame) -> pd.DataFrame:
@@ -268,26 +273,19 @@ def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
     slow = _of(points, SLOW)
     plateau = float(slow["epsilon_eff"].iloc[-1]) * elastic_slope(PRINTED, pair[0].velocity)
     over = (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau)
-    grown = f"at {FAST} over %s at {SLOW}, ε = 0.5"
-    recovered = (
-        *(
-            RecoveredQuantity(f"μ₁ at ε = 0.5, {name}", *mu1, "of order 1e-3")
-            for name, mu1 in zip(SPEEDS, first, strict=True)
-        ),
-        RecoveredQuantity(f"μ₁ {grown % 'μ₁'}", *ratio(first[1], first[0]), "1"),
-        RecoveredQuantity(f"μ₂ {grown % 'μ₂'}", *ratio(second[1], second[0]), "above 1"),
-        *(
-            RecoveredQuantity(f"μ₂/μ₁ at ε = 0.5, {name}", *share, "0.1 to 0.2")
-            for name, share in zip(SPEEDS, shares, strict=True)
-        ),
-        RecoveredQuantity(f"μ₁ over the elastic plateau ε_eff μ̄ l/(1 + l), {SLOW}", *over, "–"),
-    )
+    reads = {
+        **{f"mu1, {name}": mu1 for name, mu1 in zip(SPEEDS, first, strict=True)},
+        "mu1, fast over slow": ratio(first[1], first[0]),
+        "mu2, fast over slow": ratio(second[1], second[0]),
+        **{f"ratio, {name}": share for name, share in zip(SPEEDS, shares, strict=True)},
+        "over plateau": over,
+    }
     quoted = {
         f"{what}, {name}": value
         for name, mu1, share in zip(SPEEDS, first, shares, strict=True)
         for what, value in (("mu1", mu1[0]), ("bar", NORMAL * mu1[1]), ("ratio", share[0]))
     }
-    return _figure("virtual-04", lines, points, pair, recovered, quoted)
+    return _figure("virtual-04", lines, points, pair, reads, quoted)
 
 
 def virtual_5(readings: SimulatedPoints) -> VirtualFigure:
@@ -297,10 +295,6 @@ def virtual_5(readings: SimulatedPoints) -> VirtualFigure:
     lines, points = _over_amplitude(readings, pair)
     factor, sigma = collapse(_of(points, VACUUM), _of(points, AIR))
     vacuum, air = (abs(one.transfer) for one in pair)
-    recovered = RecoveredQuantity(
-        "Factor on ε that makes air and vacuum collapse", factor, sigma, air / vacuum,
-        f"{1 / p.collapse_divisor_200Hz}",
-    )  # fmt: skip
     quoted = {
         "factor": factor,
         "bar of the factor": NORMAL * sigma,
@@ -308,7 +302,8 @@ def virtual_5(readings: SimulatedPoints) -> VirtualFigure:
         **{f"share, {name}": share for name, share in ((VACUUM, vacuum), (AIR, air))},
         **{f"drop, {n}": last_point(points, n, "delta_mu")[0] for n in (VACUUM, AIR)},
     }
-    return _figure("virtual-05", lines, points, pair, (recovered,), quoted)
+    reads = {"factor": (factor, sigma, air / vacuum)}
+    return _figure("virtual-05", lines, points, pair, reads, quoted)
 
 
 def collapse(vacuum: pd.DataFrame, air: pd.DataFrame) -> tuple[float, float]:

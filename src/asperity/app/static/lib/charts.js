@@ -1,11 +1,10 @@
-// Figures as SVG. A general chart library takes 100 ms for the five figures of Explore, these a few:
-// they have to follow a slider. Colours are classes of the style sheet, so that light, dark and
+// Figures as SVG. They follow a slider: a general chart library takes 100 ms for the figures of Explore, this file some 10. Colours are classes of the style sheet, so that light, dark and
 // print need no redrawing.
 
-import { el, fresh } from "./dom.js";
-import { worded } from "./names.js";
+import { el, fresh, shape } from "./dom.js";
 import { csv, saveFile } from "./save.js";
 import { digits } from "./units.js";
+import { worded } from "./words.js";
 
 const figures = new Set();
 let printing = false;
@@ -31,10 +30,16 @@ export function series(index) {
   return `s${(index % 6) + 1}`;
 }
 
+/** A line of a legend: the line, or the point, of a class, and what it is. */
+export function key(cls, ...text) {
+  const mark = cls.startsWith("point") ? shape("circle", { class: cls, cx: 12, cy: 4, r: 4 }) : shape("path", { class: `line thick ${cls}`, d: "M0 4H24" });
+  return el("p", { class: "key" }, shape("svg", { class: "swatch", viewBox: "0 0 24 8", "aria-hidden": "true" }, mark), ...text);
+}
+
 /**
  * A figure with a title, a note and buttons that save it.
  *
- * `columns()` returns what the CSV holds: arrays by name. `options` are elements beside the title.
+ * `columns()` returns what the CSV holds: arrays by name. `options` are elements next to the title.
  * `ownLabel` says what the keyboard does on the chart where that is not reading values.
  * `onSpan(from, to)` is called with the ends, in units of x, of what is dragged over with the mouse.
  */
@@ -79,8 +84,8 @@ export class Figure {
    * axis has `label`, `log`, `range` (else that of the data) and `format`, from a number to a text.
    * A row has `lines` and `points` ({x, y, cls, name, title}), `bars` ({x, y, cls, name}), `marks`
    * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `words` ([text, x, y]
-   * in shares of the axes), `colours` ({stops, low, high, label}: a colour bar), `equal` (both axes in
-   * one scale) and `text` (in the middle). A line may be `thick`, `dashed` or `smooth`.
+   * in shares of the axes), `colours` ({stops, low, high, label}: a colour bar), `equal` (both axes with
+   * the same scale) and `text` (in the middle). A line may be `thick`, `dashed` or `smooth`.
    * `description` says in words what there is to see.
    */
   draw(chart, description = "") {
@@ -98,10 +103,10 @@ export class Figure {
     if (this.cursor) this.#showCursor();
   }
 
-  /** Width on paper, which no layout tells before it is printed: two figures side by side, or one. */
+  /** Width on paper: two figures in a row, or a single figure. */
   #printedWidth() {
-    const beside = this.element.parentElement?.classList.contains("panels") && this.name !== "whole";
-    return beside ? PRINTED / 2 - 20 : PRINTED;
+    const paired = this.element.parentElement?.classList.contains("panels") && this.name !== "whole";
+    return paired ? PRINTED / 2 - 20 : PRINTED;
   }
 
   /** Position of an event in units of the axes of its row; null outside. */
@@ -149,10 +154,10 @@ export class Figure {
   #hover(event) {
     const text = event && this.frames ? this.#under(event) : "";
     const box = this.plot.getBoundingClientRect();
-    this.#tell(text, event && event.clientX - box.left, event && event.clientY - box.top);
+    this.#show(text, event && event.clientX - box.left, event && event.clientY - box.top);
   }
 
-  #tell(text, x, y) {
+  #show(text, x, y) {
     this.readout.hidden = !text;
     if (!text) return;
     this.readout.textContent = text;
@@ -184,17 +189,17 @@ export class Figure {
         }
       }
     }
-    return best ? this.#said(row, best.item, best.i) : "";
+    return best ? this.#words(row, best.item, best.i) : "";
   }
 
-  #said(row, item, i) {
+  #words(row, item, i) {
     const y = item.y[i];
     if (item.title) return typeof item.title === "function" ? item.title(i) : item.title;
     const name = item.name ? `${item.name}: ` : "";
     return `${name}${(row.y.format || digits)(y)} at ${(this.chart.x.format || digits)(item.x[i])}`;
   }
 
-  // --- With the keyboard: arrows to the sides follow a curve, up and down change to another one ----
+  // --- With the keyboard: arrows to the sides follow a curve, up and down change the curve ----
 
   /** Every curve, row of points and row of bars that has a value, with the number of its row. */
   #tracks() {
@@ -226,18 +231,16 @@ export class Figure {
 
   #showCursor() {
     const tracks = this.#tracks();
-    const found = tracks[Math.min(this.cursor.track, tracks.length - 1)];
-    const i = found && Math.min(this.cursor.i, found.item.x.length - 1);
-    if (!found || !isKnown(found.item.y[i])) return this.#forget();
-    const frame = this.frames[found.k];
-    const [x, y] = [frame.x.to(found.item.x[i]), clampPixel(frame.y.to(found.item.y[i]))];
+    const track = tracks[Math.min(this.cursor.track, tracks.length - 1)];
+    const i = track && Math.min(this.cursor.i, track.item.x.length - 1);
+    if (!track || !isKnown(track.item.y[i])) return this.#forget();
+    const frame = this.frames[track.k];
+    const [x, y] = [frame.x.to(track.item.x[i]), clampPixel(frame.y.to(track.item.y[i]))];
     this.plot.querySelector(".cursor")?.remove();
-    const circle = document.createElementNS("http://www.w3.org/2000/svg", "circle");
-    for (const [n, v] of Object.entries({ class: "cursor", cx: round(x), cy: round(y), r: 8 })) circle.setAttribute(n, v);
-    this.plot.querySelector("svg").append(circle);
-    const text = this.#said(found.row, found.item, i);
-    const label = found.row.y.label && !found.item.title ? `${found.row.y.label}: ` : "";
-    this.#tell(text, x, y);
+    this.plot.querySelector("svg").append(shape("circle", { class: "cursor", cx: round(x), cy: round(y), r: 8 }));
+    const text = this.#words(track.row, track.item, i);
+    const label = track.row.y.label && !track.item.title ? `${track.row.y.label}: ` : "";
+    this.#show(text, x, y);
     this.spoken.textContent = label + text;
     return undefined;
   }
@@ -286,11 +289,7 @@ export class Figure {
       node.removeAttribute("class");
     });
     for (const node of gone) node.remove();
-    const ground = document.createElementNS("http://www.w3.org/2000/svg", "rect");
-    ground.setAttribute("width", "100%");
-    ground.setAttribute("height", "100%");
-    ground.setAttribute("fill", getComputedStyle(this.element).backgroundColor);
-    copy.prepend(ground);
+    copy.prepend(shape("rect", { width: "100%", height: "100%", fill: getComputedStyle(this.element).backgroundColor }));
     return new XMLSerializer().serializeToString(copy);
   }
 
@@ -498,7 +497,7 @@ function extent(values, log, margin) {
   return [low - margin * (high - low), high + margin * (high - low)];
 }
 
-/** Ranges in one scale, about the same middles. */
+/** Ranges with the same scale, about the same centres. */
 function equal(frame, [x0, x1], [y0, y1]) {
   const unit = Math.max((x1 - x0) / (frame.right - frame.left), (y1 - y0) / (frame.bottom - frame.top));
   const around = (low, high, size) => [(low + high - unit * size) / 2, (low + high + unit * size) / 2];
@@ -526,21 +525,20 @@ function ticks({ low, high, log }, axis, most) {
     const step = Math.max(1, Math.ceil((last - first + 1) / Math.max(2, most)));
     for (let p = first; p <= last; p += step) powers.push(10 ** p);
     if (powers.length >= 2) return powers.map((value) => ({ value, label: label(Number(value.toPrecision(3))) }));
-    const found = [];
-    for (let p = first - 1; p <= last; p += 1) {
-      for (const m of [1, 2, 5]) {
-        const value = Number(`${m}e${p}`);
-        if (value >= low && value <= high) found.push(value);
-      }
-    }
-    return found.map((value) => ({ value, label: label(value) }));
+    const values = [];
+    for (let p = first - 1; p <= last; p += 1) values.push(...[1, 2, 5].map((m) => Number(`${m}e${p}`)));
+    return values.filter((value) => value >= low && value <= high).map((value) => ({ value, label: label(value) }));
   }
   const rough = (high - low) / Math.max(2.5, most);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 2.5, 5, 10].find((m) => m * power >= rough * 0.999) * power;
-  const found = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n += 1) {
-    found.push(Number((n * step).toPrecision(12)));
-  }
-  return found.map((value) => ({ value, label: label(value, 8) }));
+  const steps = [10, 5, 2.5, 2, 1, 0.5].filter((m) => m * power < 5 * rough);
+  const multiples = (step) => {
+    const first = Math.ceil(low / step - 1e-9);
+    const count = Math.floor(high / step + 1e-9) - first + 1;
+    return Array.from({ length: Math.max(0, count) }, (_, n) => Number(((first + n) * step).toPrecision(12)));
+  };
+  // The fewest ticks that give a scale, two at least, else as many as fit.
+  const fitting = steps.map((m) => multiples(m * power)).filter((t) => t.length >= 2);
+  const chosen = fitting.findLast((t) => t.length <= Math.max(2.5, most) + 0.5) || fitting[0] || multiples(rough);
+  return chosen.map((value) => ({ value, label: label(value, 8) }));
 }

@@ -1,8 +1,8 @@
 // Sliders with number fields.
 
 import { el, fill, formula, fresh } from "./dom.js";
-import { nameOf, symbolOf } from "./names.js";
 import { parse, quantity } from "./units.js";
+import { nameOf, symbolOf } from "./words.js";
 
 const STEPS = 400;
 
@@ -37,7 +37,7 @@ export class Quantity {
     this.set(slider.value);
   }
 
-  /** Show a value in SI without telling anyone. */
+  /** Show a value in SI without calling `onInput`. */
   set(value) {
     this.value = value;
     this.field.value = typeof value === "number" ? quantity(value, this.parameter.kind, 4) : value;
@@ -48,7 +48,7 @@ export class Quantity {
     this.onShown?.();
   }
 
-  /** Move the slider as a hand would. */
+  /** Move the slider to a step, as the mouse does. */
   slideTo(step) {
     this.range.value = step;
     this.#moved();
@@ -56,15 +56,15 @@ export class Quantity {
 
   #fraction(value) {
     const { low, high, log } = this.slider;
-    const found = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-    return Math.min(1, Math.max(0, found));
+    const share = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+    return Math.min(1, Math.max(0, share));
   }
 
   #moved() {
     const { low, high, log } = this.slider;
     const u = Number(this.range.value) / STEPS;
     const exact = log ? low * (high / low) ** u : low + (high - low) * u;
-    // Three digits: a value that can be read, written down and said.
+    // Three digits: a value that can be read and written down.
     this.set(Number(exact.toPrecision(3)));
     this.onInput(this.value);
   }
@@ -79,7 +79,7 @@ export class Quantity {
 
 /**
  * The slider that was touched last, kept at the foot of a narrow screen while its figures scroll; a
- * list changes to another one. Wide screens have the sliders beside the figures and hide it.
+ * list chooses another slider. Wide screens, with the sliders next to the figures, hide it.
  */
 export class Dock {
   constructor() {
@@ -87,10 +87,10 @@ export class Dock {
     this.list = el("select", { "aria-label": "Number of the slider below", change: () => this.#choose(this.quantities[this.list.selectedIndex]) });
     this.value = el("output", {});
     this.range = el("input", { type: "range", min: 0, max: STEPS, step: 1, input: () => this.chosen.slideTo(this.range.value) });
-    this.element = el("div", { class: "dock", role: "group", "aria-label": "One slider beside the figures" }, this.list, this.value, this.range);
+    this.element = el("div", { class: "dock", role: "group", "aria-label": "A slider next to the figures" }, this.list, this.value, this.range);
   }
 
-  /** Offer the sliders of a form; the same number as before stays, else the one named `first`. */
+  /** Offer the sliders of a form; the number chosen before stays, else `first` is chosen. */
   offer(quantities, first) {
     this.quantities = quantities;
     fill(this.list, quantities.map(({ parameter: p }) => el("option", {}, `${p.label || nameOf(p.name)} – ${p.meaning}`)));
@@ -126,9 +126,9 @@ export class Entry {
       type: "text", class: "number", id, spellcheck: "false", autocomplete: "off",
       "aria-label": label ? parameter.meaning : false,
       change: () => {
-        const found = parse(field.value, parameter.kind) ?? field.value.trim();
-        field.value = text(found);
-        onInput(found);
+        const value = parse(field.value, parameter.kind) ?? field.value.trim();
+        field.value = text(value);
+        onInput(value);
       },
     });
     field.value = text(value);
@@ -148,7 +148,7 @@ export function tick(label, checked, onInput, title) {
   return { element, set: (value) => { box.checked = value; }, box };
 }
 
-/** A choice of one. */
+/** A labelled list to choose from. */
 export function choice(label, options, value, onInput) {
   const id = fresh("choice");
   const select = el("select", { id, change: () => onInput(select.value) },

@@ -17,6 +17,14 @@ export function el(tag, attributes = {}, ...children) {
   return node;
 }
 
+/** An element of SVG. */
+export function shape(tag, attributes = {}, ...children) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
+}
+
 /** Formulas of the server, which writes them itself. */
 export function formula(markup) {
   const holder = document.createElement("span");

@@ -19,7 +19,7 @@ export function writeLink(tab, parameters) {
 
 /** Write at once what waits: before the address changes to that of another view. */
 export function flushLink() {
-  // The Back button changes the address some time before the page is told.
+  // The Back button changes the address some time before the page gets the event.
   const here = readLink().tab;
   const same = pending !== null && (here === "" || here === pending.tab);
   if (same) history.replaceState(null, "", pending.address);

@@ -1,5 +1,8 @@
 // Files and texts that leave the page.
 
+import { el } from "./dom.js";
+import { flushLink } from "./link.js";
+
 /** Offer a file. */
 export function saveFile(name, content, type) {
   const url = content instanceof Blob ? URL.createObjectURL(content) : URL.createObjectURL(new Blob([content], { type }));
@@ -23,8 +26,21 @@ export function csv(columns) {
   return [names.map(cell).join(","), ...rows].join("\n") + "\n";
 }
 
-/** Copy a text, and say so on the button. */
-export async function copyText(text, button) {
+/** Buttons that copy: a label, and a function that returns the text or a promise of it. */
+export function copies(...labelled) {
+  return labelled.map(([label, text]) => el("button", {
+    type: "button",
+    click: async ({ currentTarget }) => {
+      const copied = await text();
+      if (copied) copyText(copied, currentTarget);
+    },
+  }, label));
+}
+
+/** Copies the address of the view. */
+export const copyLink = ["Copy link", () => { flushLink(); return location.href; }];
+
+async function copyText(text, button) {
   const label = button.textContent;
   try {
     await navigator.clipboard.writeText(text);

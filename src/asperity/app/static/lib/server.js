@@ -7,19 +7,23 @@ const client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) =>
 /** A request that the server refuses; the message is the server's sentence. */
 export class Refused extends Error {}
 
-async function send(path, body, signal, part) {
-  let response;
+/** What the network gives, or a sentence where it gives nothing. */
+async function received(promise) {
   try {
-    response = await fetch(`/api/${path}`, {
-      method: "POST",
-      headers: { "Content-Type": "application/json", "X-Client": part ? `${client}-${part}` : client },
-      body: JSON.stringify(body),
-      signal,
-    });
+    return await promise;
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Refused("The server does not answer; is asperity serve still running?");
   }
+}
+
+async function send(path, body, signal, part) {
+  const response = await received(fetch(`/api/${path}`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json", "X-Client": part ? `${client}-${part}` : client },
+    body: JSON.stringify(body),
+    signal,
+  }));
   if (!response.ok) {
     const body = await response.json().catch(() => ({}));
     throw new Refused(body.error || `The server answered with ${response.status}.`);
@@ -29,28 +33,31 @@ async function send(path, body, signal, part) {
 
 /** JSON of a GET request. */
 export async function get(path) {
-  return (await fetch(`/api/${path}`)).json();
+  return received(fetch(`/api/${path}`).then((response) => response.json()));
 }
 
 /** JSON answer to a POST request. */
 export async function ask(path, body, signal) {
-  return (await send(path, body, signal)).json();
+  return received((await send(path, body, signal)).json());
 }
 
 /**
- * Run a job: `onMessage` is called with each of its messages, and the last one is returned.
+ * Run a job: `onMessage` is called with each of its messages, and the last message is returned.
  * Aborting the signal ends the job; so does another job on the same path with the same `part`.
  */
 export async function run(path, body, onMessage, signal, part) {
   const response = await send(path, body, signal, part);
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
-  let rest = "";
+  let begun = "";
   let last = {};
   for (;;) {
-    const { done, value } = await reader.read();
-    if (done) return last;
-    const lines = (rest + value).split("\n");
-    rest = lines.pop();
+    const { done, value } = await received(reader.read());
+    if (done) {
+      if (!last.done && !signal?.aborted) throw new Refused("The server ended before the computation did; is asperity serve still running?");
+      return last;
+    }
+    const lines = (begun + value).split("\n");
+    begun = lines.pop();
     for (const line of lines) {
       last = JSON.parse(line);
       if (last.error && !last.cancelled) throw new Refused(last.error);
@@ -81,7 +88,7 @@ export function sendFile(path, file, onProgress, signal) {
 
 /**
  * Asks for the newest question only: while an answer is on its way, later questions replace each
- * other, and the last of them is asked next.
+ * other, and the last is sent next.
  */
 export class Latest {
   constructor(path, onAnswer, onError) {

@@ -56,10 +56,10 @@ export function parse(text, kind) {
     if (unit === "%") return number / 100;
     return unit ? null : number;
   }
-  const found = ladder.find(([name]) => plain(name) === unit);
+  const step = ladder.find(([name]) => plain(name) === unit);
   // Divided, so that 1 um is the double 1e-6.
-  if (!found || !Number.isFinite(number)) return null;
-  return found[1] < 0 ? number / 10 ** -found[1] : number * 10 ** found[1];
+  if (!step || !Number.isFinite(number)) return null;
+  return step[1] < 0 ? number / 10 ** -step[1] : number * 10 ** step[1];
 }
 
 /** A value with the digits that its standard uncertainty leaves. */

@@ -1,7 +1,7 @@
 // Data: recordings that are dropped, measured and fitted, and the virtual tribometer.
 
 import { el } from "../lib/dom.js";
-import { copyText } from "../lib/save.js";
+import { copies, copyLink } from "../lib/save.js";
 import { ask, Refused } from "../lib/server.js";
 import { capital } from "../lib/words.js";
 import { FitPanel } from "./data/fit.js";
@@ -34,12 +34,12 @@ export function create(page) {
   const protocol = new ProtocolPanel(page, { read: (upload) => open(upload), changed: link });
   const element = el("section", { class: "tab data", "aria-label": title },
     el("div", { class: "paper-head" }, el("h2", {}, "Data"),
-      el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link")),
+      copies(copyLink)),
     drop, message, list, fit.element, protocol.element);
 
   async function add(files) {
     message.textContent = "";
-    // Files may be dropped before the server has said what it takes.
+    // Files may be dropped before the server has answered.
     while (!known) await new Promise((done) => { setTimeout(done, 50); });
     for (const file of files) {
       if (file.size > known.largest) {
@@ -65,21 +65,23 @@ export function create(page) {
     card.element.focus({ preventScroll: true });
   }
 
-  let writing = false;
   let written = "";
   function link() {
-    const found = new URLSearchParams();
-    for (const card of cards) if (card.state.key) found.append("file", JSON.stringify(card.saved()));
-    fit.save(found);
-    protocol.save(found);
-    written = found.toString();
-    writing = true;
-    page.setLink(name, found);
-    writing = false;
+    const parameters = new URLSearchParams();
+    for (const card of cards) if (card.state.key) parameters.append("file", JSON.stringify(card.saved()));
+    fit.save(parameters);
+    protocol.save(parameters);
+    page.setLink(name, parameters);
+    written = parameters.toString();
   }
 
   return {
     element,
+    renamed() {
+      for (const card of cards) card.renamed();
+      fit.renamed();
+      link();
+    },
     async show(parameters) {
       if (!known) {
         try {
@@ -91,13 +93,12 @@ export function create(page) {
         }
         protocol.begin(known.protocols);
       }
-      if (writing || (parameters.toString() === written && written)) return;
+      if (written && parameters.toString() === written) return;
       written = parameters.toString();
       while (cards.length) cards.pop().element.remove();
       for (const text of parameters.getAll("file")) {
         try {
-          const [key, fileName, source, options] = JSON.parse(text);
-          newCard({ key, name: String(fileName), source, options }).measure();
+          newCard(RecordingCard.restored(text)).measure();
         } catch {
           message.textContent = "The link must name recordings as this page writes them, got another text; drop the files again.";
         }

@@ -1,22 +1,23 @@
-// Explore: one operating point, and everything about it while the sliders move.
+// Explore: an operating point, whose response follows the sliders.
 
-import { Figure, series } from "../lib/charts.js";
+import { Figure, key, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
-import { Machine } from "../lib/machine.js";
-import { worded } from "../lib/names.js";
-import { copyText } from "../lib/save.js";
-import { get, Latest, Refused, run } from "../lib/server.js";
+import { copies, copyLink } from "../lib/save.js";
+import { ask, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
-import { capital } from "../lib/words.js";
+import { capital, worded } from "../lib/words.js";
+import { Machine } from "./explore/machine.js";
 import { MotionPanel } from "./explore/motion.js";
 
 export const name = "explore";
 export const title = "Explore";
 
-/** Time (ms) without a movement after which a search begins. */
-const REST = 250;
-/** Numbers of the drive and of the machine, in the order of the page; the law's own follow. */
+/** Time (ms) without a movement after which a search starts. */
+const PAUSE = 250;
+/** Time (ms) after which the page says why an answer takes longer than usual. */
+const SLOW = 1000;
+/** Numbers of the drive and of the machine, in the order of the page; those of the law follow. */
 const FIRST = ["V", "epsilon", "frequency", "W0", "K", "M"];
 
 export function create(page) {
@@ -28,6 +29,8 @@ export function create(page) {
   let motion = null;
   let searching = null;
   let resting = 0;
+  let slow = 0;
+  let compiling = null;
   let answer = null;
   let sliders = [];
 
@@ -45,17 +48,17 @@ export function create(page) {
   // --- The address ---------------------------------------------------------------------------
 
   function toParameters() {
-    const found = new URLSearchParams();
-    found.set("material", view.material);
-    found.set("law", view.law);
-    found.set("laws", view.laws.join(","));
-    for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
+    const parameters = new URLSearchParams();
+    parameters.set("material", view.material);
+    parameters.set("law", view.law);
+    parameters.set("laws", view.laws.join(","));
+    for (const [n, v] of Object.entries(view.numbers)) parameters.set(n, v);
     if (view.air) {
-      found.set("air", "1");
-      for (const [n, v] of Object.entries(view.air)) found.set(`air.${n}`, v);
+      parameters.set("air", "1");
+      for (const [n, v] of Object.entries(view.air)) parameters.set(`air.${n}`, v);
     }
-    if (view.phases) found.set("show", "phases");
-    return found;
+    if (view.phases) parameters.set("show", "phases");
+    return parameters;
   }
 
   function fromParameters(parameters) {
@@ -86,16 +89,16 @@ export function create(page) {
     };
   }
 
-  /** Numbers that the chosen laws need and the material does not have: where their sliders start. */
+  /** Numbers that the chosen laws need and the material does not have: the values at which their sliders start. */
   function needed() {
     const { numbers, sliders } = catalogue.materials[view.material];
-    const found = {};
+    const values = {};
     for (const law of [view.law, ...view.laws]) {
       for (const n of catalogue.laws[law].required) {
-        if (!numbers[n]) found[n] = sliders[n].value;
+        if (!numbers[n]) values[n] = sliders[n].value;
       }
     }
-    return found;
+    return values;
   }
 
   function changed() {
@@ -103,6 +106,12 @@ export function create(page) {
     onPaper.textContent = `${view.material}, ${view.law}: ${sliders.map((q) => `${q.parameter.name} = ${q.field.value}`).join(", ")}${view.numbers.inertia ? ", with inertia" : ""}.`;
     stopSearch();
     latest.ask(question(), { since: performance.now() });
+    clearTimeout(slow);
+    slow = setTimeout(() => {
+      const text = "Computing. Programs that these numbers need are compiled once, which takes some seconds.";
+      page.say(text);
+      if (!answer?.point) sentence.textContent = text;
+    }, SLOW);
   }
 
   function stopSearch() {
@@ -112,14 +121,15 @@ export function create(page) {
     searching = null;
   }
 
-  async function answered(found, { since }, more) {
-    answer = found;
+  async function answered(response, { since }, more) {
+    answer = response;
     message.textContent = "";
-    page.say(found.preparing ? `Preparing ${found.preparing}, once; this takes some seconds.` : "");
-    if (found.preparing) {
+    clearTimeout(slow);
+    sayPreparing(response);
+    if (response.preparing) {
       resting = setTimeout(() => latest.ask(question(), { since: performance.now() }), 400);
     }
-    if (!found.point) return;
+    if (!response.point) return;
     draw();
     // The picture is on the screen after the next frame.
     await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
@@ -127,15 +137,29 @@ export function create(page) {
     if (performance.getEntriesByName("slider to picture").length > 1000) {
       performance.clearMeasures("slider to picture");
     }
-    const open = !found.point.searched || Object.values(found.curves).some((c) => c.left.length);
-    if (more || latest.pending || found.preparing) return;
-    if (open) resting = setTimeout(search, REST);
-    if (found.point.searched) motion.ask(question(), found.point);
+    const open = !response.point.searched || Object.values(response.curves).some((c) => c.left.length);
+    if (more || latest.pending || response.preparing) return;
+    if (open) resting = setTimeout(search, PAUSE);
+    if (response.point.searched) motion.ask(question(), response.point);
+  }
+
+  /** Say which law is compiled and for how long already: nothing can be drawn of it before. */
+  function sayPreparing({ preparing, point }) {
+    if (!preparing) compiling = null;
+    else if (compiling?.law !== preparing) compiling = { law: preparing, since: performance.now() };
+    if (!preparing) return page.say("");
+    const passed = Math.round((performance.now() - compiling.since) / 1000);
+    const text = `Compiling the equations of ${preparing} for this computer, once: usually less than 20 s${passed > 2 ? `, ${passed} s so far` : ""}.`;
+    if (point) return page.say(text);
+    sentence.dataset.state = "searching";
+    sentence.textContent = text;
+    return page.say("Compiling…");
   }
 
   function refused(error) {
     if (!(error instanceof Refused)) throw error;
-    message.textContent = error.message;
+    clearTimeout(slow);
+    message.textContent = capital(error.message);
     page.say("");
   }
 
@@ -171,10 +195,10 @@ export function create(page) {
   // --- Figures ---------------------------------------------------------------------------------
 
   function makeFigures() {
-    const found = {
+    return {
       period: new Figure({
         name: "period", title: "One period", height: 400,
-        caption: "While the load is low the slider slips fast and the contacts are young; while it is high they age.",
+        caption: "At low load the slider slips fast and the contacts stay young; at high load they age.",
         columns: () => answer.point?.converged && {
           phase: answer.point.phase, force: answer.point.force, slip_velocity: answer.point.slip,
           ...(answer.point.age ? { age: answer.point.age } : {}),
@@ -183,11 +207,11 @@ export function create(page) {
       amplitude: new Figure({
         name: "amplitude", title: "Against the amplitude", height: 400, columns: amplitudeColumns,
         options: phases.element,
-        caption: "The more the load is modulated, the lower the mean friction: laws differ in the harmonics most.",
+        caption: "Modulation lowers the mean friction; the laws differ most in the harmonics.",
       }),
       harmonics: new Figure({
         name: "harmonics", title: "Harmonics of the force", height: 230,
-        caption: "What a lock-in amplifier reads at once, twice, three times the frequency of the load.",
+        caption: "What a lock-in amplifier reads at the frequency of the load and its multiples.",
         columns: () => answer.point?.converged && {
           harmonic: answer.point.harmonics.map((_, i) => i + 1),
           real: answer.point.harmonics.map((c) => c[0]),
@@ -197,7 +221,7 @@ export function create(page) {
       }),
       multipliers: new Figure({
         name: "multipliers", title: "Floquet multipliers", height: 230,
-        caption: "A small disturbance is multiplied by these in each period: inside the circle it dies out.",
+        caption: "Each period multiplies a small disturbance by these numbers: inside the circle it dies out.",
         columns: () => answer.point?.converged && {
           real: answer.point.multipliers.map((m) => m[0]),
           imaginary: answer.point.multipliers.map((m) => m[1]),
@@ -205,13 +229,12 @@ export function create(page) {
       }),
       air: new Figure({
         name: "air", title: "Air layer", height: 230,
-        caption: "Air between the surfaces carries a part of the modulation; the contacts feel the rest.",
+        caption: "Air between the surfaces carries a part of the modulation; the contacts feel what remains.",
         columns: () => answer.air && {
           frequency: answer.air.frequency, share: answer.air.share, phase: answer.air.phase,
         },
       }),
     };
-    return found;
   }
 
   function amplitudeColumns() {
@@ -320,8 +343,8 @@ export function create(page) {
       })),
     }));
     fill(figures.amplitude.note,
-      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)} ${law === view.law ? "" : "dashed"}` }), law,
-        curve.lost ? el("span", { class: "lost" }, ` – lost at ε = ${digits(curve.lost.at, 3)}: ${curve.lost.why}`)
+      curves.map(([law, curve], k) => key(`${series(k)} ${law === view.law ? "" : "dashed"}`, law,
+        curve.lost ? el("span", { class: "lost" }, ` – no orbit from ε = ${digits(curve.lost.at, 3)}: ${curve.lost.why}`)
           : curve.left.length ? " …" : "")));
     const high = Math.max(answer.amplitudes.at(-1), answer.epsilon * 1.03);
     return figures.amplitude.draw({ x: { label: "ε on the contacts", range: [0, high] }, rows },
@@ -336,7 +359,7 @@ export function create(page) {
     figures.air.note.textContent =
       `At ${quantity(here, "frequency")} the contacts bear ` +
       `${digits(100 * air.share_here, 3)} % of the modulation, ${digits(Math.abs(air.phase_here), 3)} rad ` +
-      `${air.phase_here < 0 ? "behind" : "ahead of"} the load; the air layer carries the rest.`;
+      `${air.phase_here < 0 ? "behind" : "ahead of"} the load; the air layer carries the remainder.`;
     return figures.air.draw({
       x: { label: "frequency", log: true, format: (v) => quantity(v, "frequency", 3) },
       rows: [{
@@ -370,8 +393,8 @@ export function create(page) {
     const law = catalogue.laws[view.law];
     const byName = Object.fromEntries(law.parameters.map((p) => [p.name, p]));
     sliders = [];
-    const slider = (own) => {
-      sliders.push(new Quantity(own));
+    const slider = (options) => {
+      sliders.push(new Quantity(options));
       return sliders.at(-1).element;
     };
     // With an air layer the contacts bear a share of what is applied.
@@ -382,7 +405,7 @@ export function create(page) {
       slider: { ...material.sliders[p.name], value: view.numbers[p.name] ?? material.sliders[p.name].value },
       onInput: (value) => { view.numbers[p.name] = value; changed(); },
     });
-    const own = law.parameters.filter((p) => p.place === "law");
+    const ofLaw = law.parameters.filter((p) => p.place === "law");
     const rebuild = () => { buildControls(); changed(); };
     fill(controls,
       choice("Material", Object.entries(catalogue.materials).map(([n, m]) => [n, `${n} – ${m.title}`]), view.material,
@@ -392,7 +415,7 @@ export function create(page) {
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
         tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia),
           (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
-      group("Law", false, own.map(sliderOf)),
+      group("Law", false, ofLaw.map(sliderOf)),
       group("Air layer", false,
         tick("Air between the surfaces", view.air !== null, (on) => { view.air = on ? {} : null; rebuild(); },
           "ε is then the amplitude of the load, of which the contacts bear a share").element,
@@ -424,9 +447,8 @@ export function create(page) {
     page.setLink(name, toParameters());
     draw();
   }, "Phases of the harmonics in place of their amplitudes");
-  const copies = el("div", { class: "actions" },
-    ...[["Copy link", () => location.href], ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command]]
-      .map(([label, text]) => el("button", { type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); } }, label)));
+  const textAs = (kind) => () => ask("explore/text", question()).then((texts) => texts[kind], refused);
+  const buttons = el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", textAs("python")], ["Copy as command", textAs("command")]));
 
   return {
     element,
@@ -436,8 +458,8 @@ export function create(page) {
         figures = makeFigures();
         machine = new Machine();
         motion = new MotionPanel((moved) => machine.follow(moved));
-        results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, copies),
-          el("div", { class: "panels" }, figures.period.element, figures.amplitude.element, machine.element, motion.element,
+        results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, buttons),
+          el("div", { class: "panels" }, figures.period.element, figures.amplitude.element, motion.element, machine.element,
             figures.harmonics.element, figures.multipliers.element, figures.air.element),
           el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }

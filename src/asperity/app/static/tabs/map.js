@@ -1,14 +1,13 @@
 // Map: stability and response over two numbers.
 
-import { Figure } from "../lib/charts.js";
+import { Figure, key } from "../lib/charts.js";
 import { picture, stops } from "../lib/colours.js";
 import { choice, Entry, group, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
-import { nameOf } from "../lib/names.js";
-import { copyText } from "../lib/save.js";
+import { copies, copyLink } from "../lib/save.js";
 import { ask, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
-import { capital } from "../lib/words.js";
+import { capital, count, nameOf } from "../lib/words.js";
 
 export const name = "map";
 export const title = "Map";
@@ -50,15 +49,15 @@ export function create(page) {
   // --- The address ---------------------------------------------------------------------------
 
   function toParameters() {
-    const found = new URLSearchParams({
+    const parameters = new URLSearchParams({
       material: view.material, law: view.law, show: view.show, count: view.count,
     });
     for (const side of ["x", "y"]) {
       const { name: n, low, high, log } = view[side];
-      found.set(side, [n, low, high, log ? "log" : "linear"].join(","));
+      parameters.set(side, [n, low, high, log ? "log" : "linear"].join(","));
     }
-    for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
-    return found;
+    for (const [n, v] of Object.entries(view.numbers)) parameters.set(n, v);
+    return parameters;
   }
 
   function fromParameters(parameters) {
@@ -71,7 +70,7 @@ export function create(page) {
       const [n, low, high, log] = (parameters.get(side) || "").split(",");
       if (parameter(n)) view[side] = { name: n, low: number(low), high: number(high), log: log === "log" };
     }
-    for (const [n, text] of parameters) if (parameter(n)) view.numbers[n] = number(text);
+    for (const [n, text] of parameters) if (parameter(n) || n === "inertia") view.numbers[n] = number(text);
   }
 
   // --- Asking ----------------------------------------------------------------------------------
@@ -107,7 +106,7 @@ export function create(page) {
   }
 
   async function start() {
-    const asked = question();
+    const solved = question();
     running = new AbortController();
     const { signal } = running;
     message.textContent = "";
@@ -116,15 +115,15 @@ export function create(page) {
     progress.removeAttribute("value");
     status.textContent = "Solving the first, coarse grid…";
     try {
-      await run("map", asked, (part) => {
+      await run("map", solved, (part) => {
         if (signal.aborted) return;
         if (part.waiting) status.textContent = "Waiting for another map to be done…";
         if (part.progress !== undefined) progress.value = part.progress;
         if (!part.grid) return;
         grid = part.grid;
-        shown = asked;
+        shown = solved;
         draw();
-        if (grid.count < asked.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
+        if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
       }, signal);
       if (signal.aborted) return;
       status.textContent = `${grid.count} × ${grid.count} points.`;
@@ -153,13 +152,14 @@ export function create(page) {
     const known = grid.values.flat().filter((v) => v !== null).sort((a, b) => a - b);
     const at = (share) => known[Math.min(known.length - 1, Math.floor(share * known.length))];
     const signed = SIGNED.includes(shown.show);
-    // A few extreme points would leave all others in one colour.
+    // A few extreme points would give all others the same colour.
     const far = signed ? Math.max(Math.abs(at(0.02)), Math.abs(at(0.98))) || 1 : 0;
     const limits = signed ? [-far, far] : [at(0.02), at(0.98) > at(0.02) ? at(0.98) : at(0.02) + 1];
     const colours = signed ? "vik" : "batlow";
     const [x, y] = [axisOf(withSi(shown.x, grid.x)), axisOf(withSi(shown.y, grid.y))];
     const critical = grid.unmodulated && { x: grid.unmodulated[0], y: grid.unmodulated[1] };
     const output = catalogue.outputs[shown.show];
+    figure.height = Math.min(560, Math.max(320, figure.plot.clientWidth));
     figure.draw({
       x,
       rows: [{
@@ -173,12 +173,12 @@ export function create(page) {
       }],
     }, description());
     fill(figure.note,
-      critical && el("p", { class: "key" }, el("span", { class: "swatch dashed boundary" }), "K = Kc: without modulation sliding is stable above it"),
+      critical && key("dashed boundary", "K = Kc: without modulation, sliding is stable above it"),
       grid.boundaries === null && el("p", {}, "The stability boundary comes with the next, finer grid."),
-      (grid.boundaries || []).map((line) => el("p", {}, el("span", { class: "swatch boundary" }), describeLine(line))),
-      grid.boundaries === null || grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever an orbit was found." : "No stability boundary here: unstable everywhere."),
+      [...new Set((grid.boundaries || []).map(describeLine))].map((text) => key("boundary", text)),
+      grid.boundaries === null || grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever there is an orbit." : "No stability boundary here: unstable everywhere."),
       grid.failed ? el("p", { class: "lost" }, `${grid.failed} of ${grid.count ** 2} points have no orbit: ${grid.reasons[0]}`) : null,
-      grid.not_located ? el("p", {}, `In ${grid.not_located} places stability changes without a crossing that could be located.`) : null);
+      grid.not_located ? el("p", {}, `At ${count(grid.not_located, "place")} stability changes, but no boundary was located there.`) : null);
   }
 
   /** An axis with its ends in SI, as the server understood them. */
@@ -190,7 +190,7 @@ export function create(page) {
     const kinds = [...new Set(line.kind)].filter(Boolean).join(" and ");
     const turning = line.mode_frequency.filter((f) => f > 0);
     const [low, high] = [Math.min(...turning), Math.max(...turning)].map((f) => digits(f, 3));
-    const hertz = turning.length ? `, turning at ${low === high ? low : `${low} to ${high}`} Hz` : "";
+    const hertz = turning.length ? `, where a disturbance swings at ${low === high ? low : `${low} to ${high}`} Hz` : "";
     return `Stability boundary: ${kinds}${hertz}`;
   }
 
@@ -305,13 +305,7 @@ export function create(page) {
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); marker = null; rebuild(); } }, "Start again")));
   }
 
-  async function copyAs(kind, button) {
-    try {
-      copyText((await ask("map/text", question()))[kind], button);
-    } catch (error) {
-      message.textContent = capital(error.message);
-    }
-  }
+  const textAs = (kind) => () => ask("map/text", question()).then((texts) => texts[kind], (error) => { message.textContent = capital(error.message); });
 
   const results = el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Stability map"));
   const element = el("section", { class: "tab map", "aria-label": title }, controls, results);
@@ -339,10 +333,7 @@ export function create(page) {
         results.append(
           el("div", { class: "summary" }, el("p", { class: "hint" }, "A click takes the point to Explore; with the keyboard, arrow keys and Enter."),
             el("div", { class: "work" }, status, progress, cancel), message,
-            el("div", { class: "actions" },
-              el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link"),
-              el("button", { type: "button", click: (e) => copyAs("python", e.currentTarget) }, "Copy as Python"),
-              el("button", { type: "button", click: (e) => copyAs("command", e.currentTarget) }, "Copy as command"))),
+            el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", textAs("python")], ["Copy as command", textAs("command")]))),
           figure.element);
       }
       fromParameters(parameters);

@@ -1,9 +1,9 @@
 // Paper: figures of a published paper that follow sliders, and the ledger of its claims.
 
-import { Figure, series } from "../lib/charts.js";
+import { Figure, key, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity } from "../lib/controls.js";
 import { el, fill, fresh } from "../lib/dom.js";
-import { copyText, csv, saveFile } from "../lib/save.js";
+import { copies, copyLink, csv, saveFile } from "../lib/save.js";
 import { ask, Latest, Refused, run } from "../lib/server.js";
 import { table } from "../lib/tables.js";
 import { digits, quantity } from "../lib/units.js";
@@ -14,7 +14,7 @@ export const name = "paper";
 export const title = "Paper";
 
 const VERDICTS = ["reproduced", "misprint", "differs", "undecided"];
-/** Time (ms) without a change after which curves with the slider's mass are asked for. */
+/** Time (ms) without a change after which curves with the mass of the slider are computed. */
 const REST = 200;
 const KINDS = ["test", "fit", "arithmetic", "identity"];
 
@@ -36,17 +36,13 @@ export function create(page) {
   const figure = new Figure({ name: "paper-figure", title: "Figure", height: 460, columns: figureColumns });
   const drawing = el("div", { class: "element" });
   const massStatus = el("p", { class: "status", role: "status" });
-  const massBar = el("progress", { max: 1, "aria-label": "Progress of the curves with the slider's mass", hidden: true });
-  const copies = el("div", { class: "actions" }, ...[
-    ["Copy link", () => location.href], ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command],
-  ].map(([label, text]) => el("button", {
-    type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); },
-  }, label)));
+  const massBar = el("progress", { max: 1, "aria-label": "Progress of the curves with the mass of the slider", hidden: true });
+  const buttons = el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command]));
   const dock = new Dock();
   const figures = el("div", { class: "paper-figures" }, controls,
     el("div", { class: "results" },
-      el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), copies), drawing, figure.element,
-      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "At the end of each curve"), ends)), dock.element);
+      el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), buttons), drawing, figure.element,
+      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "Values at the end of each curve"), ends)), dock.element);
   const ledgerView = el("div", { class: "ledger" });
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
   const heading = el("h2", {}, title);
@@ -58,14 +54,14 @@ export function create(page) {
   // --- The address -----------------------------------------------------------------------------
 
   function link() {
-    const found = new URLSearchParams();
-    if (view.paper) found.set("paper", view.paper);
-    if (view.show !== "figures") found.set("show", view.show);
+    const parameters = new URLSearchParams();
+    if (view.paper) parameters.set("paper", view.paper);
+    if (view.show !== "figures") parameters.set("show", view.show);
     if (view.show === "figures") {
-      found.set("figure", view.figure);
-      for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
-    } else for (const n of ["status", "kind", "section", "search"]) if (view[n]) found.set(n, view[n]);
-    page.setLink(name, found);
+      parameters.set("figure", view.figure);
+      for (const [n, v] of Object.entries(view.numbers)) parameters.set(n, v);
+    } else for (const n of ["status", "kind", "section", "search"]) if (view[n]) parameters.set(n, view[n]);
+    page.setLink(name, parameters);
   }
 
   function fromParameters(parameters) {
@@ -97,27 +93,27 @@ export function create(page) {
     const { place, title: what, numbers } = current();
     const moved = numbers.filter((n) => n.name in view.numbers);
     if (!moved.length) return `${place}: ${what}. All numbers are as printed.`;
-    const one = (n) => {
+    const described = (n) => {
       const value = view.numbers[n.name];
       return `${n.label} = ${typeof value === "number" ? quantity(value, n.kind, 3) : value} in place of ${quantity(n.slider.value, n.kind, 3)}`;
     };
-    return `${place} with ${moved.map(one).join(", ")}.`;
+    return `${place} with ${moved.map(described).join(", ")}.`;
   }
 
-  async function answered(found) {
+  async function answered(response) {
     message.textContent = "";
-    if (found.preparing) {
-      page.say(`Preparing ${found.preparing}, once; this takes some seconds.`);
+    if (response.preparing) {
+      page.say(`Compiling the equations of ${response.preparing}, once; this takes some seconds.`);
       setTimeout(() => latest.ask({ paper: view.paper, figure: view.figure, numbers: view.numbers }, null), 500);
       return;
     }
     page.say("");
-    answer = found;
+    answer = response;
     draw();
     if (current().inertia && view.show === "figures") resting = setTimeout(weigh, REST);
   }
 
-  // --- Curves with the slider's mass, which may take seconds ------------------------------------
+  // --- Curves with the mass of the slider, which may take seconds ------------------------------------
 
   function stopMass() {
     clearTimeout(resting);
@@ -134,7 +130,7 @@ export function create(page) {
     const { signal } = weighing;
     massBar.hidden = false;
     massBar.removeAttribute("value");
-    massStatus.textContent = "Solving the curves with the slider's mass…";
+    massStatus.textContent = "Computing the curves with the mass of the slider…";
     try {
       await run("paper/inertia", { paper: view.paper, figure: view.figure, numbers: view.numbers }, (part) => {
         if (signal.aborted) return;
@@ -185,10 +181,10 @@ export function create(page) {
       `${asSentence()} Curves: ${moved.map((c) => c.name).join(", ")}.`);
     const hasStated = rows.some((row) => stated[row.column]);
     fill(figure.note,
-      moved.map((curve, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), curve.name)),
-      inertia.map(({ curve }, k) => el("p", { class: "key" }, el("span", { class: `swatch ${massClass(curve, k)}` }), curve.name)),
-      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed dashed" }), "as printed"),
-      hasStated && el("p", { class: "key" }, el("span", { class: "swatch dot stated" }), "stated in the text"));
+      moved.map((curve, k) => key(series(k), curve.name)),
+      inertia.map(({ curve }, k) => key(massClass(curve, k), curve.name)),
+      isMoved && key("printed dashed", "as printed"),
+      hasStated && key("point stated", "stated in the text"));
     drawEnds();
   }
 
@@ -202,12 +198,12 @@ export function create(page) {
     const { rows, printed, moved, stated } = answer;
     const last = (curve, column) => curve.values[column].at(-1);
     const all = [...moved.map((curve, k) => [curve, printed[k]]), ...inertia.map((m) => [m.curve, m.printed])];
-    const said = rows.flatMap((row) => (stated[row.column] || []).map((s) =>
+    const statements = rows.flatMap((row) => (stated[row.column] || []).map((s) =>
       el("li", {}, `${row.label} at ${digits(s.x, 3)}: ${s.ends.map((v) => digits(v, 3)).join(" to ")} (${s.text})`)));
-    fill(ends, table(["Curve", "Quantity", "As printed", "Moved"],
+    fill(ends, table(["Curve", "Quantity", "As printed", "With the moved numbers"],
       all.flatMap(([curve, before]) => rows.map((row) => [curve.name, row.label, digits(last(before, row.column), 4), digits(last(curve, row.column), 4)])),
-      "At the end of each curve"),
-    said.length > 0 && el("ul", { class: "said" }, said));
+      "Values at the end of each curve"),
+    statements.length > 0 && el("ul", { class: "statements" }, statements));
   }
 
   function figureColumns() {
@@ -224,8 +220,8 @@ export function create(page) {
   }
 
   function buildControls() {
-    const own = current();
-    const sliders = own.numbers.map((n) => new Quantity({
+    const chosen = current();
+    const sliders = chosen.numbers.map((n) => new Quantity({
       parameter: { name: n.name, label: n.label, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace(/_(\w+)/, "<sub>$1</sub>")}</i>` },
       slider: { ...n.slider, value: view.numbers[n.name] ?? n.slider.value },
       onInput: (value) => {
@@ -247,7 +243,7 @@ export function create(page) {
       el("div", { class: "actions" }, el("button", {
         type: "button", click: () => { view.numbers = {}; buildControls(); changed(); },
       }, "As printed")));
-    dock.offer(sliders, own.numbers[0].name);
+    dock.offer(sliders, chosen.numbers[0].name);
   }
 
   // --- Ledger ----------------------------------------------------------------------------------
@@ -271,9 +267,7 @@ export function create(page) {
         filters.status.element, filters.kind.element, filters.section.element,
         el("div", { class: "choice" }, el("label", { for: id }, "Text"), filters.search)),
       el("div", { class: "summary" }, count, ledgerMessage, el("div", { class: "actions" },
-        el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link"),
-        el("button", { type: "button", click: (e) => copyText(ledgerPython(), e.currentTarget) }, "Copy as Python"),
-        el("button", { type: "button", click: (e) => copyText(`asperity reproduce ${paper.paper.name} --out report`, e.currentTarget) }, "Copy as command"),
+        copies(copyLink, ["Copy as Python", ledgerPython], ["Copy as command", () => `asperity reproduce ${paper.paper.name} --out report`]),
         el("button", { type: "button", click: saveLedger }, "CSV"))),
       list);
   }
@@ -301,7 +295,7 @@ export function create(page) {
       el("h3", {}, c.statement),
       el("dl", {}, el("dt", {}, "Stated"), el("dd", {}, c.stated),
         el("dt", {}, "Computed"), el("dd", {}, c.computed || "…")),
-      el("details", {}, el("summary", {}, "How, and what to make of it"),
+      el("details", {}, el("summary", {}, "How it was computed, and what it means"),
         c.rule && el("p", {}, `Rule: ${c.rule}.`), el("p", {}, c.how), el("p", {}, c.why)))));
   }
 
@@ -337,7 +331,7 @@ export function create(page) {
     }, text)));
   }
 
-  /** Which paper, where more than one is installed. */
+  /** The choice of a paper, if several are installed. */
   function buildPapers() {
     fill(papers, paper.papers.length > 1 && choice("Paper", paper.papers.map((p) => [p.name, p.short]), paper.paper.name, async (value) => {
       Object.assign(view, { paper: value, figure: "", numbers: {} });

@@ -11,7 +11,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.orbit.batches import FAST_BLOCK, points_of, run_chunks, take
+from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
 from asperity.orbit.methods.fourier.orbit import FourierOrbit, fourier_observables, fourier_orbit
 from asperity.orbit.methods.method import Method
 from asperity.orbit.observables import Observables, waveform
@@ -34,7 +34,7 @@ def fast_solve(
     def solve(block: Problem) -> tuple[Observables, Array, FourierOrbit]:
         return _fast_block(block, nodes, grading, harmonics)
 
-    blocks = jax.tree.map(lambda a: a.reshape(-1, FAST_BLOCK), problem)
+    blocks = jax.tree.map(lambda a: a.reshape(-1, min(points, FAST_BLOCK)), problem)
     results = jax.lax.map(solve, blocks)
     return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
 
@@ -55,7 +55,7 @@ def _fast_block(
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
 #: nodes that a pulse needs grow with the root of it.
 _GRIDS = ((5.0, 24, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
-#: Points in a call: enough to spread the cost of a call, and not too many for a single point.
+#: Points in a call: enough to spread the cost of a call.
 _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
@@ -91,14 +91,16 @@ class Fourier(Method):
                 harmonics=options.harmonics,
             )
             chosen = left[sharpness[left] <= sharpest]
-            for part, (observables, error, orbit) in run_chunks(solve, (problem,), chosen, _CHUNK):
+            size = chunk_of(chosen, _CHUNK)
+            for part, (observables, error, orbit) in run_chunks(solve, (problem,), chosen, size):
                 good = np.flatnonzero(error < _ERROR)
                 solution.store(part[good], take(observables, good))
                 solution.iterations[part] += orbit.steps
                 if options.phases:
                     sample = partial(_sample, grading=grading, phases=options.phases)
                     inputs = (take(problem, part), orbit)
-                    for some, samples in run_chunks(sample, inputs, good, FAST_BLOCK):
+                    size = chunk_of(good, FAST_BLOCK)
+                    for some, samples in run_chunks(sample, inputs, good, size):
                         solution.waveform[..., part[some]] = samples
                 options.progress(len(good))
             left = left[~solution.converged[left]]

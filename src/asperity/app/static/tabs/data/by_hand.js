@@ -1,44 +1,64 @@
-// A law's numbers moved by hand over a recording; the curve of the law follows at once.
+// Sliders for the parameters of a law, whose curve is drawn over a recording.
 
 import { Figure, series } from "../../lib/charts.js";
 import { Quantity } from "../../lib/controls.js";
 import { el, fill } from "../../lib/dom.js";
 import { Latest, Refused } from "../../lib/server.js";
+import { capital } from "../../lib/words.js";
 
-/** Numbers to begin with, where no fit has been made: usual ones of rocks. */
+/** Start values before a fit: typical of rocks. */
 const BEGIN = { A: 0.01, B: 0.012, D0: 5e-6, "K/W0": 5e3 };
 /** A slider covers this factor on both sides of its number. */
 const REACH = 30;
 
 export class ByHand {
-  /** `fitFrom(start)` begins a fit at the numbers, by their names in a fit. */
-  constructor(page, fitFrom) {
-    Object.assign(this, { page, fitFrom });
+  /** `fitFrom(start)` begins a fit at the numbers, by their names in a fit; `changed()` writes the link. */
+  constructor(page, fitFrom, changed) {
+    Object.assign(this, { page, fitFrom, changed });
     this.sliders = el("div", { class: "filters" });
     this.message = el("p", { class: "message", role: "alert" });
     this.figure = new Figure({
       name: "by-hand", title: "The law over the recording", height: 340,
       columns: () => this.shown && { time: this.shown.x, model: this.shown.y },
-      caption: "The level and a straight trend over time are fitted to the recording; the rest is as the sliders say.",
+      caption: "The level and a straight trend over time are fitted to the recording; all other numbers are those of the sliders.",
     });
     this.latest = new Latest("data/model", (answer) => this.#draw(answer), (error) => {
       if (!(error instanceof Refused)) throw error;
-      this.message.textContent = error.message;
+      this.message.textContent = capital(error.message);
     });
     this.element = el("details", { class: "by-hand", hidden: true },
       el("summary", {}, "Move the numbers by hand over the recording"), this.sliders, this.message, this.figure.element,
       el("div", { class: "actions" }, el("button", { type: "button", click: () => this.fitFrom(this.start()) }, "Fit from here")));
-    this.element.addEventListener("toggle", () => { if (this.element.open && this.recording) this.#ask(); });
+    this.element.addEventListener("toggle", () => {
+      if (!this.recording) return;
+      this.changed();
+      if (this.element.open) this.#ask();
+    });
   }
 
-  /** The one recording with known velocities, or null; and the law. */
+  /** What a link holds: the numbers, where the panel is open. */
+  saved() {
+    return this.recording && this.element.open ? JSON.stringify(this.values) : this.kept;
+  }
+
+  /** Numbers of a link, for the recording that comes. */
+  restore(text) {
+    this.kept = text;
+  }
+
+  renamed() {
+    if (this.recording) this.#build();
+  }
+
+  /** Show a recording, unless its velocities are unknown, and a law. */
   use(recording, law) {
     const known = recording?.segments.length && recording.segments.every((s) => s.hold || s.velocity > 0) && !recording.segments[0].hold;
     this.element.hidden = !known;
     if (!known) this.recording = null;
     if (!known || (this.recording === recording && this.law === law)) return;
-    Object.assign(this, { recording, law, values: null });
+    Object.assign(this, { recording, law, values: null, shown: null });
     this.#build();
+    this.kept = null;
   }
 
   /** Take the numbers of a fit. */
@@ -59,26 +79,49 @@ export class ByHand {
 
   #build() {
     const { laws, materials } = this.page.catalogue;
-    const usual = Object.values(materials)[0].sliders;
-    const own = laws[this.law].parameters.filter((p) => p.place === "law");
-    this.values ||= Object.fromEntries([
-      ...own.map((p) => [p.name, BEGIN[p.name] ?? usual[p.name].value]), ["K/W0", BEGIN["K/W0"]],
-      ["V0", this.recording.segments[0].velocity], ["mu0", this.recording.level],
-    ]);
-    const moved = own.filter((p) => !["mu0", "V0"].includes(p.name));
+    const defaults = Object.values(materials)[0].sliders;
+    const parameters = laws[this.law].parameters.filter((p) => p.place === "law");
+    if (!this.values) {
+      this.values = Object.fromEntries([
+        ...parameters.map((p) => [p.name, BEGIN[p.name] ?? defaults[p.name].value]), ["K/W0", BEGIN["K/W0"]],
+        ["V0", this.recording.segments[0].velocity], ["mu0", this.recording.level],
+      ]);
+      this.#takeKept();
+    }
+    const moved = parameters.filter((p) => !["mu0", "V0"].includes(p.name));
     const stiffness = { name: "K/W0", kind: "per_length", meaning: "stiffness over the load" };
     fill(this.sliders, [...moved, stiffness].map((parameter) => {
       const value = this.values[parameter.name];
       const slider = value > 0 ? { value, low: value / REACH, high: value * REACH, log: true } : { value, low: 0, high: 1, log: false };
       return new Quantity({
         parameter, slider,
-        onInput: (to) => { if (typeof to === "number") { this.values[parameter.name] = to; this.#ask(); } },
+        onInput: (to) => {
+          if (typeof to !== "number") {
+            this.message.textContent = `${capital(parameter.meaning)} must be a number with a unit as in the field before, got “${to}”; change it.`;
+            return;
+          }
+          this.values[parameter.name] = to;
+          this.#ask();
+          this.changed();
+        },
       }).element;
     }));
     if (this.element.open) this.#ask();
   }
 
+  /** Take the numbers of a link. */
+  #takeKept() {
+    try {
+      const kept = Object.entries(JSON.parse(this.kept || "{}")).filter(([n, v]) => n in this.values && Number.isFinite(v));
+      Object.assign(this.values, Object.fromEntries(kept));
+      if (kept.length) this.element.open = true;
+    } catch {
+      // The numbers to begin with.
+    }
+  }
+
   #ask() {
+    if (!this.shown) this.message.textContent = "Integrating the motion; the equations of the law are compiled first, once, which takes some seconds.";
     const segments = this.recording.segments.map((s) => [s.end - s.start, s.hold ? 0 : s.velocity]);
     this.latest.ask({ law: this.law, numbers: this.values, segments });
   }
@@ -93,7 +136,7 @@ export class ByHand {
     const trend = line(known);
     this.shown = { x: at, y: friction.map((f, i) => f + trend(at[i])) };
     const change = segments[1]?.start;
-    // What is around the first change of the velocity: the rest is straight.
+    // Around the first change of the velocity; friction is straight elsewhere.
     const near = change === undefined ? null : [change - 0.15 * (segments[1].end - change), change + 0.4 * (segments[1].end - change)];
     const lines = [{ ...curve, cls: series(5), name: "recorded" }, { ...this.shown, cls: series(1), thick: true, name: `${this.law} by hand` }];
     const cut = ({ x, y, ...style }) => {

@@ -1,14 +1,13 @@
 // A law fitted to what was measured, or several compared.
 
-import { Figure, series } from "../../lib/charts.js";
+import { Figure, key, series } from "../../lib/charts.js";
 import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
-import { nameOf, names as chosenNames } from "../../lib/names.js";
-import { copyText, csv, saveFile } from "../../lib/save.js";
+import { copies, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
 import { sections } from "../../lib/tables.js";
 import { digits } from "../../lib/units.js";
-import { capital } from "../../lib/words.js";
+import { capital, ended, nameOf, names as chosenNames } from "../../lib/words.js";
 import { ByHand } from "./by_hand.js";
 
 /** What a fit begins with, by the kind of data; without free parameters, all that the data may show. */
@@ -34,7 +33,7 @@ export class FitPanel {
     this.status = el("p", { class: "sentence", role: "status" });
     this.message = el("p", { class: "message", role: "alert" });
     this.results = el("div", { class: "card-body" });
-    this.byHand = new ByHand(page, (start) => this.start(start));
+    this.byHand = new ByHand(page, (start) => this.start(start), changed);
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
     this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
     this.cancel.hidden = true;
@@ -48,19 +47,28 @@ export class FitPanel {
 
   save(parameters) {
     if (!this.element.hidden && JSON.stringify(this.settings) !== JSON.stringify(SETTINGS)) parameters.set("fit", JSON.stringify(this.settings));
+    const hand = this.byHand.saved();
+    if (hand) parameters.set("hand", hand);
+  }
+
+  /** Write parameters by their names in another set of names. */
+  renamed() {
+    this.#free();
+    this.byHand.renamed();
   }
 
   restore(parameters) {
     this.settings = { ...SETTINGS };
+    this.byHand.restore(parameters.get("hand"));
     try {
-      const given = JSON.parse(parameters.get("fit") || "{}");
+      const kept = JSON.parse(parameters.get("fit") || "{}");
       const { laws } = this.page.catalogue;
-      if (Array.isArray(given.laws)) this.settings.laws = given.laws.filter((n) => laws[n]?.rate_dependent);
-      if (Array.isArray(given.free)) this.settings.free = given.free.filter((n) => typeof n === "string");
-      for (const n of TEXTS) if (typeof given[n] === "string") this.settings[n] = given[n];
-      for (const n of FLAGS) this.settings[n] = given[n] === true;
+      if (Array.isArray(kept.laws)) this.settings.laws = kept.laws.filter((n) => laws[n]?.rate_dependent);
+      if (Array.isArray(kept.free)) this.settings.free = kept.free.filter((n) => typeof n === "string");
+      for (const n of TEXTS) if (typeof kept[n] === "string") this.settings[n] = kept[n];
+      for (const n of FLAGS) this.settings[n] = kept[n] === true;
     } catch {
-      // A link that was cut: the settings to begin with.
+      // A link that was cut: the default settings.
     }
     this.#build();
   }
@@ -82,7 +90,7 @@ export class FitPanel {
     this.byHand.use(runs.length === 1 ? runs[0].recording : null, this.settings.laws[0]);
   }
 
-  /** The defaults of another kind of data, where those of the earlier one were left as they are. */
+  /** The defaults of another kind of data, unless a setting was changed. */
   #begin(kind) {
     const before = DEFAULTS[this.kind || "tables"];
     const untouched = Object.keys(before).every((n) => JSON.stringify(this.settings[n]) === JSON.stringify(before[n]));
@@ -110,33 +118,33 @@ export class FitPanel {
     fixed.value = settings.fixed;
     this.freeHolder = el("div", { class: "ticks" });
     const text = (label, key, placeholder) => {
-      const own = fresh("field");
-      const field = el("input", { type: "text", id: own, placeholder, spellcheck: "false", autocomplete: "off", change: () => set(key)(field.value.trim()) });
+      const fieldId = fresh("field");
+      const field = el("input", { type: "text", id: fieldId, placeholder, spellcheck: "false", autocomplete: "off", change: () => set(key)(field.value.trim()) });
       field.value = settings[key];
-      return el("div", { class: "choice" }, el("label", { for: own }, label), field);
+      return el("div", { class: "choice" }, el("label", { for: fieldId }, label), field);
     };
     this.sampling = el("div", { class: "filters" }, text("Draws of each chain", "draws", "1000"), text("Chains", "chains", "4"));
     this.sampling.hidden = !settings.posterior;
     this.runOptions = el("fieldset", {}, el("legend", {}, "Whole recordings"),
-      el("p", { class: "note" }, "Compared with the motion through the whole of it; K is free for each of them, and the noise is estimated."),
+      el("p", { class: "note" }, "The law's motion over the whole recording is fitted; K is free for each recording, and the noise is estimated."),
       el("div", { class: "filters" },
         choice("Trend of the friction over slip", ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")).element,
-        choice("State at the beginning", [["steady", "of steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
+        choice("State at the beginning", [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
         text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
-        text("Means a second of long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
+        text("Mean values per second for long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
         text("Velocities between the steps", "velocities", "measured, or 1 um/s, 10 um/s"),
-        tick("The friction may drift over time too", settings.drift, set("drift")).element));
+        tick("Friction also drifts over time", settings.drift, set("drift")).element));
     fill(this.form,
-      el("fieldset", {}, el("legend", {}, "Laws: one is fitted, several are compared"),
+      el("fieldset", {}, el("legend", {}, "Laws: tick one to fit it, several to compare them"),
         el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
-      el("fieldset", {}, el("legend", {}, "Free parameters; without any, all that the data may show"), this.freeHolder),
+      el("fieldset", {}, el("legend", {}, "Free parameters; if none is ticked, all that the data can determine"), this.freeHolder),
       el("div", { class: "fit-more" },
         choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")).element,
-        el("div", { class: "choice" }, el("label", { for: id }, "Fixed numbers, one a line; V is the pulling velocity"), fixed),
+        el("div", { class: "choice" }, el("label", { for: id }, "Fixed numbers, one per line; V is the pulling velocity"), fixed),
         el("div", { class: "ticks" },
           tick("Published uncertainties as priors", settings.prior, set("prior")).element,
           tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
-          tick("Posterior by sampling, of one law", settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
+          tick("Posterior of one law by sampling", settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
             "As asperity fit --posterior; it takes a minute or more").element,
           tick("With the inertia of the slider", settings.inertia, set("inertia")).element,
           tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element),
@@ -149,8 +157,8 @@ export class FitPanel {
 
   #free() {
     const { laws } = this.page.catalogue;
-    const own = [...new Set(this.settings.laws.flatMap((l) => laws[l].parameters.filter((p) => p.place !== "drive").map((p) => p.name)))];
-    const names = ["eps_ratio", ...own.filter((n) => !["V0", "inertia", "epsilon", "frequency", "V"].includes(n))];
+    const parameters = [...new Set(this.settings.laws.flatMap((l) => laws[l].parameters.filter((p) => p.place !== "drive").map((p) => p.name)))];
+    const names = ["eps_ratio", ...parameters.filter((n) => !["V0", "inertia", "epsilon", "frequency", "V"].includes(n))];
     fill(this.freeHolder, names.map((n) => tick(nameOf(n), this.settings.free.includes(n), (on) => {
       this.settings.free = names.filter((m) => (m === n ? on : this.settings.free.includes(m)));
       this.changed();
@@ -164,7 +172,7 @@ export class FitPanel {
     return free.length ? free : null;
   }
 
-  /** Fit or compare, of one law from start values if there are some. */
+  /** Fit or compare; `start` has start values by parameter. */
   async start(start = {}) {
     this.work?.abort();
     this.work = new AbortController();
@@ -174,17 +182,17 @@ export class FitPanel {
     fill(this.results);
     const fixed = {};
     for (const line of settings.fixed.split(/[\n;]+/).filter((l) => l.trim())) {
-      const [n, ...rest] = line.split("=");
-      if (!n.trim() || !rest.join("=").trim()) {
+      const [n, ...value] = line.split("=");
+      if (!n.trim() || !value.join("=").trim()) {
         this.message.textContent = `Fixed numbers must be NAME = VALUE, got “${line.trim()}”; write it like V = 1 um/s.`;
         return;
       }
-      fixed[n.trim()] = rest.join("=").trim();
+      fixed[n.trim()] = value.join("=").trim();
     }
-    const asked = {
+    const question = {
       laws: settings.laws, free: this.#freed(),
       rows: this.rows(), tables: this.tables(), fixed, start,
-      runs: this.runs().map((r) => r.asked),
+      runs: this.runs().map((r) => r.question),
       trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
       fit_rate: settings.fit_rate || null,
       report: settings.report, names: chosenNames(),
@@ -192,26 +200,26 @@ export class FitPanel {
       profile: settings.profile, inertia: settings.inertia,
     };
     if (settings.posterior) {
-      asked.posterior = true;
+      question.posterior = true;
       for (const [key, label, low, high] of [["draws", "Draws of each chain", 100, 10000], ["chains", "Chains", 2, 8]]) {
-        asked[key] = Number(settings[key]);
-        if (!settings[key] || !Number.isInteger(asked[key]) || asked[key] < low || asked[key] > high) {
+        question[key] = Number(settings[key]);
+        if (!settings[key] || !Number.isInteger(question[key]) || question[key] < low || question[key] > high) {
           this.message.textContent = `${label} must be a whole number from ${low} to ${high}, got “${settings[key]}”; change it.`;
           return;
         }
       }
     }
     const velocities = settings.velocities.split(",").map((v) => v.trim()).filter(Boolean);
-    if (velocities.length && asked.runs.length) {
-      if (asked.runs.length > 1) {
-        this.message.textContent = `Velocities between the steps must go with one recording, got ${asked.runs.length}; fit them one by one.`;
+    if (velocities.length && question.runs.length) {
+      if (question.runs.length > 1) {
+        this.message.textContent = `Velocities between the steps must go with one recording, got ${question.runs.length}; fit them one by one.`;
         return;
       }
-      asked.runs[0].velocities = velocities;
+      question.runs[0].velocities = velocities;
     }
     this.#running(true);
     try {
-      const last = await run("data/fit", asked, (part) => {
+      const last = await run("data/fit", question, (part) => {
         if (part.waiting) this.status.textContent = "Waiting for another fit…";
         if (part.share !== undefined) {
           this.bar.value = part.share;
@@ -219,7 +227,7 @@ export class FitPanel {
         }
         if (part.draws !== undefined) {
           this.bar.value = part.draws / part.of;
-          this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, those of the warm-up included.` : "Sampling: the processes start…";
+          this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, warm-up included.` : "Sampling: starting the processes…";
         }
         this.bar.hidden = part.draws === undefined && part.share === undefined;
         if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
@@ -246,19 +254,17 @@ export class FitPanel {
 
   #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, command }) {
     this.figures = [];
-    const python = () => this.#python();
     const record = fit || comparison;
     const buttons = el("div", { class: "actions" },
-      el("button", { type: "button", click: (e) => copyText(python(), e.currentTarget) }, "Copy as Python"),
-      el("button", { type: "button", click: (e) => copyText(command, e.currentTarget) }, "Copy as command"),
+      copies(["Copy as Python", () => this.#python()], ["Copy as command", () => command]),
       el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(posterior ? { ...record, posterior } : record, null, 2), "application/json") }, "JSON"),
       report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
     if (fit?.converged) this.byHand.take(fit);
-    // What the fit says first stands beside the button, then its picture, then its numbers.
+    // The first sentence of the report stands next to the button, then the picture, then the numbers.
     const [first, ...others] = described;
-    this.status.textContent = first.sentences.length ? `${first.sentences.join(". ")}.` : first.title;
-    const ofLaws = Object.entries(laws || {}).map(([n, own]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(own, ` of ${n}`)));
+    this.status.textContent = first.sentences.length ? first.sentences.map(ended).join(" ") : capital(first.title);
+    const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw.map((s) => ({ ...s, title: s.title === n ? "" : s.title })), ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
     for (const draw of this.figures) draw();
@@ -292,7 +298,7 @@ export class FitPanel {
       const figure = new Figure({ name: `bands-${k + 1}`, title: "Readings and the fitted law", height: Math.max(260, 190 * rows.length), columns });
       const many = rows[0].series.length;
       fill(figure.note,
-        rows[0].series.slice(0, 12).map(({ label }, i) => el("p", { class: "key" }, el("span", { class: `swatch ${series(i)}` }), label)),
+        rows[0].series.slice(0, 12).map(({ label }, i) => key(series(i), label)),
         many > 12 && el("p", {}, `and ${many - 12} more series`),
         el("p", {}, "Points: readings with two standard errors. Lines: the law, with its 95 % band between the thin ones."));
       this.figures.push(() => figure.draw({
@@ -315,19 +321,19 @@ export class FitPanel {
   #runs(runs) {
     return (runs || []).map(({ name, recorded, fitted, difference, transients }, k) => {
       const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y, time_of_fitted: fitted.x, fitted: fitted.y }) });
-      fill(figure.note, el("p", { class: "key" }, el("span", { class: "swatch s6" }), "recorded"), el("p", { class: "key" }, el("span", { class: "swatch s2" }), "fitted"));
+      fill(figure.note, key("s6", "recorded"), key("s2", "fitted"));
       const both = (of) => [{ ...of.recorded, cls: "s6", name: "recorded" }, { ...of.fitted, cls: "s2", name: "fitted", thick: true }];
       this.figures.push(() => figure.draw({ x: { label: "time (s)" }, rows: [
         { y: { label: "F/W" }, marks: transients.map((t) => t.time), lines: both({ recorded, fitted }) },
         { y: { label: "recorded − fitted" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
       ] }, `Friction of ${name} as recorded and as fitted.`));
-      const near = transients.map((transient) => {
+      const enlarged = transients.map((transient) => {
         const title = `After ${digits(transient.time, 6)} s`;
-        const one = new Figure({ name: "transient", title, height: 250, columns: () => ({ time: transient.recorded.x, friction: transient.recorded.y }) });
-        this.figures.push(() => one.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`));
-        return one.element;
+        const near = new Figure({ name: "transient", title, height: 250, columns: () => ({ time: transient.recorded.x, friction: transient.recorded.y }) });
+        this.figures.push(() => near.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`));
+        return near.element;
       });
-      return el("div", { class: "panels" }, figure.element, near);
+      return el("div", { class: "panels" }, figure.element, enlarged);
     });
   }
 
@@ -336,7 +342,7 @@ export class FitPanel {
     const { value, observable } = residuals;
     const names = [...new Set(observable)];
     const figure = new Figure({ name: "residuals", title: "Residuals in standard deviations", height: 230, columns: () => ({ observable, residual: value }) });
-    fill(figure.note, names.map((n, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), n)));
+    fill(figure.note, names.map((n, k) => key(`point ${series(k)}`, n)));
     this.figures.push(() => {
       const at = value.map((_, i) => i + 1);
       const of = (n) => at.filter((_, i) => observable[i] === n);
@@ -372,10 +378,10 @@ export class FitPanel {
     const chosen = `{${fixed.map(([n, v]) => `"${n}": "${v}"`).join(", ")}}`;
     const files = [...this.tables().map((t) => t.name), ...(this.rows().length ? ["campaign.csv"] : [])];
     return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
-      + this.runs().map(({ name, python, asked }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${asked.window ? `, window=(${asked.window.join(", ")})` : ""}${asked.steps ? `, steps=[${asked.steps.join(", ")}]` : ""}))\n`).join("")
-      + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${this.#freed() ? list(this.#freed()) : "None"},\n    fixed=fixed,\n`
+      + this.runs().map(({ name, python, question }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${question.window ? `, window=(${question.window.replace(":", ", ")})` : ""}${question.steps ? `, steps=[${question.steps.join(", ")}]` : ""}))\n`).join("")
+      + `result = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${this.#freed() ? list(this.#freed()) : "None"},\n    fixed=fixed,\n`
       + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`
-      + (posterior && one ? `posterior = inference.sample_posterior(found, chains=${Number(chains)}, draws=${Number(draws)})\n` : "");
+      + (posterior && one ? `posterior = inference.sample_posterior(result, chains=${Number(chains)}, draws=${Number(draws)})\n` : "");
   }
 }
 
@@ -384,6 +390,6 @@ function fromBase64(text) {
 }
 
 function priorText({ kind, ...numbers }) {
-  const given = Object.entries(numbers).filter(([, v]) => typeof v === "number").map(([n, v]) => `${n} ${digits(v, 3)}`);
-  return `Prior: ${kind}${given.length ? `, ${given.join(", ")}` : ""}.`;
+  const shown = Object.entries(numbers).filter(([, v]) => typeof v === "number").map(([n, v]) => `${n} ${digits(v, 3)}`);
+  return `Prior: ${kind}${shown.length ? `, ${shown.join(", ")}` : ""}.`;
 }

@@ -3,7 +3,7 @@
 import { Figure, series } from "../../lib/charts.js";
 import { choice } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
-import { copyText } from "../../lib/save.js";
+import { copies } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
 import { digits } from "../../lib/units.js";
 import { capital } from "../../lib/words.js";
@@ -12,6 +12,7 @@ import { capital } from "../../lib/words.js";
 const REST = 350;
 /** Longest text (characters) that a link holds. */
 const LONGEST = 4000;
+const PYTHON = 'from asperity.protocol import load_protocol, record_run, run_protocol\n\nprotocol = load_protocol("protocol.toml")\nrun_protocol(protocol, "run.nc")\nif protocol.setup is not None:\n    trace = record_run(protocol.setup, "run.nc")\n    print(trace)\n';
 
 export class ProtocolPanel {
   constructor(page, { read, changed }) {
@@ -34,7 +35,7 @@ export class ProtocolPanel {
     this.chooser = el("div");
     this.figure = new Figure({
       name: "motion", title: "The motion", height: 420,
-      columns: () => ({ time: this.found.curves.load.x, load: this.found.curves.load.y, force: this.found.curves.force.y, velocity: this.found.curves.velocity.y }),
+      columns: () => ({ time: this.shown.curves.load.x, load: this.shown.curves.load.y, force: this.shown.curves.force.y, velocity: this.shown.curves.velocity.y }),
     });
     this.details = el("details", { class: "recording virtual" },
       el("summary", {}, el("h3", {}, "Virtual tribometer")),
@@ -42,8 +43,7 @@ export class ProtocolPanel {
       this.chooser,
       el("div", { class: "choice" }, el("label", { for: id }, "Protocol"), this.text), this.mistakes,
       el("div", { class: "actions" }, this.runButton, this.cancel,
-        el("button", { type: "button", click: (e) => copyText(this.#python(), e.currentTarget) }, "Copy as Python"),
-        el("button", { type: "button", click: (e) => copyText("asperity run protocol.toml --out run.nc --record recording.csv", e.currentTarget) }, "Copy as command")),
+        copies(["Copy as Python", () => PYTHON], ["Copy as command", () => "asperity run protocol.toml --out run.nc --record recording.csv"])),
       this.status, this.bar, this.message, this.result);
     this.details.addEventListener("toggle", () => { if (this.protocols && this.details.open) { this.#check(); this.changed(); } });
     this.element = this.details;
@@ -143,22 +143,18 @@ export class ProtocolPanel {
     }
   }
 
-  #draw(found) {
-    this.found = found;
-    this.status.textContent = found.stopped ? capital(found.stopped) : `Done: ${found.rows.toLocaleString("en")} rows.`;
+  #draw(result) {
+    this.shown = result;
+    this.status.textContent = result.stopped ? capital(result.stopped) : `Done: ${result.rows.toLocaleString("en")} rows.`;
     fill(this.result,
-      found.stability && el("p", { class: "note" }, capital(found.stability)),
-      el("div", { class: "actions" }, el("button", { type: "button", class: "primary", click: () => this.read({ id: found.id, name: found.name }) }, "Read this recording")),
+      result.stability && el("p", { class: "note" }, capital(result.stability)),
+      el("div", { class: "actions" }, el("button", { type: "button", class: "primary", click: () => this.read({ id: result.id, name: result.name }) }, "Read this recording")),
       this.figure.element);
-    const { load, force, velocity } = found.curves;
+    const { load, force, velocity } = result.curves;
     this.figure.draw({
       x: { label: "time (s)" },
       rows: [["load (N)", load, 5], ["force (N)", force, 0], ["velocity (m/s)", velocity, 1]]
         .map(([label, curve, k]) => ({ y: { label }, lines: [{ ...curve, cls: series(k), name: label }] })),
     }, "Load, force and slip velocity over the run.");
-  }
-
-  #python() {
-    return 'from asperity.protocol import load_protocol, record_run, run_protocol\n\nprotocol = load_protocol("protocol.toml")\nrun_protocol(protocol, "run.nc")\nif protocol.setup is not None:\n    trace = record_run(protocol.setup, "run.nc")\n    print(trace)\n';
   }
 }

@@ -1,13 +1,13 @@
-// One recording: what was understood of it, corrections by hand, what was measured.
+// A recording: channels as understood, corrections by hand, what was measured.
 
 import { Figure, series } from "../../lib/charts.js";
 import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
-import { copyText, csv, saveFile } from "../../lib/save.js";
+import { copies, csv, saveFile } from "../../lib/save.js";
 import { Refused, run, sendFile } from "../../lib/server.js";
 import { scrolling, table } from "../../lib/tables.js";
 import { digits, quantity, withDoubt } from "../../lib/units.js";
-import { capital, count } from "../../lib/words.js";
+import { capital, count, ended } from "../../lib/words.js";
 import { stickSlip, stickSlipSentence } from "./stick_slip.js";
 
 const ROLE_NAMES = {
@@ -19,14 +19,14 @@ let numbered = 0;
 export class RecordingCard {
   constructor(page, known, state, { changed, removed }) {
     Object.assign(this, { page, known, changed, removed });
-    this.state = { key: null, name: "", ...state };
+    this.state = { key: state.key ?? null, name: state.name || "" };
     this.state.source = { columns: {}, units: {}, channels: {}, ...(state.source || {}) };
     this.state.options = { ...(state.options || {}) };
     this.number = numbered += 1;
     this.result = null;
     this.recording = null;
-    this.chosen = new Map();
-    this.fitted = true;
+    this.left = new Set(state.left || []); // rows that a fit leaves out
+    this.fitted = state.fitted !== false;
     this.status = el("p", { class: "sentence", role: "status" });
     this.bar = el("progress", { max: 1, "aria-label": `Progress of ${this.state.name}` });
     this.message = el("p", { class: "message", role: "alert" });
@@ -39,16 +39,27 @@ export class RecordingCard {
     this.bar.hidden = true;
   }
 
+  /** What a link holds: see `RecordingCard.restored`. */
   saved() {
-    return [this.state.key, this.state.name, this.state.source, this.state.options];
+    const { key, name, source, options } = this.state;
+    return [key, name, source, options, [...this.left], this.fitted];
+  }
+
+  static restored(text) {
+    const [key, name, source, options, left, fitted] = JSON.parse(text);
+    return { key, name: String(name), source, options, left, fitted };
+  }
+
+  renamed() {
+    if (this.result) this.#draw();
   }
 
   rows() {
     const rows = this.result?.measured?.rows || [];
-    return rows.filter((row, i) => row.kind === "amplitude" && !row.reason && this.chosen.get(i) !== false);
+    return rows.filter((row, i) => row.kind === "amplitude" && !row.reason && !this.left.has(i));
   }
 
-  /** The recording as a whole, where it is no modulated one and is to be fitted. */
+  /** The whole recording for a fit; null for one with a modulated load. */
   run() {
     const { key, name, source, options } = this.state;
     if (this.result?.measured?.record.mode !== "sliding" || !this.fitted) return null;
@@ -56,7 +67,7 @@ export class RecordingCard {
     this.traced ||= { curve: curves.friction, segments: record.segments, level: record.friction.value, load: record.load?.value ?? 1 };
     return {
       name, python: this.recording?.python || "", recording: this.traced,
-      asked: { recording: key, source, window: options.window || null, steps: options.steps || null },
+      question: { recording: key, source, window: options.window || null, steps: options.steps || null },
     };
   }
 
@@ -109,7 +120,6 @@ export class RecordingCard {
       if (signal.aborted || !last.result) return;
       this.result = last.result;
       this.traced = null;
-      this.chosen.clear();
       this.bar.hidden = true;
       this.#draw();
       this.changed();
@@ -140,18 +150,22 @@ export class RecordingCard {
   #drawForms() {
     const { source, options } = this.state;
     const open = this.forms.querySelector("details")?.open;
-    const again = () => this.measure();
-    const text = (label, value, set, placeholder = "", kind = "text") => {
+    const again = () => { this.left.clear(); this.measure(); };
+    const text = (label, value, set, placeholder = "") => {
       const id = fresh("field");
       const field = el("input", {
-        type: kind, id, placeholder, spellcheck: "false", autocomplete: "off",
+        type: "text", id, placeholder, spellcheck: "false", autocomplete: "off",
         change: () => { set(field.value.trim()); again(); },
       });
       field.value = value ?? "";
       return el("div", { class: "choice" }, el("label", { for: id }, label), field);
     };
     const optional = (object, key) => (value) => { if (value) object[key] = value; else delete object[key]; };
-    const numbers = (value) => value.split(/[,;\s]+/).filter(Boolean).map(Number).filter(Number.isFinite);
+    // The server reads the texts, and says what is wrong with them.
+    const several = (key) => (value) => {
+      const texts = value.split(/[,;]+/).map((t) => t.trim()).filter(Boolean);
+      if (texts.length) options[key] = texts; else delete options[key];
+    };
     const { recording } = this;
     const channels = recording ? [this.#channelTable(recording, again)] : [];
     const mode = options.mode || "auto";
@@ -159,32 +173,30 @@ export class RecordingCard {
       el("summary", {}, "Channels, units and options"),
       ...channels,
       el("form", { class: "filters", submit: (e) => e.preventDefault() },
-        choice("What it is", [["auto", "found by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"], ["stick-slip", "stick-slip"]],
+        choice("What it is", [["auto", "recognised by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"], ["stick-slip", "stick-slip"]],
           mode, (v) => { options.mode = v; again(); }).element,
-        text("Frequency", options.frequency, optional(options, "frequency"), "found, or 120 Hz"),
+        text("Frequency", options.frequency, optional(options, "frequency"), "measured, or 120 Hz"),
         tick("Take it as exact", Boolean(options.exact_frequency), (on) => { if (on) options.exact_frequency = true; else delete options.exact_frequency; again(); }).element,
-        text("Harmonics", options.harmonics ?? 4, (v) => { options.harmonics = Math.round(Number(v)) || 4; }, "4", "text"),
-        text("Window (s)", options.window?.join(" to "), (v) => {
-          const found = numbers(v.replace("to", " ").replaceAll(":", " "));
-          if (found.length === 2) options.window = found; else delete options.window;
-        }, "chosen, or 10 to 60"),
+        text("Harmonics", options.harmonics, optional(options, "harmonics"), "4"),
+        text("Window (s)", options.window, optional(options, "window"), "chosen, or 10:60"),
         tick("Whole periods only", Boolean(options.whole_periods), (on) => { if (on) options.whole_periods = true; else delete options.whole_periods; again(); }).element,
         choice("Drift", ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", (v) => { options.detrend = v; again(); }).element,
-        text("Velocity steps (s)", options.steps?.join(", "), (v) => { const f = numbers(v); if (f.length) options.steps = f; else delete options.steps; }, "found, or 12.5, 60"),
-        text("Holds (s)", options.holds?.map((h) => h.join(":")).join(", "), (v) => {
-          const f = v.split(/[,;]+/).map((h) => numbers(h.replace(":", " "))).filter((h) => h.length === 2);
-          if (f.length) options.holds = f; else delete options.holds;
-        }, "found, or 100:110"),
+        text("Velocity steps (s)", options.steps?.join(", "), several("steps"), "detected, or 12.5, 60"),
+        text("Holds (s)", options.holds?.join(", "), several("holds"), "detected, or 100:110"),
         ...[["Spring stiffness K", "stiffness", "for slips and energies, 168 N/m"], ["Pulling velocity V", "velocity", "of stick-slip, 42 um/s"], ["Mass M", "mass", "of stick-slip, 30.7 g"], ["Normal load W0", "normal_load", "M g, or 3 N"]]
           .map(([label, key, example]) => text(label, options[key], optional(options, key), example)),
         text("Time column", source.columns.time, optional(source.columns, "time"), "named in the file, or column 0"),
         text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
-        text("Area", source.area, optional(source, "area"), "makes stresses forces, 25 cm^2"),
+        text("Area", source.area, optional(source, "area"), "turns stress into force, 25 cm^2"),
         text("Group", source.group, optional(source, "group"), "of HDF5, MATLAB, TDMS"),
-        text("Delimiter", source.delimiter, optional(source, "delimiter"), "seen from the file"),
-        text("Decimal mark", source.decimal, optional(source, "decimal"), "seen from the file"),
-        text("Made channel", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {
-          source.channels = Object.fromEntries(v.split(";").map((one) => one.split("=").map((p) => p.trim())).filter((p) => p.length === 2 && p[0] && p[1]));
+        text("File format", source.format, optional(source, "format"), "recognised, or text"),
+        text("Delimiter", source.delimiter, optional(source, "delimiter"), "detected"),
+        text("Decimal mark", source.decimal, optional(source, "decimal"), "detected"),
+        text("Derived channels", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {
+          source.channels = Object.fromEntries(v.split(";").filter((part) => part.trim()).map((part) => {
+            const [made, ...formula] = part.split("=");
+            return [made.trim(), formula.join("=").trim()];
+          }));
         }, "load = A - B"))));
   }
 
@@ -212,7 +224,7 @@ export class RecordingCard {
       unit.value = source.units[channel.name] || "";
       return el("tr", {},
         el("th", { scope: "row" }, channel.name), el("td", {}, role), el("td", {}, unit),
-        el("td", {}, channel.kind === null ? "not understood" : channel.unit || "pure number"),
+        el("td", {}, channel.kind === null ? "unknown" : channel.unit || "pure number"),
         el("td", {}, `${shown(channel, channel.least)} to ${shown(channel, channel.largest)}`),
         el("td", {}, channel.curve ? sparkline(channel.curve) : ""));
     });
@@ -233,12 +245,12 @@ export class RecordingCard {
     const figures = this.#figures(measured);
     fill(this.body,
       el("div", { class: "actions" },
-        copy("Copy as Python", () => this.result.python), copy("Copy as command", () => this.result.command),
+        copies(["Copy as Python", () => this.result.python], ["Copy as command", () => this.result.command]),
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
       figures.readings,
-      record.mode === "sliding" && tick("Fit the recording as a whole", this.fitted, (on) => { this.fitted = on; this.changed(); },
-        "It goes into the fit below, with the window and the velocity steps above").element,
+      record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
+        "The fit below uses it, with the window and the velocity steps above").element,
       record.mode !== "stick-slip" && this.#rowTable(measured.rows),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
       ...figures.tables || [],
@@ -271,7 +283,7 @@ export class RecordingCard {
       el("dt", { title: n }, symbol(n)), el("dd", {}, `${withDoubt(record[n], record.uncertainties[n])} ${n.startsWith("phase") ? "rad" : units[n] || ""}`.trim()))));
     const whole = this.#figure("whole", "The recording", curves.force, ["time", "force over W0"]);
     const cycle = this.#figure("cycle", "Mean cycle", { x: curves.cycle.phase, y: curves.cycle.measured }, ["phase", "friction less mean"]);
-    const spectrum = this.#figure("spectrum", "What the harmonics leave", curves.spectrum, ["frequency", "amplitude"]);
+    const spectrum = this.#figure("spectrum", "Spectrum of the residual", curves.spectrum, ["frequency", "amplitude"]);
     const amplitudes = record.harmonics.map(([a, b]) => Math.hypot(a, b));
     const bars = this.#figure("harmonics", "Harmonics", { x: amplitudes.map((_, i) => i + 1), y: amplitudes }, ["harmonic", "amplitude"]);
     const { start, end } = record.window;
@@ -285,7 +297,7 @@ export class RecordingCard {
         [cycle, { x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
           y: { label: "F/W₀ − mean" },
           lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
-          points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0) }],
+          points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0), size: 3 }],
         }] }, "Mean cycle with the fitted harmonics."],
         [bars, { x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: amplitudes.map((_, i) => i + 1) }, rows: [{
           y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
@@ -293,9 +305,9 @@ export class RecordingCard {
         }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", ")],
         [spectrum, { x: { label: "frequency (Hz)" }, rows: [{
           y: { label: "amplitude of F/W₀", log: true },
-          lines: [{ ...curves.spectrum, cls: series(5), name: "left" }],
+          lines: [{ ...curves.spectrum, cls: series(5), name: "residual" }],
           points: [{ x: amplitudes.map((_, i) => (i + 1) * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
-        }] }, "Spectrum of what the fit leaves, beside the harmonics."],
+        }] }, "Spectrum of the residual, and the harmonics as points."],
       ],
     };
   }
@@ -338,17 +350,18 @@ export class RecordingCard {
     if (kind !== "whole") return new Figure({ name: kind, title, height: 260, columns });
     const { window } = this.state.options;
     const measure = (part) => {
+      this.left.clear();
       if (part) this.state.options.window = part; else delete this.state.options.window;
       this.measure();
     };
     return new Figure({
-      name: kind, title, height: 360, columns, onSpan: (from, to) => measure([from, to]),
-      options: window && el("button", { type: "button", class: "small", click: () => measure(null) }, "Measure the whole recording again"),
+      name: kind, title, height: 360, columns, onSpan: (from, to) => measure(`${from}:${to}`),
+      options: window && el("button", { type: "button", class: "small", click: () => measure(null) }, "Measure the whole recording"),
       caption: "Drag over a part of the trace with the mouse to measure that part only.",
     });
   }
 
-  /** Rows of the table that a fit takes, to be left out one by one. */
+  /** The measured rows, each of which can be left out of a fit. */
   #rowTable(rows) {
     const modulated = rows.some((r) => r.kind === "amplitude");
     const columns = modulated
@@ -365,9 +378,9 @@ export class RecordingCard {
       el("thead", {}, el("tr", {}, [modulated ? "In fits" : "", "From (s)", ...columns.map(([, t]) => t), "Verdict"].map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
       el("tbody", {}, rows.map((row, i) => {
         const box = el("input", {
-          type: "checkbox", "aria-label": `Use part ${row.part} in fits`, change: () => { this.chosen.set(i, box.checked); this.changed(); },
+          type: "checkbox", "aria-label": `Use part ${row.part} in fits`, change: () => { if (box.checked) this.left.delete(i); else this.left.add(i); this.changed(); },
         });
-        box.checked = this.chosen.get(i) !== false;
+        box.checked = !this.left.has(i);
         return el("tr", {}, el("td", {}, modulated && !row.reason ? box : ""), el("td", {}, digits(row.start, 6)),
           row.reason ? el("td", { colspan: columns.length + 1 }, row.reason) : [...columns.map(([n]) => el("td", {}, cell(row, n))), el("td", { class: row.verdict }, row.verdict)]);
       }))));
@@ -377,14 +390,14 @@ export class RecordingCard {
     const worst = checks.filter((c) => c.verdict === "bad" || c.verdict === "suspicious");
     return el("details", { open: worst.length > 0 }, el("summary", {}, `Checks: ${checks.length - worst.length} good, ${worst.length} doubtful or bad`),
       el("ul", { class: "checks" }, [...worst, ...checks.filter((c) => !worst.includes(c))].map((c) => el("li", { class: c.verdict },
-        el("span", { class: "badge" }, c.verdict), el("b", {}, c.name), ` ${c.sentence}`))));
+        el("span", { class: "badge" }, c.verdict), el("b", {}, c.name), ` ${ended(c.sentence)}`))));
   }
 
   #findings() {
-    const found = this.recording?.findings || [];
-    if (!found.length) return null;
-    return el("details", {}, el("summary", {}, `${count(found.length, "finding")} in the file`),
-      el("ul", { class: "checks" }, found.map((f) => el("li", { class: f.severity }, el("span", { class: "badge" }, f.severity), el("b", {}, f.name), ` ${f.sentence}`))));
+    const findings = this.recording?.findings || [];
+    if (!findings.length) return null;
+    return el("details", {}, el("summary", {}, `${count(findings.length, "finding")} in the file`),
+      el("ul", { class: "checks" }, findings.map((f) => el("li", { class: f.severity }, el("span", { class: "badge" }, f.severity), el("b", {}, f.name), ` ${ended(f.sentence)}`))));
   }
 
   #drawTable() {
@@ -395,11 +408,11 @@ export class RecordingCard {
   }
 }
 
-/** What is read as a person writes it. */
+/** The symbol of a quantity. */
 function symbol(name) {
-  const own = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", epsilon: "ε", frequency: "frequency", W0: "W₀" };
+  const symbols = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", epsilon: "ε", frequency: "frequency", W0: "W₀" };
   const lowered = (digit) => "₀₁₂₃₄₅₆₇₈₉"[digit];
-  return own[name] || name.replace(/^mu(\d)$/, (_, d) => `μ${lowered(d)}`).replace(/^phase(\d)$/, (_, d) => `phase of μ${lowered(d)}`);
+  return symbols[name] || name.replace(/^mu(\d)$/, (_, d) => `μ${lowered(d)}`).replace(/^phase(\d)$/, (_, d) => `phase of μ${lowered(d)}`);
 }
 
 function errorBars(x, y, doubt) {
@@ -418,10 +431,6 @@ function sparkline({ x, y }) {
   const holder = el("span", { class: "spark" });
   holder.innerHTML = `<svg width="120" height="24" viewBox="0 0 120 24" aria-hidden="true"><path d="${path}"/></svg>`;
   return holder;
-}
-
-function copy(label, text) {
-  return el("button", { type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); } }, label);
 }
 
 function saveRows(name, rows) {

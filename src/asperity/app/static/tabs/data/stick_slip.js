@@ -19,7 +19,7 @@ const COLUMNS = [
 export function stickSlipSentence(record) {
   return `${capital(record.regime)}: ${count(record.events, "slip event")}`
     + (record.drop === undefined ? "" : `, mean drop ${digits(record.drop, 3)} of F/W`)
-    + (record.recurrence === undefined ? "" : `, one in ${digits(record.recurrence, 3)} s`);
+    + (record.recurrence === undefined ? "" : `, every ${digits(record.recurrence, 3)} s`);
 }
 
 /** Readings, figures and tables of a stick-slip recording; `whole` is the figure of its trace. */
@@ -30,8 +30,8 @@ export function stickSlip({ record, curves }, whole, name) {
     ["drop of F/W", "drop", ""], ["recurrence", "recurrence", " s"], ["stick time", "stick_duration", " s"], ["slip time", "slip_duration", " s"],
   ].filter(([, n]) => record[n] !== undefined).map(([label, n, unit]) => [label, `${spread(n)}${unit}`]).concat([
     ["loading slope", record.loading_slope === null ? "–" : `${withDoubt(record.loading_slope, record.loading_slope_uncertainty)} 1/s`],
-    ["K by that slope", record.stiffness_from_slope === null ? "needs V and the load" : quantity(record.stiffness_from_slope, "stiffness", 4)],
-    ["smallest drop that is seen", digits(record.smallest_drop, 2)],
+    ["K from the slope", record.stiffness_from_slope === null ? "needs V and the load" : quantity(record.stiffness_from_slope, "stiffness", 4)],
+    ["smallest detectable drop", digits(record.smallest_drop, 2)],
   ]).map(([label, text]) => el("div", {}, el("dt", {}, label), el("dd", {}, text))));
 
   const ends = (list) => ({
@@ -64,7 +64,7 @@ export function stickSlip({ record, curves }, whole, name) {
     const drops = new Figure({
       name: "drops", title: "Drop against stick time", height: 300,
       columns: () => ({ stick_time: times, drop: timed.map((e) => e.drop), drop_uncertainty: timed.map((e) => e.drop_uncertainty) }),
-      caption: "Within one recording a larger drop follows a longer stick without any healing, as friction varies along the track; recordings at several velocities tell healing apart.",
+      caption: "Within one recording a larger drop follows a longer stick without any healing, as friction varies along the track; recordings at several velocities separate healing from it.",
     });
     const range = [Math.min(...times) / 1.3, Math.max(...times) * 1.3];
     list.push(drops);
@@ -72,13 +72,13 @@ export function stickSlip({ record, curves }, whole, name) {
       x: { label: "stick time (s)", log: true, range },
       rows: [{
         y: { label: "drop of F/W", range: [0, 1.08 * Math.max(...timed.map((e) => e.drop))] },
-        lines: [{ x: range, y: [record.smallest_drop, record.smallest_drop], cls: "s6", dashed: true, name: "smallest drop that is seen" }],
+        lines: [{ x: range, y: [record.smallest_drop, record.smallest_drop], cls: "s6", dashed: true, name: "smallest detectable drop" }],
         points: [{
           x: times, y: timed.map((e) => e.drop), cls: series(0), size: timed.length > 300 ? 2 : 3.5,
           title: (i) => `slip at ${digits(timed[i].onset, 6)} s: drop ${withDoubt(timed[i].drop, timed[i].drop_uncertainty)} after ${digits(times[i], 3)} s of stick`,
         }],
       }],
-    }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest drop that is seen.`]);
+    }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest detectable drop.`]);
   }
   return { readings, list, charts, tables: [regimeTable(record, name), catalogue(record, events, name)] };
 }

@@ -1,11 +1,12 @@
-// The motion in time: computed once the sliders rest, and drawn while it is computed.
+// The motion in time: computed after the last change of a slider, and drawn while it is computed.
 
 import { Figure, series } from "../../lib/charts.js";
 import { Refused, run } from "../../lib/server.js";
 import { digits, quantity } from "../../lib/units.js";
+import { ended, worded } from "../../lib/words.js";
 
-/** Time (ms) without a movement of a slider after which the motion is computed. */
-const REST = 600;
+/** Time (ms) without a movement of a control after which the motion is computed. */
+const PAUSE = 600;
 
 export class MotionPanel {
   /** `onMotion(motion)` is called with the motion so far, and with null when it is out of date. */
@@ -18,41 +19,41 @@ export class MotionPanel {
         time_of_displacement: this.motion.curves.displacement.x, displacement: this.motion.curves.displacement.y,
         time_of_velocity: this.motion.curves.velocity.x, velocity: this.motion.curves.velocity.y,
       },
-      caption: "Integrated in time from steady sliding at 0.7 V. Dashed: the pulled end of the spring. A displacement along it is sliding; a staircase is stick-slip.",
+      caption: "Integrated in time, with the mass of the slider, from steady sliding at 0.7 V. Dashed: the pulled end of the spring. A displacement along it is sliding; a staircase is stick-slip.",
     });
     this.element = this.figure.element;
   }
 
-  /** Forget the motion: its numbers have changed. */
+  /** Forget the motion, whose numbers have changed. */
   stop() {
-    clearTimeout(this.resting);
+    clearTimeout(this.timer);
     this.work?.abort();
     this.motion = null;
     this.onMotion(null);
     this.element.classList.add("waiting");
   }
 
-  /** Compute the motion of an operating point once its numbers have rested. */
+  /** Compute the motion of an operating point a moment after its last change. */
   ask(question, point) {
-    clearTimeout(this.resting);
-    this.resting = setTimeout(() => this.#compute(question, point), REST);
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.#compute(question, point), PAUSE);
   }
 
   async #compute(question, point) {
     this.work?.abort();
     this.work = new AbortController();
     const { signal } = this.work;
-    const { laws, ...asked } = question;
-    this.figure.note.textContent = "Integrating the motion…";
+    const { laws, ...operating } = question;
+    this.figure.note.textContent = "Integrating the motion in time; the equations of a law are compiled first, once, which takes some seconds.";
     try {
-      const last = await run("explore/motion", { ...asked, growth_rate: point.converged ? point.growth_rate : null }, (part) => {
+      const last = await run("explore/motion", { ...operating, growth_rate: point.converged ? point.growth_rate : null }, (part) => {
         if (!signal.aborted && part.curves) this.#draw(part, question, point, false);
       }, signal);
       if (!signal.aborted && last.result) this.#draw(last.result, question, point, true);
     } catch (error) {
       if (error.name === "AbortError") return;
       if (!(error instanceof Refused)) throw error;
-      this.figure.note.textContent = error.message;
+      this.figure.note.textContent = ended(error.message);
     }
   }
 
@@ -61,7 +62,7 @@ export class MotionPanel {
     this.element.classList.remove("waiting");
     const { force, displacement } = motion.curves;
     const [unit, factor] = displacement.y.at(-1) > 1e-3 ? ["mm", 1e3] : ["µm", 1e6];
-    const sentence = sentenceOf(motion, point, done);
+    const sentence = worded(sentenceOf(motion, point, done));
     this.figure.note.textContent = sentence;
     this.figure.draw({
       x: { label: "time (s)", range: [0, motion.reached] },
@@ -82,11 +83,10 @@ export class MotionPanel {
 
 function sentenceOf(motion, point, done) {
   const slip = motion.stick_slip;
-  const mass = motion.inertia ? ", with the mass of the slider" : "";
-  const until = `${digits(motion.reached, 3)} s computed${mass}${done ? "" : " so far"}`;
+  const until = `${digits(motion.reached, 3)} s computed${motion.inertia ? "" : ", without mass"}${done ? "" : " so far"}`;
   if (motion.stopped) return `The motion ends: ${motion.stopped} (${until}).`;
-  if (slip) return `Stick-slip: the slider rests, and slips by ${quantity(slip.slip, "length", 3)} once in ${digits(slip.period, 3)} s; the force rises and drops by ${digits(slip.drop, 3)} W₀ (${until}).`;
+  if (slip) return `Stick-slip: the slider sticks, and slips by ${quantity(slip.slip, "length", 3)} every ${digits(slip.period, 3)} s; the force rises and drops by ${digits(slip.drop, 3)} W₀ (${until}).`;
   if (point.converged && point.stable) return `Steady: the slider settles to the same motion in each period of the load (${until}).`;
   if (!done) return `Sliding is unstable: waiting for the slips (${until}).`;
-  return `Sliding is unstable, and no two slips follow each other in the ${until}.`;
+  return `Sliding is unstable, but shows no repeated slips in the ${until}.`;
 }

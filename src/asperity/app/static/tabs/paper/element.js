@@ -1,16 +1,8 @@
 // Figure 10: the interface as a spring in series with a frictional joint, with its numbers.
 
-import { el } from "../../lib/dom.js";
+import { el, shape } from "../../lib/dom.js";
+import { scrolling } from "../../lib/tables.js";
 import { digits, quantity } from "../../lib/units.js";
-
-const NS = "http://www.w3.org/2000/svg";
-
-function shape(tag, attributes, content = "") {
-  const node = document.createElementNS(NS, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.textContent = content;
-  return node;
-}
 
 /** A spring between two points of a horizontal line, of so many teeth. */
 function spring(from, to, y, teeth) {
@@ -23,8 +15,8 @@ function spring(from, to, y, teeth) {
 /** The drawing, with the stiffnesses and the resonance that `numbers` has in SI. */
 export function elementDrawing({ asperities, spring: pulling, ratio, resonance }) {
   const label = (x, y, text, cls = "") => shape("text", { x, y, class: cls, "text-anchor": "middle" }, text);
-  const said = `A wall, a frictional joint, a spring of ${quantity(asperities, "stiffness", 3)} for the asperities, the slider, and a pulling spring of ${quantity(pulling, "stiffness", 3)}.`;
-  const svg = shape("svg", { viewBox: "0 0 640 130", role: "img", "aria-label": said });
+  const description = `A wall, a frictional joint, a spring of ${quantity(asperities, "stiffness", 3)} for the asperities, the slider, and a pulling spring of ${quantity(pulling, "stiffness", 3)}.`;
+  const svg = shape("svg", { viewBox: "0 0 640 130", role: "img", "aria-label": description });
   svg.append(
     shape("path", { class: "stroke", d: "M20 20V100M20 35l-10 10M20 55l-10 10M20 75l-10 10M20 60H90" }),
     shape("rect", { class: "solid", x: 90, y: 44, width: 90, height: 12 }),
@@ -40,6 +32,6 @@ export function elementDrawing({ asperities, spring: pulling, ratio, resonance }
     label(515, 36, "pulling spring"), label(515, 98, `K = ${quantity(pulling, "stiffness", 3)}`), label(605, 50, "V"),
   );
   return el("figure", { class: "panel", "aria-label": "The element" },
-    el("div", { class: "drawing" }, svg),
-    el("p", { class: "note" }, `λK/W₀ = ${digits(ratio, 3)}: while the joint sticks, the slider follows ${digits((100 * ratio) / (1 + ratio), 3)} % of the movement of the pulling end, and the pulling spring takes up the rest. On its asperities the slider resonates at ${quantity(resonance, "frequency", 3)}. Redrawn from the text, with what the element does over one period at ε_eff = 0.24.`));
+    scrolling("Drawing of the element", [svg]),
+    el("p", { class: "note" }, `λK/W₀ = ${digits(ratio, 3)}: while the joint sticks, the slider follows ${digits((100 * ratio) / (1 + ratio), 3)} % of the movement of the pulling end, and the pulling spring takes up the remainder. On its asperities the slider resonates at ${quantity(resonance, "frequency", 3)}. Redrawn from the text, with what the element does over one period at ε_eff = 0.24.`));
 }

@@ -1,9 +1,8 @@
 // A drawing of slider and spring that moves as the computed orbit does, or as stick-slip in time.
 
-import { el } from "./dom.js";
+import { el, shape } from "../../lib/dom.js";
 
-const SVG = "http://www.w3.org/2000/svg";
-/** Duration (s) of one period on the screen: the true one is too short to be seen. */
+/** Duration (s) of one period on the screen: the true period is too short to be seen. */
 const SHOWN_PERIOD = 4;
 /** Duration (s) of one cycle of stick-slip on the screen. */
 const SHOWN_CYCLE = 3;
@@ -13,13 +12,6 @@ const ARROW = 46, SPRING = 150;
 const BLOCK = { x: 120, width: 110, height: 54, floor: 150 };
 /** Largest excursion (px) of the block from the mean motion. */
 const SWING = 34;
-
-const shape = (tag, attributes, ...children) => {
-  const node = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-};
 
 /** Zigzag of a spring from x to x + length. */
 function coil(x, y, length) {
@@ -102,7 +94,7 @@ export class Machine {
     return {
       n: place.length, seconds: SHOWN_CYCLE * cycles, ground: (SWING * travel) / swing, epsilon: 0,
       place: place.map((v) => v / swing), pull: force.map((f) => (2 * f - low - high) / (high - low)),
-      note: `Stick-slip: ${cycles} cycles of ${(duration / cycles).toPrecision(3)} s each, shown in ${SHOWN_CYCLE} s each. The block rests on the track while the spring is drawn out, then it slips.`,
+      note: `Stick-slip: ${cycles} cycles of ${(duration / cycles).toPrecision(3)} s each, shown in ${SHOWN_CYCLE} s each. The block sticks while the spring is stretched, then it slips.`,
     };
   }
 

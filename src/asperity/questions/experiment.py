@@ -1,0 +1,158 @@
+"""An experiment as text: slider, initial state, and steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import PositiveInt, ValidationError, WrapValidator
+
+from asperity.errors import InputError, MistakesError
+from asperity.loads import ProgrammeStep
+from asperity.questions.point import Point
+from asperity.questions.record import Record, quantity, shown
+
+
+class ProtocolError(MistakesError):
+    """A protocol that cannot be run: all mistakes in one message."""
+
+    subject = "protocol"
+
+
+def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
+    """The steps; a wrong step is one mistake, which pydantic would report for each kind of step."""
+    try:
+        return fill(steps)
+    except ValidationError as error:
+        wrong = {m["loc"][0]: m for m in reversed(error.errors()) if m["loc"]}
+        if not wrong:
+            raise
+        raise ProtocolError(
+            [_wrong_step(number, wrong[number]) for number in sorted(wrong)]
+        ) from None
+
+
+def _wrong_step(number: Any, reported: Any) -> InputError:
+    raised = reported.get("ctx", {}).get("error")
+    if isinstance(raised, InputError):
+        return raised
+    return InputError(
+        f"step {number + 1}",
+        "be a text, or a table of repeat and steps",
+        shown(reported["input"]),
+        "write it like 'hold 10 s' or { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }",
+    )
+
+
+class Repeat(Record):
+    """Repeated steps.
+
+    Attributes
+    ----------
+    repeat : int
+        How often.
+    steps : tuple of str, ProgrammeStep or Repeat
+    """
+
+    repeat: PositiveInt
+    steps: tuple[str | Repeat | ProgrammeStep, ...]
+
+
+class ProtocolStart(Record):
+    """Load, velocity and states before the first step.
+
+    Attributes
+    ----------
+    velocity : float or str
+        Pulling velocity (m/s); without `states` the slider is in steady sliding at this velocity.
+    load : float or str, optional
+        Normal load (N), W0 by default.
+    states : tuple of float, optional
+        States of the equation of motion, for a start that is not steady sliding; see
+        `asperity.transients.transient`.
+    """
+
+    velocity: quantity("velocity")  # type: ignore[valid-type]
+    load: quantity("force") | None = None  # type: ignore[valid-type]
+    states: tuple[float, ...] | None = None
+
+
+class Track(Record):
+    """A friction level that varies along the track; see `asperity.laws.uneven_track`.
+
+    Attributes
+    ----------
+    amplitude : float
+        Standard deviation of mu0.
+    length : float or str
+        Over which mu0 forgets itself (m).
+    exponent : float
+        Of the power law of its spectrum beyond one over that length.
+    origin : float or str
+        Where on the track the slider begins (m).
+    """
+
+    amplitude: float
+    length: quantity("length")  # type: ignore[valid-type]
+    exponent: float = 2.0
+    origin: quantity("length") = 0.0  # type: ignore[valid-type]
+
+
+class SolverSettings(Record):
+    """Settings of the integration and of the output.
+
+    Attributes
+    ----------
+    inertia : bool
+        Whether the mass of the slider counts.
+    sampling : float or str, optional
+        Samples per second (Hz); the integrator's steps by default.
+    rtol : float
+        Tolerated relative error of a step.
+    method : str
+        "auto", "explicit" or "implicit".
+    most_steps : float, optional
+        Largest number of steps of the integration; that of `asperity.transient` by default.
+    """
+
+    inertia: bool = False
+    sampling: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
+    rtol: float = 1e-9
+    method: Literal["auto", "explicit", "implicit"] = "auto"
+    most_steps: float | None = None
+
+
+class Experiment(Point):
+    """An experiment: slider, initial state, and steps.
+
+    Attributes
+    ----------
+    law : str
+        A registered law.
+    steps : tuple of str, ProgrammeStep or Repeat
+        Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
+    start : ProtocolStart
+    material : str
+        Material whose numbers apply where `parameters` has none.
+    parameters : mapping of str to float or str
+        Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
+    solver : SolverSettings
+    track : Track, optional
+        By default mu0 is the same everywhere.
+    tribometer : mapping, optional
+        Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
+    title : str
+    folder : Path
+        Where files that steps name lie.
+    """
+
+    subject = "protocol"
+    mistakes_error = ProtocolError
+
+    law: str
+    steps: Annotated[tuple[str | Repeat | ProgrammeStep, ...], WrapValidator(_each_step_once)]
+    start: ProtocolStart
+    solver: SolverSettings = SolverSettings()
+    track: Track | None = None
+    tribometer: Mapping[str, Any] | None = None
+    title: str = ""

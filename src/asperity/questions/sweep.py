@@ -1,0 +1,210 @@
+"""The plan of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PositiveInt, model_validator
+
+from asperity.errors import InputError, MistakesError
+from asperity.questions.fit import Estimation
+from asperity.questions.point import Point
+from asperity.questions.record import Given, Names, Record
+
+
+class PlanError(MistakesError):
+    """A plan that cannot be run."""
+
+    subject = "plan"
+
+
+class AxisTable(Record):
+    """An axis as a plan writes it, in exactly one of five forms.
+
+    Attributes
+    ----------
+    from_, to, count, spacing
+        A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
+    values : tuple
+        All values.
+    zip : mapping of str to tuple
+        Several numbers that vary together, all of one length.
+    cases : tuple of mapping
+        Rows; a case with lists gives a row for every combination of their values.
+    draw : {"random", "sobol", "halton"}
+        ``count`` draws of the numbers in ``over``.
+    over : mapping of str to mapping
+        For each drawn number ``from``, ``to`` and ``spacing``, or ``mean`` and ``std``.
+    """
+
+    from_: Given | None = Field(default=None, alias="from")
+    to: Given | None = None
+    count: PositiveInt | None = None
+    spacing: Literal["linear", "log"] | None = None
+    values: tuple[Given, ...] | None = None
+    zip: Mapping[str, tuple[Given, ...]] | None = None
+    cases: tuple[Mapping[str, Any], ...] | None = None
+    draw: Literal["random", "sobol", "halton"] | None = None
+    over: Mapping[str, Mapping[str, Any]] | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> AxisTable:
+        allowed = {
+            "from": {"from_", "to", "count", "spacing"},
+            "values": {"values"},
+            "zip": {"zip"},
+            "cases": {"cases"},
+            "draw": {"draw", "over", "count"},
+        }
+        fields = {name for name in type(self).model_fields if getattr(self, name) is not None}
+        forms = [form for form in allowed if form.replace("from", "from_") in fields]
+        if len(forms) != 1 or fields - allowed[forms[0]]:
+            shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
+            raise InputError(
+                "axis",
+                "have one of from-to-count, values, zip, cases or draw",
+                shown,
+                "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }",
+            )
+        needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
+        missing = [name for name in needed if getattr(self, name) is None]
+        if missing:
+            raise InputError(
+                "axis",
+                f"have {' and '.join(needed)} together with {forms[0]}",
+                f"no {' and no '.join(missing)}",
+                "add it",
+            )
+        return self
+
+
+class ThresholdTable(Record):
+    """Settings of the search for stiffness thresholds.
+
+    Attributes
+    ----------
+    between : pair of float
+        Limits of the search, in units of K_c = (B - A) W0/D0 of the same point.
+    scan : int
+        Number of stiffnesses solved before the search, at equal ratios.
+    """
+
+    between: tuple[float, float] = (0.3, 4.0)
+    scan: PositiveInt = 24
+
+
+class NumberTable(Record):
+    """A number computed from a transient.
+
+    Attributes
+    ----------
+    of : str
+        A channel: ``friction``, ``force``, ``load``, ``velocity``, ``slip_velocity``,
+        ``displacement``.
+    take : str
+        ``mean``, ``min``, ``max``, ``range``, ``std``, ``first`` or ``last``.
+    from_, to : float or str, optional
+        First and last time (s) of the samples, written ``from`` and ``to``; all by default.
+    """
+
+    of: str
+    take: str
+    from_: float | str | None = Field(default=None, alias="from")
+    to: float | str | None = None
+
+
+class TransientTable(Record):
+    """A transient, and the numbers that are computed from it.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        Lines of a protocol; ``{epsilon}`` stands for the value at the point.
+    numbers : mapping of str to NumberTable
+    sampling : float or str
+        Samples per second (Hz).
+    rtol : float
+    most_steps : float
+    """
+
+    steps: tuple[str, ...]
+    numbers: Mapping[str, NumberTable]
+    sampling: float | str
+    rtol: float = 1e-9
+    most_steps: float = 2e6
+
+
+class FitTable(Estimation):
+    """Settings of a fit at every point.
+
+    Attributes
+    ----------
+    data : tuple of str
+        Tables of readings, all in one likelihood; left out where an axis has a column ``data``.
+    """
+
+    data: Names | None = None
+
+
+class Sweep(Point):
+    """What a sweep computes.
+
+    Attributes
+    ----------
+    axes : mapping of str to AxisTable
+        In the order of the dimensions. The grid is the product of the axes.
+    law : str
+        Friction law; left out where an axis has a column ``law``.
+    material : str
+        Material whose numbers apply where neither an axis nor `parameters` has one.
+    parameters : mapping of str to float, str or bool
+        Numbers and ratios that are the same at every point, by name.
+    solve : {"periodic", "threshold", "transient", "fit"}
+    outputs : tuple of str
+        Outputs to keep of each point; the default outputs of `solve` if left out.
+    seed : int
+        Seed of drawn axes.
+    chunk : int, optional
+        Approximate number of points that are solved and written together.
+    threshold, transient, fit
+        Settings of these kinds of solve.
+    title : str
+    folder : Path
+        Folder of the files that the plan names.
+    """
+
+    subject = "plan"
+    mistakes_error = PlanError
+
+    axes: Mapping[str, AxisTable]
+    solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
+    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    seed: int = Field(default=0, ge=0)
+    chunk: PositiveInt | None = None
+    threshold: ThresholdTable = ThresholdTable()
+    transient: TransientTable | None = None
+    fit: FitTable | None = None
+    title: str = ""
+
+    @property
+    def columns(self) -> dict[str, tuple[Any, ...]]:
+        """Columns of the axes as the plan writes them; drawn columns have no values."""
+        columns: dict[str, tuple[Any, ...]] = {}
+        for name, table in self.axes.items():
+            if table.values is not None or table.from_ is not None:
+                columns[name] = (*columns.get(name, ()), *(table.values or ()))
+            for column, values in (table.zip or {}).items():
+                columns[column] = (*columns.get(column, ()), *values)
+            for case in table.cases or ():
+                for column, value in case.items():
+                    values = tuple(value) if isinstance(value, list | tuple) else (value,)
+                    columns[column] = (*columns.get(column, ()), *values)
+            for column in table.over or {}:
+                columns.setdefault(column, ())
+        return columns
+
+    @property
+    def laws(self) -> list[str]:
+        """Laws as the plan writes them, in their order."""
+        return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]

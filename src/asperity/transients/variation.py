@@ -1,0 +1,147 @@
+"""Variational equations: derivatives of a motion to its first states and to its parameters.
+
+Along a motion Y(t) with the rates f(Y, p) they are linear,
+
+    dD/dt = f_Y D + f_p,
+
+with a column of D for each first state, D(0) = 1, and for each parameter, D(0) = 0. They are solved
+by Radau collocation with five stages on the steps of the motion. Of a motion whose steps the
+implicit method took they are the derivatives of these steps at fixed lengths; along others they
+have the order 9 of the method.
+
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+(Springer, 1993), section I.14.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.algebra.runge_kutta import radau_iia
+from asperity.algebra.small_systems import jacobian_columns
+from asperity.loads import Excitation
+from asperity.slider import Motion
+from asperity.slider.named import equation_parameters, with_value
+from asperity.slider.problem import Problem
+from asperity.transients.implicit import STAGES
+
+Float = NDArray[np.float64]
+
+#: Fewest instants in a call of the compiled program; more are padded to a power of two.
+_FEWEST = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """Derivatives of the states along a motion under constant load and drive.
+
+    Attributes
+    ----------
+    nodes : array, shape (steps + 1,)
+        Beginnings of the steps, and the end (s).
+    coefficients : array, shape (STAGES + 1, steps, size, size + parameters)
+        Of rising powers of the share of a step. Columns are the first states, then the parameters.
+    """
+
+    nodes: Float
+    coefficients: Float
+
+    @classmethod
+    def along(
+        cls,
+        motion: Motion,
+        states: Callable[[Float], Float],
+        nodes: Float,
+        names: Sequence[str] = (),
+    ) -> Variation:
+        """Solve the variational equations along a motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            With scalar parameters and omega = 1 rad/s.
+        states : callable
+            States of shape (size, n) at times (s) of shape (n,).
+        nodes : array, shape (steps + 1,)
+            Of the steps, of which the first begins where the derivatives are to.
+        names : sequence of str
+            Parameters of the law or the machine, whose derivatives are in SI.
+        """
+        scheme, size = radau_iia(STAGES), motion.size
+        lengths = np.diff(nodes)
+        times = nodes[:-1, None] + lengths[:, None] * scheme.c
+        jacobian, sides = _linearised(motion, names, states(times.ravel()))
+        # (steps, stages, size, size) and (steps, stages, size, size + parameters)
+        jacobian = jacobian.reshape(size, size, *times.shape).transpose(2, 3, 0, 1)
+        sides = sides.reshape(len(names), size, *times.shape).transpose(2, 3, 1, 0)
+        sides = np.concatenate([jacobian, sides], axis=3)
+        weights = lengths[:, None, None] * scheme.a
+        whole = STAGES * size
+        matrix = np.eye(whole) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
+            -1, whole, whole
+        )
+        known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), whole, -1)
+        stages = np.linalg.solve(matrix, known).reshape(len(lengths), STAGES, size, -1)
+        powers = np.linalg.inv(scheme.c[:, None] ** np.arange(1, STAGES + 1))
+        rising = np.einsum("kj,njrc->knrc", powers, stages)
+        here = np.eye(size, size + len(names))
+        # Of the rows that come with a first state the parameters have none.
+        only = np.concatenate([np.zeros((size, size)), np.ones((size, len(names)))], axis=1)
+        coefficients = np.empty((STAGES + 1, *rising.shape[1:]))
+        for i in range(len(lengths)):
+            coefficients[0, i] = here
+            coefficients[1:, i] = rising[:, i, :, :size] @ here + rising[:, i] * only
+            here = coefficients[:, i].sum(0)
+        return cls(nodes, coefficients)
+
+    @property
+    def at_end(self) -> Float:
+        """At the end of the last step, shape (size, size + parameters)."""
+        return np.asarray(self.coefficients[:, -1].sum(0))
+
+    def evaluate(self, t: Float, state: int) -> Float:
+        """Derivatives of one state at times (s), shape (n, size + parameters)."""
+        i = np.clip(np.searchsorted(self.nodes, t, side="right") - 1, 0, len(self.nodes) - 2)
+        share = ((t - self.nodes[i]) / (self.nodes[i + 1] - self.nodes[i]))[:, None]
+        value = self.coefficients[-1, i, state]
+        for coefficient in self.coefficients[-2::-1]:
+            value = value * share + coefficient[i, state]
+        return np.asarray(value)
+
+
+def _linearised(motion: Motion, names: Sequence[str], Y: Float) -> tuple[Float, Float]:
+    """Derivatives of the rates to states (size, size, n) and parameters (parameters, size, n)."""
+    count = Y.shape[1]
+    room = max(_FEWEST, 1 << (count - 1).bit_length())
+    Y = np.concatenate([Y, np.repeat(Y[:, -1:], room - count, axis=1)], axis=1)
+    jacobian, sides = _slopes(motion, _directions(jax.tree.structure(motion), tuple(names)), Y)
+    sides = [np.asarray(a)[:, :count] for a in sides]
+    return (
+        np.asarray(jacobian)[:, :, :count],
+        np.stack(sides) if sides else np.empty((0, *Y[:, :count].shape)),
+    )
+
+
+@cache
+def _directions(structure: Any, names: tuple[str, ...]) -> list[Any]:
+    """Changes of an equation of motion of scalars by a unit of each parameter."""
+    none = jax.tree.unflatten(structure, [np.zeros(())] * structure.num_leaves)
+    known = equation_parameters(none)
+    return [with_value(Problem(none, None), known[name], 1.0).system for name in names]
+
+
+@jax.jit
+def _slopes(motion: Motion, directions: list[Any], Y: Array) -> tuple[Array, list[Array]]:
+    at = Excitation(jnp.ones(Y.shape[1:]))
+    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), Y)
+    sides = [jax.jvp(lambda m: m.rates(Y, at), (motion,), (d,))[1] for d in directions]
+    return jnp.stack(columns, axis=1), sides
