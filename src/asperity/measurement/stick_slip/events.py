@@ -164,7 +164,7 @@ def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     )
     for part in np.array_split(np.arange(k), -(-k // _TOGETHER)):
         onset[part], end[part], squares[part] = _onset_and_end(
-            sums, part, *(b[part] for b in bounds), shape.fall
+            sums, part, *(b[part] for b in bounds), shape=shape.fall
         )
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
@@ -178,6 +178,7 @@ def _onset_and_end(
     trough: Index,
     first: Index,
     stop: Index,
+    *,
     shape: Callable[[Array], Array],
 ) -> tuple[Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in, and the mean square of residuals."""
@@ -277,7 +278,7 @@ def _shape(
     squares only say which shape follows the noise: such events do not count. Of shapes that are as
     good as the one chosen their distance from it counts: of onset or end, over the duration.
     """
-    fits = [_onset_and_end(sums, part, *bounds, shape.fall) for shape in _SHAPES]
+    fits = [_onset_and_end(sums, part, *bounds, shape=shape.fall) for shape in _SHAPES]
     squares = np.array([fit[2] for fit in fits])
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
