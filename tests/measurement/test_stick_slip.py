@@ -179,6 +179,40 @@ def test_what_the_sticks_lack_to_their_slope_is_creep_and_missed_events() -> Non
     assert check_.verdict == "suspicious"
 
 
+def test_small_events_that_cannot_be_seen_are_missing() -> None:
+    """Forty falls in a stick, each as large as the noise."""
+    stick, small, slope = 2000, 40, 1e-4
+    rise = slope * stick - small * 0.0025
+    loading = slope * np.arange(stick) - 0.0025 * (np.arange(stick) // (stick // small))
+    cycle = np.r_[loading, rise * (1 + np.cos(np.pi * np.arange(1, 21) / 20)) / 2]
+    force = 0.3 + np.tile(cycle, 40)
+    noise = 0.002 * np.random.default_rng(0).standard_normal(force.size)
+
+    def hidden(friction):
+        checks = measure_stick_slip(recorded(friction)).checks
+        return next(c for c in checks if c.name == "hidden events")
+
+    seen = hidden(force + noise)
+    # They take 40 times 0.0025 of 0.2.
+    assert seen.verdict == "suspicious"
+    assert hidden(saw(0, noise=0.02).force).verdict == "ok"
+
+
+def test_a_trend_is_no_steady_sliding_and_a_single_slip_is_named() -> None:
+    noise = 0.002 * np.random.default_rng(0).standard_normal(20_000)
+    trend = recorded(0.4 + np.linspace(0, 0.3, 20_000) + noise)
+    assert measure_stick_slip(trend).kind == "cannot tell"
+    with pytest.raises(InputError, match=r"rises by .* stick longer than the recording"):
+        asp.measure(trend)
+    with pytest.raises(InputError, match="1 event cannot tell"):
+        asp.measure(recorded(saw(0, events=1).force))
+
+
+def test_a_saturated_recording_has_no_events_of_its_noise() -> None:
+    friction = np.minimum(saw(0, events=50, noise=0.02).force, 0.32)
+    assert len(measure_stick_slip(recorded(friction)).events) == 50
+
+
 def test_uneven_sampling_is_resampled_and_a_gap_is_one_sentence() -> None:
     truth = saw(0, noise=0.02, impulses=0.0)
     # Up to two fifths of the interval early or late.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.stick_slip import judged, matched, saw
 from scipy.io import loadmat
+from scipy.signal import butter, sosfilt
 
 from asperity.measurement.stick_slip.detection import find_falls, turning_points
 from asperity.measurement.stick_slip.events import read_events
@@ -175,6 +176,34 @@ def test_onsets_are_as_certain_as_they_say(correlation) -> None:
     # Fisher's information of onset, end and both lines, in white noise: 0.74 samples.
     if not correlation:
         assert np.std(events.onset[found] - truth.onset[true]) < 1.3 * 0.74 / 2000
+
+
+FALLS = {
+    "straight": lambda u: 1 - u,
+    "damped": lambda u: (np.exp(-4 * u) - np.exp(-4)) / (1 - np.exp(-4)),
+}
+
+
+@pytest.mark.parametrize("fall", FALLS)
+def test_slips_of_another_shape_are_as_long_as_they_are(fall) -> None:
+    cycle = np.r_[np.linspace(0, 1, 400, endpoint=False), FALLS[fall](np.arange(60) / 60)]
+    force = 0.3 + 0.1 * np.tile(cycle, 60)
+    force += 0.003 * np.random.default_rng(0).standard_normal(force.size)
+    _, events = read(force)
+    assert len(events) == 60
+    assert np.median(events.slip_duration) == pytest.approx(60 / 2000, rel=0.05)
+    late = (events.onset - (400 + 460 * np.arange(60)) / 2000) / events.timing_uncertainty
+    assert np.mean(np.abs(late) < 1.96) > 0.9
+
+
+@pytest.mark.parametrize("seed", population(3))
+def test_the_noise_of_a_filtered_recorder_has_no_events(seed) -> None:
+    """Its second differences from sample to sample are a seventh of those that are far apart."""
+    truth = saw(seed, events=40, noise=0.0, impulses=0.0)
+    white = np.random.default_rng(seed).standard_normal(truth.force.size)
+    smooth = sosfilt(butter(2, 0.1, output="sos"), white)
+    _, events = read(truth.force + 0.005 * smooth / smooth.std())
+    assert len(events) == 40
 
 
 def test_random_recordings_are_read_right_or_flagged() -> None:

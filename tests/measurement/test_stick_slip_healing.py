@@ -57,6 +57,8 @@ def test_each_machine_of_a_campaign_tells_the_healing_of_a_law() -> None:
         assert healing.recordings == V.size
         # 2 (B - A): age and velocity at the onset follow that of the drive, and slips overshoot.
         assert healing.drop_per_efold == pytest.approx(0.024, rel=0.15)
+        low, high = healing.b_minus_a
+        assert low < 0.012 < high
     assert "0 recordings are too few" in campaign.series[2].healing().reason
     figure = replace(campaign, model=cycles, modelled=(0, 1)).plot()
     drops, times = figure.axes

@@ -119,7 +119,12 @@ class StickSlipCampaign(Drawn):
 
     def healing_record(self) -> list[dict[str, Any]]:
         """Healing of each series, with K and W0, as numbers and texts."""
-        return [{"K": s.K, "W0": s.W0, **asdict(s.healing())} for s in self.series]
+        records = []
+        for one in self.series:
+            healing = one.healing()
+            record = {"K": one.K, "W0": one.W0, **asdict(healing)}
+            records.append(record | {"b_minus_a_interval_95": healing.b_minus_a})
+        return records
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """Healing of each series."""
@@ -133,6 +138,10 @@ class StickSlipCampaign(Drawn):
             if healing.reason:
                 value = f"cannot tell: {healing.reason}"
             lines.append(SummaryLine(one.name, value, "drop per e-fold of stick time"))
+            if not healing.reason:
+                low, high = healing.b_minus_a
+                meaning = "where K is below half of the critical stiffness, M V^2 < A D0 W0"
+                lines.append(SummaryLine("B - A", f"{low:.2g} to {high:.2g} (95 %)", meaning))
         return f"StickSlipCampaign, {count} recordings", lines
 
 

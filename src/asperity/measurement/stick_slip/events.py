@@ -164,7 +164,7 @@ def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     )
     for part in np.array_split(np.arange(k), -(-k // _TOGETHER)):
         onset[part], end[part], squares[part] = _onset_and_end(
-            sums, part, *(b[part] for b in bounds), shape.fall
+            sums, part, *(b[part] for b in bounds), shape=shape.fall
         )
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
@@ -178,6 +178,7 @@ def _onset_and_end(
     trough: Index,
     first: Index,
     stop: Index,
+    *,
     shape: Callable[[Array], Array],
 ) -> tuple[Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in, and the mean square of residuals."""
@@ -260,7 +261,7 @@ class _Shape:
 
 
 #: How a slider slips on a spring: freely at constant friction, at a constant velocity, and damped.
-#: Onsets of half a cosine and of a straight fall lie this share of the slip apart, by least squares.
+#: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
 _SHAPES = (_Shape(_half_cosine, 2.65), _Shape(_straight, 2.0), _Shape(_relaxing, 4.97))
 _DISTANCE = 0.13
 #: Of 26 made recordings the true shapes stand out by 3.4 to 46 standard errors, others by 2.1.
@@ -277,7 +278,7 @@ def _shape(
     squares only say which shape follows the noise: such events do not count. Of shapes that are as
     good as the one chosen their distance from it counts: of onset or end, over the duration.
     """
-    fits = [_onset_and_end(sums, part, *bounds, shape.fall) for shape in _SHAPES]
+    fits = [_onset_and_end(sums, part, *bounds, shape=shape.fall) for shape in _SHAPES]
     squares = np.array([fit[2] for fit in fits])
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2

@@ -502,7 +502,7 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
                 abs(off),
                 LIMITS["stiffness"],
                 f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
-                f"{doubt:.1g} N/m, {stiffness / given:.3g} times the {given:.4g} N/m that is stated",
+                f"{doubt:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m",
                 significant=abs(stiffness - given) > 3 * doubt,
             )
         )

@@ -51,7 +51,7 @@ class Noise:
 
     @property
     def longest(self) -> int:
-        """K of the longest means, over 2^k samples."""
+        """Exponent k of the longest means, over 2^k samples."""
         return self.scatter.shape[0] - 1
 
     def of_means(self, longest: int, noisy: int) -> Array:
