@@ -621,7 +621,7 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     # 200 samples of a noise of 3e-4 leave standard errors of A, B and D0 of 0.8, 0.5 and 0.7 %.
     assert found == pytest.approx(PLANTED, rel=0.03)
     assert found["A"] - found["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
-    assert fit.locator(".panel.run-1 svg path.line").count() == 3
+    assert fit.locator(".panel.run-1 .plot path.line").count() == 3
     assert not fit.get_by_role("button", name="Cancel").is_visible()
     # The numbers of the fit are moved by hand, and the link restores them.
     page.locator("summary", has_text="by hand").click()
@@ -634,7 +634,7 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     again = visit("#" + page.url.split("#", 1)[1])
     again.locator(".by-hand .plot svg").wait_for()
     values = "(all) => all.map((e) => e.type === 'checkbox' ? e.checked : e.value)"
-    controls = ".fit-form :is(input, select, textarea), .by-hand input"
+    controls = ".fit-form :is(input, select, textarea), .by-hand input.number"
     first, second = (p.locator(controls).evaluate_all(values) for p in (page, again))
     assert first == second
 
