@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 #: Fewest recordings that tell a slope, and passes in which their scatter about it settles.
 _FEWEST, _PASSES = 3, 30
-#: Growth of the drop per e-fold of stick time over B - A: limit cycles of 34 sliders with inertia
+#: Growth of the drop per e-fold of stick time over B - A: limit cycles of 24 sliders with inertia
 #: and random A, B, D0, M and V of the Rice-Ruina law, at stiffnesses from 0.05 to 0.5 of the
 #: critical one and M V^2 < A D0 W0; less where the drive is faster or the spring stiffer.
 FACTOR = 1.8, 2.4
