@@ -263,7 +263,9 @@ def preparations() -> dict[str, Callable[[], Any]]:
     The grid of the fast method depends on the amplitude, and each grid is a program.
     """
     names = [name for name, law in registered().items() if law.rate_dependent]
-    tasks = {name: partial(_prepare, name, _AMPLITUDE) for name in names}
+    tasks: dict[str, Callable[[], Any]] = {
+        name: partial(_prepare, name, _AMPLITUDE) for name in names
+    }
     more = {f"{n} at large amplitudes": partial(_prepare, n, _LARGE) for n in _FIRST}
     return tasks | more
 
