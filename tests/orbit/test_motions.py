@@ -317,7 +317,7 @@ def test_inertia_needs_a_mass_and_damping_a_value():
 @pytest.mark.parametrize("more", [{"inertia": True}, {"radiation_damping": 500.0}])
 def test_a_law_without_rate_has_no_dynamics_to_add_inertia_to(more):
     null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0, mass=M)
-    with pytest.raises(InputError, match="law must depend on the velocity where inertia"):
+    with pytest.raises(InputError, match="law must depend on the velocity with inertia"):
         asp.periodic_response(null, velocity=1e-6, epsilon=0.1, frequency=120.0, **more)
 
 

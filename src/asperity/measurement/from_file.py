@@ -310,19 +310,19 @@ def _which_force(trace: Trace) -> InputError:
 
 
 def _without_motion(events: StickSlipMeasurement | None) -> InputError:
-    if events is not None and events.kind == "cannot tell":
-        return InputError(
-            "measure.trace",
-            "have a modulated load, velocity steps, holds, slips or steady friction",
-            f"friction of which this is seen: {events.regimes[0].evidence}",
-            f"{Argument('measure.stick_slip')} reads it nevertheless",
-        )
     name, unit = Argument("columns", "displacement", "x"), Argument("units", "x", "um")
+    got = "friction without a displacement or velocity of a known unit"
+    advice = (
+        f"name it, like {name}, give its unit, like {unit}, or give {Argument('measure.steps')}"
+    )
+    if events is not None and events.kind == "cannot tell":
+        got += f", and as slips {events.regimes[0].evidence}"
+        advice += f"; {Argument('measure.stick_slip')} reads slips nevertheless"
     return InputError(
         "measure.trace",
-        "have a modulated load, velocity steps or holds",
-        "friction without a displacement or velocity of a known unit",
-        f"name it, like {name}, give its unit, like {unit}, or give {Argument('measure.steps')}",
+        "have a modulated load, velocity steps, holds, slips or steady friction",
+        got,
+        advice,
     )
 
 
