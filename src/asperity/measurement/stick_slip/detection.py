@@ -47,12 +47,11 @@ def turning_points(values: Array, height: float) -> Index:
     The smallest rise or fall goes first, with both its ends, until all are `height` or more:
     extremes of persistence `height`. Every pass removes all that are smaller than their neighbours.
     """
-    changing = np.flatnonzero(np.diff(values)) + 1
-    at = np.concatenate([[0], changing]).astype(np.intp)
-    kept = values[at]
-    bend = np.ones(at.size, bool)
-    bend[1:-1] = np.sign(kept[1:-1] - kept[:-2]) != np.sign(kept[2:] - kept[1:-1])
-    at = at[bend]
+    step = np.diff(values)
+    changing = np.flatnonzero(step)
+    up = step[changing] > 0
+    turns = changing[:-1][up[1:] != up[:-1]] + 1
+    at = np.concatenate([[0], turns, changing[-1:] + 1]).astype(np.intp)
     while at.size > 1:
         size = np.abs(np.diff(values[at]))
         before = np.concatenate([[np.inf], size[:-1]])
@@ -117,10 +116,10 @@ def find_falls(force: Array, noise: Noise) -> Falls:
     searched together. Of falls that overlap at different widths those of the width that tells most
     of them apart are kept.
     """
-    most, candidates = noise.longest, []
+    most, candidates, averages = noise.longest, [], _Averages(force, noise)
     for octave in range(most + 1):
         scatter = noise.of_means(octave, octave)
-        falls = _at_width(force, octave, scatter[octave], noise, 0.0)
+        falls = averages.falls(octave, scatter[octave], 0.0)
         if falls[0].size and _cycle(*falls, force.size) >= _PER_CYCLE << octave:
             candidates.append((*_evidence(*falls), octave, falls))
     evidence = max((c[0] for c in candidates), default=0)
@@ -128,7 +127,7 @@ def find_falls(force: Array, noise: Noise) -> Falls:
         likely = [c for c in candidates if c[0] == evidence]
         ratio = max(c[1] for c in likely)
         _, _, octave, falls = next(c for c in likely if c[1] > ratio / _BLUNTER)
-        return _at_all_widths(force, noise, octave, falls)
+        return _at_all_widths(averages, noise, octave, falls)
     empty = np.empty(0, dtype=np.intp)
     scatter = noise.of_means(most, most)
     return Falls(empty, empty, scatter, _thresholds(noise, scatter))
@@ -173,38 +172,54 @@ def _returns(peak: Index) -> bool:
     return bool((high - low) / 2 < _REGULAR * middle)
 
 
-def _means(force: Array, octave: int) -> tuple[Array, int]:
-    """Means over 2^octave samples, and the samples from one to the next."""
-    width = 1 << octave
-    hop = max(1, width // 4)
-    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-    starts = np.arange(0, force.size - width + 1, hop)
-    return (total[starts + width] - total[starts]) / width, hop
+class _Averages:
+    """Means of a force over 1, 2, 4, ... samples, and their falls, each computed once."""
+
+    def __init__(self, force: Array, noise: Noise) -> None:
+        self.force, self._noise = force, noise
+        self._total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+        self._means: dict[int, tuple[Array, int]] = {}
+        self._falls: dict[tuple[int, float, float], tuple[Index, Index]] = {}
+
+    def means(self, octave: int) -> tuple[Array, int]:
+        """Means over 2^octave samples, and the samples from one to the next."""
+        if octave not in self._means:
+            width = 1 << octave
+            hop = max(1, width // 4)
+            first, last = self._total[:-width:hop], self._total[width::hop]
+            self._means[octave] = (last - first) / width, hop
+        return self._means[octave]
+
+    def falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
+        """Peaks and troughs of means, without those at the ends of the recording.
+
+        `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
+        """
+        key = octave, scatter, tilt
+        if key not in self._falls:
+            self._falls[key] = self._computed(*key)
+        return self._falls[key]
+
+    def _computed(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
+        means, hop = self.means(octave)
+        if tilt:
+            means = means + tilt * hop * np.arange(means.size)
+        at = turning_points(means, self._noise.threshold(scatter, 1 << octave))
+        if at.size < 2:
+            return at[:0], at[:0]
+        falling = np.flatnonzero(np.diff(means[at]) < 0)
+        peak, trough = at[falling], at[falling + 1]
+        inside = (peak > 0) & (trough < means.size - 1)
+        centre = ((1 << octave) - 1) // 2
+        return peak[inside] * hop + centre, trough[inside] * hop + centre
 
 
-def _at_width(
-    force: Array, octave: int, scatter: float, noise: Noise, tilt: float
-) -> tuple[Index, Index]:
-    """Peaks and troughs of means, without those at the ends of the recording.
-
-    `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
-    """
-    means, hop = _means(force, octave)
-    if tilt:
-        means = means + tilt * hop * np.arange(means.size)
-    at = turning_points(means, noise.threshold(scatter, 1 << octave))
-    if at.size < 2:
-        return at[:0], at[:0]
-    falling = np.flatnonzero(np.diff(means[at]) < 0)
-    peak, trough = at[falling], at[falling + 1]
-    inside = (peak > 0) & (trough < means.size - 1)
-    centre = ((1 << octave) - 1) // 2
-    return peak[inside] * hop + centre, trough[inside] * hop + centre
-
-
-def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, Index]) -> Falls:
+def _at_all_widths(
+    averages: _Averages, noise: Noise, octave: int, first: tuple[Index, Index]
+) -> Falls:
     """Falls at all widths up to an eighth of a cycle, which is longer the fewer falls are false."""
     most, longest, (peak, trough) = noise.longest, -1, first
+    force = averages.force
     while True:
         cycle = _cycle(peak, trough, force.size)
         wider = min(max(octave, _octave(cycle / _PER_CYCLE)), most)
@@ -213,7 +228,7 @@ def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, 
         longest = wider
         scatter = noise.of_means(longest, max(octave, _octave(cycle / _PER_CYCLE_OF_NOISE)))
         sets = [
-            _at_width(force, k, scatter[k], noise, tilt)
+            averages.falls(k, scatter[k], tilt)
             for tilt in (0.0, _tilt(force, peak, trough))
             for k in range(longest + 1)
         ]
@@ -222,10 +237,12 @@ def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, 
             break
         peak, trough = _without_ringing(force, *_most_resolved(sets))
     thresholds = _thresholds(noise, scatter)
-    return Falls(*_steep_part(force, peak, trough, thresholds), scatter, thresholds)
+    return Falls(*_steep_part(averages, peak, trough, thresholds), scatter, thresholds)
 
 
-def _steep_part(force: Array, peak: Index, trough: Index, thresholds: Array) -> tuple[Index, Index]:
+def _steep_part(
+    averages: _Averages, peak: Index, trough: Index, thresholds: Array
+) -> tuple[Index, Index]:
     """Falls from where they leave their upper quarter to where they reach their lower, and around.
 
     The highest mean of a stick that loads slowly may be far before the fall. Means are the
@@ -234,7 +251,7 @@ def _steep_part(force: Array, peak: Index, trough: Index, thresholds: Array) -> 
     peak, trough = peak.copy(), trough.copy()
     octave = np.full(peak.size, -1)
     for k in range(thresholds.size):
-        means, hop = _means(force, k)
+        means, hop = averages.means(k)
         half = ((1 << k) - 1) // 2
         last = means.size - 1
         high, low = (np.clip((at - half) // hop, 0, last) for at in (peak, trough))
