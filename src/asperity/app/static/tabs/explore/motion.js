@@ -86,7 +86,12 @@ function sentenceOf(motion, point, done) {
   const until = `${digits(motion.reached, 3)} s computed${motion.inertia ? "" : ", without mass"}${done ? "" : " so far"}`;
   if (motion.stopped) return `The motion ends: ${motion.stopped} (${until}).`;
   if (slip) return `Stick-slip: the slider sticks, and slips by ${quantity(slip.slip, "length", 3)} every ${digits(slip.period, 3)} s; the force rises and drops by ${digits(slip.drop, 3)} W₀ (${until}).`;
-  if (point.converged && point.stable) return `Steady: the slider settles to the same motion in each period of the load (${until}).`;
+  if (point.converged && point.stable) {
+    // A disturbance fades to 5 % in ln 20 relaxation times.
+    const fading = -Math.log(20) / point.growth_rate;
+    if (motion.reached < fading) return `Still settling: a disturbance fades to 5 % in ${digits(fading, 3)} s, and then the motion is the same in each period of the load (${until}).`;
+    return `Settled: the motion is the same in each period of the load (${until}).`;
+  }
   if (!done) return `Sliding is unstable: waiting for the slips (${until}).`;
   return `Sliding is unstable, but shows no repeated slips in the ${until}.`;
 }
