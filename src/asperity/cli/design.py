@@ -83,18 +83,18 @@ def design_text(result: Design) -> str:
 
     plan = result.plan
     known = point_parameters(plan.truth.law)
-    axes = [a.name for a in plan.axes]
+    axes = list(plan.axes)
     rows: list[tuple[str, ...]] = [(*axes, "readings", *plan.noise)]
     for p in result.points:
         settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
         predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
         rows.append((*settings, str(p.readings), *predicted))
-    aim = f"to measure {', '.join(plan.measured)}"
+    aim = f"to measure {', '.join(plan.question.measure)}"
     if plan.rival is not None:
         aim = f"to exclude {plan.rival.law.name}"
     lines = [f"{plan.truth.law.name}: {result.readings} readings {aim}", aligned(rows, "  ")]
-    if plan.budget.time is not None:
-        lines.append(f"time {result.spent:.4g} s of {plan.budget.time:.4g} s")
+    if plan.question.time is not None:
+        lines.append(f"time {result.spent:.4g} s of {plan.budget:.4g} s")
     table = [("", "expected", "std. error", "even grid", "")]
     table += [
         (n, f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
