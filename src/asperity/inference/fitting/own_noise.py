@@ -61,11 +61,11 @@ def with_noise(
     """
     noisy = objective.terms_of(RunTerm)
     first = [term.noise_state() for term in noisy]
-    ends = []
+    ends: list[_End] = []
     for u in _apart(objective, minima):
         for term, state in zip(noisy, first, strict=True):
             term.restore_noise(state)
-        ends.append(_with_own_noise(objective, noisy, u))
+        ends += _with_own_noise(objective, noisy, u, ends)
     for u, value in distinct(list(besides)):
         assert drifting is not None  # whose minima they are
         # Chi-squared of a drift says how large it is: noise has one a sample.
@@ -73,7 +73,7 @@ def with_noise(
         if all(drifting.chi2(end.u) > allowed for end in ends):
             for term, state in zip(noisy, first, strict=True):
                 term.restore_noise(state)
-            ends.append(_with_own_noise(objective, noisy, u))
+            ends += _with_own_noise(objective, noisy, u, ends)
     best = min(ends, key=lambda end: end.deviance)
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)
@@ -106,10 +106,15 @@ class _End(NamedTuple):
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _End:
-    """Noise and parameters in turn, until the parameters stay where they are."""
+def _with_own_noise(
+    objective: Objective, noisy: list[RunTerm], u: Float, known: Sequence[_End]
+) -> list[_End]:
+    """Noise and parameters in turn, until the parameters stay where they are.
+
+    Empty where they come to an end that is known.
+    """
     agreed = False
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
         begin = u
         for term in noisy:
             term.update_noise(objective.named(begin))
@@ -117,7 +122,11 @@ def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _En
         u, value = objective.minimise(begin)
         if not math.isfinite(value):
             break
+        begin, u = objective.ordered(begin), objective.ordered(u)
         _, jacobian = objective.residuals(u)
+        # The first noise holds the misfit of the start.
+        if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
+            return []
         away = jacobian @ (u - begin)
         # chi-squared of the change, under the noise as it is now.
         if agreed := float(away @ away) < _STILL**2:
@@ -126,4 +135,4 @@ def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _En
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
     states = [term.noise_state() for term in noisy]
-    return _End(u, deviance, states, agreed)
+    return [_End(u, deviance, states, agreed)]
