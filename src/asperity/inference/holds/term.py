@@ -192,10 +192,8 @@ def _with_slopes(
     def of(values: dict[str, Array]) -> Array:
         return _healing(law, fields, {**given, **values}, K, V, hold_time)
 
-    free = {n: given[n] for n in names}
+    def along(shares: Array) -> Array:
+        change = {n: jnp.broadcast_to(s, K.shape) for n, s in zip(names, shares, strict=True)}
+        return jax.jvp(of, ({n: given[n] for n in names},), (change,))[1]
 
-    tangents = {
-        n: jnp.stack([jnp.full_like(v, float(n == m)) for m in names]) for n, v in free.items()
-    }
-    slopes = jax.vmap(lambda t: jax.jvp(of, (free,), (t,))[1])(tangents)
-    return of(free), slopes
+    return of({}), jax.vmap(along)(jnp.eye(len(names)))

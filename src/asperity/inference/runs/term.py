@@ -259,7 +259,7 @@ class RunTerm(DataTerm):
         left = raw[0] + self._columns @ self._coefficients(raw[0])
         white = self._whitened(left[:, None])[:, 0]
         innovations = [white[a:b] for a, b in self.run.stretches]
-        self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
+        self._whiteness = whiteness(innovations, max(m.order for m in self.models))
         self._after_changes = misfit_after_changes(white, first_after_changes(self.run))
         return True
 
