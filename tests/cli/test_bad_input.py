@@ -219,7 +219,7 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
         ((*AIR, "--set", "R=1 cm", "--vacuum"), ["R must not be given with --vacuum"]),
         ((*AIR, "--inverse", "0.48"), ["--inverse and --for must be given together"]),
         ((*AIR, "--for", "gap"), ["--inverse and --for must be given together"]),
-        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be radius or gap"]),
+        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be one of radius, gap"]),
         ((*AIR, "--inverse", "0 %", "--for", "gap"), ["inverse.ratio must be positive"]),
         ((*AIR, "--inverse", "0.4", "--for", "gap", "--vacuum"), ["must have an air layer"]),
         ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),
