@@ -61,24 +61,24 @@ def plot_slice(
             part = part.sel({dim: float(chosen[dim])}, method="nearest")
         elif dim not in (x, y):
             part = part.isel({dim: int(chosen.get(dim, 0))})
-    for dim in (x, y):
-        if dim is not None and not numbered[dim]:
-            part = part.assign_coords({dim: (dim, range(part.sizes[dim]))})
-            part[dim].attrs["long_name"] = f"row of {dim}"
+    for side in (x, y):
+        if side is not None and not numbered[side]:
+            part = part.assign_coords({side: (side, range(part.sizes[side]))})
+            part[side].attrs["long_name"] = f"row of {side}"
     # Titles name the position on the other axes; a pure number needs no unit.
     part = part.drop_vars([n for n, c in part.coords.items() if c.ndim == 0 and n not in dims])
     for array in (part, *part.coords.values()):
         array.attrs = {n: v for n, v in array.attrs.items() if v != "1"}
-    scales = {"xscale": _scale(part[x].values)}
+    options: dict[str, Any] = {"xscale": _scale(part[x].values)}
     figure = new_figure(4.4, 3.4)
     axis = figure.subplots()
     if y is None:
-        part.plot.line(x=x, ax=axis, **scales)
+        part.plot.line(x=x, ax=axis, **options)
     else:
-        scales["yscale"] = _scale(part[y].values)
-        signed = part.min() < 0 < part.max()
-        options = {"cmap": cm.vik, "center": 0.0} if signed else {"cmap": cm.batlow}
-        part.plot.pcolormesh(x=x, y=y, ax=axis, rasterized=True, **options, **scales)
+        options |= {"yscale": _scale(part[y].values), "rasterized": True, "cmap": cm.batlow}
+        if part.min() < 0 < part.max():
+            options |= {"cmap": cm.vik, "center": 0.0}
+        part.plot.pcolormesh(x=x, y=y, ax=axis, **options)
     return figure
 
 
