@@ -167,11 +167,6 @@ def _opened(
             f"{differences(made, numerics())}, so that last digits may differ; finish it with "
             "those versions, or choose another store"
         )
-    pending = root.attributes.get("extending")
-    if pending:
-        longer = SweepGrid(pending["record"], root.grid.chunks)
-        extend(path, root, longer, pending["attributes"])
-        root = read_root(path)
     old = root.grid.record
     if old == grid.record:
         written = [root.damage] if root.damage else []

@@ -116,9 +116,10 @@ def _holds(file: Path, content: bytes) -> bool:
 
 
 def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
-    """Append points to a store; the call can be repeated after an interruption.
+    """Append points to a store; chunks that get new points become "not done".
 
-    Chunks that get new points become "not done"; the other chunks stay as they are.
+    After an interruption the shorter plan and the longer one can both be continued: the root, which
+    is written last, tells which plan the store has.
 
     Parameters
     ----------
@@ -135,8 +136,6 @@ def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any
     list of str
         As for `lay_out`.
     """
-    pending = {"record": grid.record, "attributes": dict(attributes)}
-    write_root(path, {**root.attributes, "extending": pending}, root.arrays)
     for chunk in _touched(root.grid, grid):
         reset(path, root.grid, chunk)
     return lay_out(path, grid, {"runs": root.runs, **attributes})

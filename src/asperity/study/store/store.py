@@ -215,11 +215,6 @@ class SweepStore:
 
 def _require_whole(path: Path, root: Root) -> None:
     """Refuse to read a store whose metadata of arrays have changed since they were written."""
-    if root.attributes.get("extending"):
-        raise InputError(
-            f"store must be completely extended, got '{path.name}', whose extension is under way "
-            "or was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
-        )
     if root.damage:
         raise _damaged(path, root.damage)
     for name, described in root.arrays.items():
