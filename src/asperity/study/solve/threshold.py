@@ -38,7 +38,6 @@ class ThresholdSolve(SolveKind):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
-        super().settings(plan)
         low, high = plan.threshold.between
         if not 0 < low < high:
             raise InputError(
