@@ -197,7 +197,9 @@ def run(
             progress=progress,
             log=log,
         )
-    record: dict[str, Any] = {**vars(result), "out": str(result.out)}
+    names = ("points", "failed", "solved", "seconds", "memory", "lost")
+    record: dict[str, Any] = {name: getattr(result, name) for name in names}
+    record["out"] = str(result.out)
     rows = [
         ("points", f"{result.points:,}"),
         ("failed", f"{result.failed:,}"),
