@@ -5,7 +5,6 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.inference import design, fit, table_of
-from references.populations import draws
 
 #: Settings that the elasto-plastic law leaves steady at 120 Hz, and two that it does not.
 PLAN = {
@@ -27,7 +26,7 @@ PLAN = {
 
 @pytest.fixture(scope="module")
 def found():
-    return design(PLAN)
+    return design(PLAN, simulate=60)
 
 
 def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(found):
@@ -55,14 +54,12 @@ def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(found):
         assert found.parameters[name].se == pytest.approx(fitted.parameters[name].se, rel=1e-4)
 
 
-@draws(8, 60)
-def test_simulated_fits_spread_as_expected(draws):
-    found = design(PLAN, simulate=draws)
+def test_simulated_fits_spread_as_expected(found):
     simulation = found.simulation
-    assert simulation.sets == draws
+    assert simulation.sets == 60
     assert simulation.failed == 0
     for name, error in found.parameters.items():
-        # Three standard errors of the spread; of 60 fits some 10 % each.
+        # Three standard errors of the spread of 60 fits, some 10 % each.
         assert simulation.spread[name] == pytest.approx(
             error.se, abs=3 * simulation.uncertainty[name]
         )
