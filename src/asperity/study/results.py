@@ -73,10 +73,14 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     InputError
         If there is no store of a sweep, or it is damaged.
     """
+    return dataset_of(SweepStore(file_path(store, "store"), mode="r"))
+
+
+def dataset_of(store: SweepStore) -> xarray.Dataset:
+    """The dataset of a store that has been checked."""
     import xarray
 
-    whole = SweepStore(file_path(store, "store"), mode="r")
-    return xarray.open_zarr(whole.path, consolidated=False, chunks=None)
+    return xarray.open_zarr(store.path, consolidated=False, chunks=None)
 
 
 def store_status(store: str | os.PathLike[str]) -> SweepStatus:

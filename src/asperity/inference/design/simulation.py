@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from asperity.inference.comparison.scale import EXCLUDED
 from asperity.inference.design.plan import Hypothesis
 from asperity.inference.design.predictions import PointModel, refit, repeated
-from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.unknowns import Prior
 
 Float = NDArray[np.float64]
@@ -81,7 +81,9 @@ def simulated(
     p, q = len(hypothesis.unknowns), sum(u.prior is not None for u in hypothesis.unknowns)
     for first in range(0, sets, _BLOCK):
         count = min(_BLOCK, sets - first)
-        data = noisy(repeated(expected, count), np.tile(readings, count), noise)
+        exact, many = repeated(expected, count), np.tile(readings, count)
+        normal = noise.normal(size=(exact.rows, len(OBSERVABLES))) / np.sqrt(many)[:, None]
+        data = exact.disturbed(exact.values, normal)
         result = refit(
             model,
             data,
@@ -147,31 +149,3 @@ def centred(hypothesis: Hypothesis) -> Hypothesis:
         replace(u, prior=at_value(u.prior, hypothesis.values[u.name])) for u in hypothesis.unknowns
     )
     return replace(hypothesis, unknowns=unknowns)
-
-
-def noisy(expected: LockInTable, readings: Float, noise: np.random.Generator) -> LockInTable:
-    """Means of readings with normal noise; harmonics are disturbed in the complex plane."""
-    values, errors = dict(expected.values), dict(expected.errors)
-    root = np.sqrt(readings)
-
-    def drawn() -> Float:
-        return noise.normal(size=expected.rows) / root
-
-    for name in ("mean_friction", "delta_mu"):
-        if name in values:
-            values[name] = values[name] + errors[name] * drawn()
-    for n in (1, 2):
-        amplitude, phase = f"mu{n}", f"phase{n}"
-        if amplitude not in values:
-            continue
-        radial = errors[amplitude] * drawn()
-        if phase not in values:
-            values[amplitude] = values[amplitude] + radial
-            continue
-        across = values[amplitude] * errors[phase]
-        turned = values[amplitude] + radial + 1j * across * drawn()
-        values[amplitude] = np.abs(turned)
-        values[phase] = values[phase] + np.angle(turned)
-        # The uncertainty across is that of the noise, whatever the amplitude that was read.
-        errors[phase] = across / np.maximum(np.abs(turned), 1e-300)
-    return LockInTable(expected.name, expected.points, values, errors)

@@ -427,32 +427,12 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
 
 def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:
     """Where the first samples of x that are also in y begin in both."""
-    if min(x.size, y.size) < _EQUAL:
-        return None
     rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
     various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT
-    begins = np.flatnonzero(various)
-    marks = _marks(x)[::_EQUAL][begins]
-    order = np.argsort(marks)
-    others = _marks(y)
-    at = np.searchsorted(marks[order], others)
-    at[at == order.size] = 0
-    for j in np.flatnonzero(marks[order][at] == others) if order.size else ():
-        k = int(begins[order[at[j]]])
-        if np.array_equal(y[j : j + _EQUAL], rows[k]):
-            return k * _EQUAL, int(j)
+    places = {rows[k].tobytes(): k for k in np.flatnonzero(various)[::-1]}
+    whole, size = y.tobytes(), y.itemsize
+    for j in range(y.size - _EQUAL + 1 if places else 0):
+        k = places.get(whole[size * j : size * (j + _EQUAL)])
+        if k is not None:
+            return int(k) * _EQUAL, j
     return None
-
-
-def _marks(x: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """A number for each 64 samples in a row that depends on all of their bits."""
-    bits = np.ascontiguousarray(x).view(np.uint64)
-    factor = 0x9E3779B97F4A7C15
-    length, mark = 1, bits * np.uint64(factor)
-    # Of twice as many samples each time; numbers wrap at 2^64.
-    while length < _EQUAL:
-        factor = (factor * factor + 2) % 2**64
-        later = mark[length:]
-        mark = mark[: mark.size - length] * np.uint64(factor) + (later ^ (later >> np.uint64(29)))
-        length *= 2
-    return mark

@@ -11,10 +11,10 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.objective import Residuals
+from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
+from asperity.inference.runs.motion import RunArrays, RunMotion, RunResiduals
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
@@ -54,7 +54,7 @@ class NoiseState(NamedTuple):
     after_changes: tuple[float, float]
 
 
-class RunTerm:
+class RunTerm(DataTerm):
     """A recorded run as a `DataTerm` of an objective.
 
     Nuisances that enter linearly, such as the offset of the gauge and a trend over slip, are
@@ -90,9 +90,6 @@ class RunTerm:
         "compute; give start values with a stiffness above the critical one, or a shorter window"
     )
     observables = ("friction",)
-    searches = None
-    #: A motion takes ten times as long as the orbits of a table.
-    affordable = 256
 
     def __init__(
         self,
@@ -108,7 +105,7 @@ class RunTerm:
         radiation_damping: bool = False,
         order: int | None = None,
     ) -> None:
-        self.run, self.law, self.fixed = run, law, dict(fixed)
+        self.run, self.law, self.fixed, self.name = run, law, dict(fixed), run.name
         self.linear, self.nuisances = linear, nuisances
         self._own = dict(own or {})
         self.gauge, self._order = gauge, order
@@ -124,11 +121,6 @@ class RunTerm:
         self._differences: dict[tuple[float, ...], Float | None] = {}
         self.models = [self._first_noise(a, b) for a, b in run.stretches]
         self._prepare()
-
-    @property
-    def name(self) -> str:
-        """Name of the run."""
-        return self.run.name
 
     @property
     def profiled(self) -> int:
@@ -199,10 +191,6 @@ class RunTerm:
         """Sums of the squared innovations; see `DataTerm`."""
         return np.array([self._chi2(v) for v in values])
 
-    def thinned(self, rows: int, data: int = 0) -> None:
-        """A recording has no rows."""
-        return
-
     def observed(self) -> dict[str, Float]:
         """Times and friction."""
         return {"time": self.run.time, "friction": self.run.friction}
@@ -242,16 +230,15 @@ class RunTerm:
         jacobian[:, [name in free for name in values]] = computed.derivatives
         return computed.friction - self.run.friction, jacobian
 
-    def likelihood(self, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
-        """The likelihood as compiled programs evaluate it, and its arrays."""
+    def compiled(self, names: tuple[str, ...]) -> tuple[RunResiduals, RunArrays]:
+        """As in `DataTerm`."""
         inner = tuple((n, result) for n in names if (result := self.inner(n)) is not None)
         fixed = {n: np.float64(v) for n, v in {**self.fixed, "W0": self.run.W0}.items()}
         # Any numbers serve for the template: those of the parameters take their place.
         template = {**{name: np.float64(1.0) for _, name in inner}, **fixed}
         arrays, equation = eqx.partition(self.motion.equations(template), eqx.is_array_like)
-        return RunLikelihood(
-            equation, inner, tuple(self.run.stretches), self.motion.room
-        ), RunArrays(
+        stretches = tuple(self.run.stretches)
+        return RunResiduals(equation, inner, stretches, self.motion.room), RunArrays(
             jax.tree.map(np.asarray, arrays),
             fixed,
             filled_up(self.run.drive),
@@ -272,7 +259,7 @@ class RunTerm:
         left = raw[0] + self._columns @ self._coefficients(raw[0])
         white = self._whitened(left[:, None])[:, 0]
         innovations = [white[a:b] for a, b in self.run.stretches]
-        self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
+        self._whiteness = whiteness(innovations, max(m.order for m in self.models))
         self._after_changes = misfit_after_changes(white, first_after_changes(self.run))
         return True
 

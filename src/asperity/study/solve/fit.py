@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -352,36 +351,4 @@ def _simulated(
         return None
     root = np.linalg.cholesky(table.correlations())
     normal = np.einsum("rij,rj->ri", root, noise.standard_normal(root.shape[:2]))
-    return _disturbed(table, {n: np.asarray(getattr(response, n)) for n in table.values}, normal)
-
-
-def _disturbed(
-    table: LockInTable, exact: Mapping[str, np.ndarray], normal: np.ndarray
-) -> LockInTable:
-    """Exact observables plus `normal` (standard normal errors) times the table's uncertainties."""
-    from asperity.inference.tables.table import OBSERVABLES
-
-    values = {n: np.where(np.isfinite(table.values[n]), exact[n], np.nan) for n in table.values}
-    errors = dict(table.errors)
-    units = dict(zip(OBSERVABLES, normal.T, strict=True))
-    for name in ("mean_friction", "delta_mu"):
-        if name in values:
-            values[name] = values[name] + errors[name] * units[name]
-    for amplitude, phase in (("mu1", "phase1"), ("mu2", "phase2")):
-        if amplitude not in values:
-            continue
-        # The phasor relative to the exact phase.
-        phasor = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
-        if phase in values:
-            # The quadrature error of the table's reading applies to any simulated amplitude.
-            quadrature = table.values[amplitude] * errors[phase]
-            both = np.isfinite(values[phase])
-            phasor = phasor + 1j * np.where(both, quadrature * units[phase], 0.0)
-            values[phase] = values[phase] + np.angle(phasor)
-            errors[phase] = np.where(both, quadrature / np.maximum(np.abs(phasor), 1e-300), np.nan)
-        values[amplitude] = np.abs(phasor)
-    scale = {n: errors[n] / table.errors[n] for n in errors}
-    covariances = {
-        (a, b): table.covariances[a, b] * scale[a] * scale[b] for a, b in table.covariances
-    }
-    return replace(table, values=values, errors=errors, covariances=covariances)
+    return table.disturbed({n: np.asarray(getattr(response, n)) for n in table.values}, normal)

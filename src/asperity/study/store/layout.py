@@ -22,8 +22,8 @@ from zarr.storage import MemoryStore
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
 from asperity.study.outcome import SweepOutcome, flag_attributes
+from asperity.study.plan import OF_CHUNKS, OF_POINTS
 from asperity.study.points import RATIOS
-from asperity.study.record import OF_CHUNKS, OF_POINTS
 from asperity.study.solve import SOLVES
 from asperity.study.store import durable
 from asperity.study.store.root import FORMAT, KIND, Root, write_root

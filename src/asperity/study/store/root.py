@@ -18,7 +18,7 @@ from typing import Any
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.study.grid import SweepGrid
-from asperity.study.record import ATTRIBUTES
+from asperity.study.plan import ATTRIBUTES
 from asperity.study.store import durable
 
 #: Attribute that marks a store of a sweep; its value is the version of the format.

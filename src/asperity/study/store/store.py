@@ -18,7 +18,7 @@ from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.outputs.written import to_disk
 from asperity.study.outcome import Answers
-from asperity.study.record import OF_CHUNKS, OF_POINTS
+from asperity.study.plan import OF_CHUNKS, OF_POINTS
 from asperity.study.store import durable
 from asperity.study.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset
 from asperity.study.store.root import Root, read_root, write_root
