@@ -79,12 +79,12 @@ def response(
     stable or not; without inertia by default.
     """
     if stick_slip:
-        if table is not None or out is not None or plot is not None or resume:
+        if table is not None or out is not None or resume:
             raise InputError(
-                "--stick-slip must go with one point and alone, got --table, --out, --resume or "
-                "--plot; leave it out, or take asperity.experiment.stick_slip_response with arrays"
+                "--stick-slip must go with one point, got --table, --out or --resume; leave it "
+                "out, or take asperity.experiment.stick_slip_response with arrays"
             )
-        return _stick_slip(point, as_json, names)
+        return _stick_slip(point, as_json, plot, names)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
@@ -118,15 +118,16 @@ def _point(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
     return 0 if result.converged else 1
 
 
-def _stick_slip(point: Point, as_json: bool, names: Names) -> int:
+def _stick_slip(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
     from asperity._version import __version__
-    from asperity.cli.report import to_json
+    from asperity.cli.report import require_picture, to_json, write_picture
     from asperity.experiment import stick_slip_response
     from asperity.laws import get_law
     from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import MODULATION, point_parameters
     from asperity.slider.named import slider_from
 
+    require_picture(plot)
     offered = offered_numbers(point, "command line")
     for name in ("epsilon", "frequency"):
         if name in point.parameters:
@@ -156,6 +157,8 @@ def _stick_slip(point: Point, as_json: bool, names: Names) -> int:
             if result.slips or name in ("steady", "stable")
         ]
         click.echo(_words(law.name, numbers, str(result.result), texts, names))
+    if result.slips:
+        write_picture(result, plot, names)
     return 0 if result.slips or result.steady else 1
 
 

@@ -19,7 +19,7 @@ from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn
 from asperity.slider import Motion, Slider, equation_of_motion
 from asperity.slider.problem import flatten
-from asperity.transients.limit_cycle import CycleEnd, limit_cycle
+from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 Float = NDArray[np.float64]
 
@@ -65,6 +65,8 @@ class StickSlip(Labelled, Drawn):
     result : str array
         Sentence on how the motion ends: stick-slip, steady sliding, or why neither.
     slider : Slider
+    cycle : LimitCycle or None
+        Of a single point: the force at any time of a period.
     """
 
     meanings = _MEANINGS
@@ -85,6 +87,7 @@ class StickSlip(Labelled, Drawn):
     stable: NDArray[np.bool_]
     result: NDArray[np.object_]
     slider: Slider
+    cycle: LimitCycle | None = None
 
     def outcomes(self) -> str:
         """How many points there are, and how many have a cycle."""
@@ -171,6 +174,7 @@ def stick_slip_response(
         stable=shaped(_stable(motion)),
         result=of("result", object),
         slider=slider,
+        cycle=cycles[0] if len(cycles) == 1 else None,
     )
 
 
