@@ -180,9 +180,7 @@ def test_bad_layer_is_answered_by_one_sentence(change, message):
 
 
 def test_bad_arguments_are_answered_by_one_sentence():
-    with pytest.raises(
-        InputError, match=r"layer.omega must not be negative, got -1"
-    ):
+    with pytest.raises(InputError, match=r"layer.omega must not be negative, got -1"):
         LAYER.dynamic_stiffness(-1.0)
     with pytest.raises(InputError, match=r"layer.r must lie on the disc, got 0.05 m;"):
         LAYER.pressure([0.0, 0.05], 754.0)

@@ -86,7 +86,10 @@ def test_mindlin_ratio_never_reaches_the_printed_one():
         (lambda: NormalContact([7.0, [7.0]], 4e-7), "NormalContact.W0 must be a rectangular"),
         (lambda: NormalContact(np.ones(2), np.ones(3)), "broadcast together, got .2,. and .3,.;"),
         (lambda: CONTACT.closure([7.0, -1.0]), "NormalContact.load .* got -1 N;"),
-        (lambda: CONTACT.closure_harmonics(1.0), "NormalContact.epsilon must be at least 0 and below 1"),
+        (
+            lambda: CONTACT.closure_harmonics(1.0),
+            "NormalContact.epsilon must be at least 0 and below 1",
+        ),
         (lambda: CONTACT.load_harmonics(-1e-9), "NormalContact.amplitude must not be"),
         (lambda: CONTACT.omega0(0.0), "NormalContact.M must be positive, got 0 kg;"),
         (lambda: mindlin_length_ratio(0.6), "material.nu must be at most 0.5, got 0.6;"),

@@ -62,7 +62,7 @@ class SlidingSignals:
     turned : bool
         Whether the friction was multiplied by -1.
     signs : tuple of Finding
-        What is read with another sign than recorded, besides the friction.
+        Load and shear that are read with the opposite sign.
     left_out : int
         Samples within the window at which something is no number or time does not go on.
     """

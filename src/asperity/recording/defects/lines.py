@@ -71,6 +71,6 @@ def take_off(x: Float, turns: float) -> None:
     inverse = np.linalg.pinv(columns)
     quick = x - uniform_filter1d(x, round(1 / turns))
     whole = x.size // m * m
-    rest = (quick[-m:] @ inverse.T) @ columns.T
+    last = (quick[-m:] @ inverse.T) @ columns.T
     x[:whole].reshape(-1, m)[:] -= (quick[:whole].reshape(-1, m) @ inverse.T) @ columns.T
-    x[whole:] -= rest[m - (x.size - whole) :]
+    x[whole:] -= last[m - (x.size - whole) :]
