@@ -19,8 +19,8 @@ from asperity.measurement.samples import (
     shear_channel,
     too_few,
 )
+from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.rows import usable_rows
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
