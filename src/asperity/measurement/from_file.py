@@ -149,8 +149,9 @@ def _either(
     }
 
     def sliding() -> SlidingMeasurement:
-        cuts = {"steps": question.steps, "holds": question.holds}
-        return measure_sliding(trace, **where, **cuts, detrend=question.detrend)
+        return measure_sliding(
+            trace, **where, detrend=question.detrend, steps=question.steps, holds=question.holds
+        )
 
     def slips() -> StickSlipMeasurement:
         numbers = question.stiffness, question.velocity, question.mass, question.normal_load
