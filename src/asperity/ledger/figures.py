@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,8 @@ from asperity.questions.record import Question, Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from asperity.materials import Material
 
 
 @dataclass(frozen=True)
@@ -331,3 +333,50 @@ class Section:
     observables: Mapping[str, Sequence[Observable]] = field(default_factory=dict)
     before: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
     after: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
+
+
+#: A line of a figure: ``name``, and ``values``, columns by their names.
+Line: TypeAlias = dict[str, Any]
+#: What a text states at one abscissa: ``x``, ``ends``, one number or two, and ``text``.
+Mark: TypeAlias = dict[str, Any]
+Progress: TypeAlias = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class TabFigure:
+    """A figure of the browser page, which is computed for changed numbers of the paper.
+
+    A paper's module ``tab`` has ``FIGURES``, a `TabFigure` by the name of each; figures.toml has
+    the paper's numbers that a figure follows from (``numbers``), and labels of its columns.
+
+    Attributes
+    ----------
+    x : str
+        Column of the abscissa.
+    rows : sequence of str
+        Columns of the ordinates, one panel each.
+    logarithmic : tuple of str
+        Columns with a logarithmic axis.
+    lines : function
+        Maps the paper's numbers to the fast lines (milliseconds).
+    marks : function
+        Maps the paper's numbers to the statements of the text, by the column of the ordinate.
+    python : function
+        From the names and values of the moved numbers to code that computes the same.
+    slow : tuple of str
+        Names of slow lines (seconds).
+    slow_line : function
+        Maps the paper's numbers, a name of `slow` and a progress function to this line.
+    extras : function
+        Maps the paper's numbers to further fields of the answer.
+    """
+
+    x: str
+    rows: Sequence[str]
+    lines: Callable[[Material], list[Line]]
+    python: Callable[[Mapping[str, float]], str]
+    logarithmic: tuple[str, ...] = ()
+    marks: Callable[[Material], Mapping[str, Sequence[Mark]]] = lambda _: {}
+    slow: tuple[str, ...] = ()
+    slow_line: Callable[[Material, str, Progress], Line] | None = None
+    extras: Callable[[Material], Mapping[str, Any]] = lambda _: {}

@@ -50,8 +50,9 @@ class SweepPlan(Sweep):
         # `plan_record` reports mistakes in the laws; here they would be reported twice.
         known = known_names(laws_named(self, []), self.solve)
         axes = {n: table.model_dump(by_alias=True) for n, table in self.axes.items()}
-        trees = (("parameters", self.parameters), ("axes", axes))
-        if mistakes := without_unit(q for tree in trees for q in _quantities(*tree, "", known)):
+        trees = {"parameters": self.parameters, "axes": axes}
+        quantities = (q for n, tree in trees.items() for q in _quantities(n, tree, "", known))
+        if mistakes := without_unit(quantities):
             raise PlanError(mistakes)
         return self
 

@@ -102,10 +102,6 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         codes, counts = np.unique(opened.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    holder = running_driver(opened.path)
-    running = ""
-    if holder:
-        running = f"process {holder['process']} on {holder['host']} since {holder['since']}"
     return SweepStatus(
         store=opened.path,
         title=str(opened.attributes.get("title", "")),
@@ -116,7 +112,7 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         chunks_done=chunks,
         chunks_damaged=damaged,
         outcomes={names.get(code, str(code)): n for code, n in sorted(outcomes.items())},
-        running=running,
+        running=running_driver(opened.path),
         runs=opened.root.runs,
         bytes=_bytes_in(opened.path),
     )

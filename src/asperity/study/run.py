@@ -27,7 +27,7 @@ from asperity.study.grid import SweepGrid
 from asperity.study.job import Job, numerics, package_version
 from asperity.study.plan import SweepPlan, is_extension, law_places, load_plan
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out
-from asperity.study.store.lock import StoreLock, lock_file
+from asperity.study.store.lock import StoreLock, lock_file, store_lock
 from asperity.study.store.root import read_root
 from asperity.study.store.store import SweepStore
 from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
@@ -99,7 +99,7 @@ def run_sweep(
         text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
-    with StoreLock(path) as lock, ExitStack() as stack:
+    with store_lock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
         _require_coordinates(grid, path.parent)
         with _writing(path):
@@ -167,11 +167,6 @@ def _opened(
             f"{differences(made, numerics())}, so that last digits may differ; finish it with "
             "those versions, or choose another store"
         )
-    pending = root.attributes.get("extending")
-    if pending:
-        longer = SweepGrid(pending["record"], root.grid.chunks)
-        extend(path, root, longer, pending["attributes"])
-        root = read_root(path)
     old = root.grid.record
     if old == grid.record:
         written = [root.damage] if root.damage else []

@@ -270,7 +270,7 @@ def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
         "mu2, fast over slow": ratio(second[1], second[0]),
         "over plateau": (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau),
     }
-    quoted = {}
+    quoted: dict[str, float] = {}
     for name, mu1, mu2 in zip(SPEEDS, first, second, strict=True):
         reads |= {f"mu1, {name}": mu1, f"ratio, {name}": ratio(mu2, mu1)}
         quoted |= {

@@ -198,13 +198,3 @@ def test_a_quotient_and_its_uncertainty():
     value, sigma, true_value = ratio((2.0, 0.02, 2.1), (4.0, 0.04, 4.2))
     assert (value, true_value) == (0.5, 0.5)
     assert sigma == pytest.approx(0.5 * np.hypot(0.01, 0.01), rel=1e-12)
-
-
-def test_names_of_quantities_are_columns(experiment):
-    for rows in experiment.values():
-        assert all(f"{name}_uncertainty" in rows for name in QUANTITIES)
-
-
-def test_the_same_seeds_make_the_same_points(experiment):
-    shortest = min(all_series(), key=lambda series: len(experiment[series.name]))
-    pd.testing.assert_frame_equal(recordings._points(shortest), experiment[shortest.name])

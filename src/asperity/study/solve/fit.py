@@ -85,10 +85,10 @@ class FitSolve(SolveKind):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
-        super().settings(plan)
         table = _table(plan)
         free = _free(table)
-        if "M" in free and not _all_inertial(plan):
+        inertia = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
+        if "M" in free and not all(value in (True, "true", "yes", 1) for value in inertia):
             raise InputError(
                 "fit.free must be parameters of the model, got 'M', which has no influence without "
                 "inertia; add inertia = true to parameters or fix M"
@@ -158,18 +158,8 @@ def data_files(plan: Sweep) -> list[str]:
 
 
 def _table(plan: Sweep) -> FitTable:
-    if plan.fit is None:
-        raise InputError(
-            "fit must be given where solve is 'fit', got nothing; add the table [fit] with data "
-            "and free"
-        )
+    assert plan.fit is not None  # a plan has the settings of its solve
     return plan.fit
-
-
-def _all_inertial(plan: Sweep) -> bool:
-    """Whether every point of a plan includes inertia."""
-    values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
-    return all(value in (True, "true", "yes", 1) for value in values)
 
 
 def _known() -> dict[str, Parameter]:
@@ -315,16 +305,10 @@ def _numbers(fitted: Fit) -> dict[str, float]:
         ends = p.interval_95
         numbers |= {f"{name}_fit": p.value, f"{name}_se": p.se}
         numbers |= {f"{name}_low": ends[0], f"{name}_high": ends[1]}
-    return numbers | {
-        "chi2": fitted.chi2,
-        "dof": fitted.dof,
-        "p_value": fitted.p_value,
-        "log_likelihood": fitted.log_likelihood,
-        "aicc": fitted.aicc,
-        "undetermined": len(fitted.undetermined),
-        "other_minima": len(fitted.optima),
-        "warnings": len(fitted.warnings),
-    }
+    whole = ("chi2", "dof", "p_value", "log_likelihood", "aicc")
+    counted = {"undetermined": "undetermined", "other_minima": "optima", "warnings": "warnings"}
+    numbers |= {name: getattr(fitted, name) for name in whole}
+    return numbers | {name: len(getattr(fitted, field)) for name, field in counted.items()}
 
 
 def _simulated(
