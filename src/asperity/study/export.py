@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
@@ -68,6 +70,9 @@ def _netcdf(store: SweepStore, file: Path) -> int:
     dataset = dataset_of(store).drop_vars(OF_CHUNKS)
     texts = ("title", "source", "convention", "plan", "plan_text")
     dataset.attrs = {name: str(store.attributes.get(name, "")) for name in texts}
+    # CF: flags have the type of their variable.
+    flags = dataset["outcome"].attrs
+    flags["flag_values"] = np.array(flags["flag_values"], dtype=dataset["outcome"].dtype)
     chunks = {name: {"chunksizes": store.grid.chunks} for name in store.arrays}
     # One variable at a time is in memory.
     dataset.to_netcdf(file, engine="h5netcdf", encoding=chunks)
