@@ -193,9 +193,6 @@ def test_an_output_that_cannot_be_written(asperity, tmp_path: Path) -> None:
     refused(asperity(*call, "--out", table), "must be another file than the table")
     refused(asperity(*call, "--out", tmp_path / "no" / "o.csv"), "must lie in a folder that exists")
     refused(asperity(*call, "--out", table / "o.csv"), "out must")
-    (tmp_path / "o.csv.partial.json").mkdir()
-    refused(asperity(*call, "--out", tmp_path / "o.csv"), "leave room for 'o.csv.partial.json'")
-    (tmp_path / "o.csv.partial.json").rmdir()
     assert list(tmp_path.iterdir()) == [table]
 
 
@@ -226,7 +223,7 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
         ((*AIR, "--set", "R=1 cm", "--vacuum"), ["R must not be given with --vacuum"]),
         ((*AIR, "--inverse", "0.48"), ["--inverse and --for must be given together"]),
         ((*AIR, "--for", "gap"), ["--inverse and --for must be given together"]),
-        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be radius or gap"]),
+        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be one of radius, gap"]),
         ((*AIR, "--inverse", "0 %", "--for", "gap"), ["inverse.ratio must be positive"]),
         ((*AIR, "--inverse", "0.4", "--for", "gap", "--vacuum"), ["must have an air layer"]),
         ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),

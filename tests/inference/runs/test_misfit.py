@@ -24,7 +24,7 @@ def test_whiteness_tells_noise_from_a_line():
     correlated = lfilter([1.0], [1.0, -1.2, 0.5], steps)[500:]
     x = np.random.default_rng(2).normal(size=2000)
     assert whiteness([x], 0) > 0.01
-    line = 0.3 * np.cos(0.7 * np.arange(2000))
+    line = 0.5 * np.cos(0.7 * np.arange(2000))
     assert whiteness([x + line], 0) < 1e-6
     assert whiteness([correlated], 0) < 1e-6
 

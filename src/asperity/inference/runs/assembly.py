@@ -10,19 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
-from asperity.inference.runs.term import RunTerm, cut_delays
+from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
+from asperity.parameters.arguments import typed
 
 #: Kind of quantity of K, by the unit of the load.
 _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
@@ -33,11 +34,12 @@ USUAL_STIFFNESS = (5e2, 5e4)
 _SAMPLES_PER_PARAMETER = 8
 #: Of an air layer: its gap, the radius of the patch and the pressure, as users call them.
 _LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
-LINEAR = ("offset", "trend", "bend", "drift")
+Linear = Literal["offset", "trend", "bend", "drift"]
 #: Standard deviations of the departures of the initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
 
 
+@typed
 @dataclass(frozen=True)
 class RunOptions:
     """How recorded runs are compared with the motion.
@@ -59,21 +61,14 @@ class RunOptions:
         over blocks as short as their changes need.
     """
 
-    linear: tuple[str, ...] = ("offset", "trend")
-    initial: str = "steady"
+    linear: tuple[Linear, ...] = ("offset", "trend")
+    initial: Literal["steady", "free"] = "steady"
     gauge: tuple[int, float] | None = None
     order: int | None = None
     fit_rate: float | str | None = None
 
     def __post_init__(self) -> None:
         checked_rate(self.fit_rate)
-        for name in self.linear:
-            if name not in LINEAR:
-                raise InputError(
-                    f"linear must be of {', '.join(LINEAR)}, got '{name}'; {closest(name, LINEAR)}"
-                )
-        if self.initial not in ("steady", "free"):
-            raise InputError(f"initial must be steady or free, got '{self.initial}'; choose one")
 
 
 def stiffness(run: RecordedRun) -> Parameter:
@@ -323,10 +318,7 @@ def _initial(
         name = inner + suffix
         meaning = "departure of the initial state from steady sliding"
         parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
-        prior = Prior(0.0, sd, "wide")
-        result.append(
-            Unknown(parameter, False, sd, -10 * sd, 10 * sd, (0.0, 0.0), 0.0, prior, nuisance=True)
-        )
+        result.append(about_zero(parameter, sd, 10 * sd, "wide"))
         own[name] = inner
     return tuple(result), own
 
