@@ -29,9 +29,9 @@ _FORMATS = (".nc", ".csv", ".parquet")
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
     """Write a store to one file; the suffix of the file chooses the format.
 
-    NetCDF keeps the grid; points that are not computed have fill values. CSV and Parquet have a row
-    for each point of the chunks that are done: the columns of the axes, the outputs, ``outcome``
-    as a word, and ``detail``.
+    NetCDF keeps the grid; points that are not computed are NaN, their outcome -1. CSV and Parquet
+    have a row for each point of the chunks that are done: the columns of the axes, the outputs,
+    ``outcome`` as a word, and ``detail``.
 
     Parameters
     ----------
