@@ -84,13 +84,13 @@ def _sections(result: Design) -> list[Section]:
 
     plan = result.plan
     known = point_parameters(plan.truth.law)
-    axes = [a.name for a in plan.axes]
+    axes = list(plan.axes)
     rows = []
     for p in result.points:
         settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
         predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
         rows.append((*settings, str(p.readings), *predicted))
-    aim = f"to measure {', '.join(plan.measured)}"
+    aim = f"to measure {', '.join(plan.question.measure)}"
     if plan.rival is not None:
         aim = f"to exclude {plan.rival.law.name}"
     title = f"{plan.truth.law.name}: {result.readings} readings {aim}"
@@ -131,8 +131,8 @@ def _sections(result: Design) -> list[Section]:
         Section("parameters", head=head, rows=numbers),
         Section("", tuple(lines)),
     ]
-    if plan.budget.time is not None:
-        spent = f"time {result.spent:.4g} s of {plan.budget.time:.4g} s"
+    if plan.question.time is not None:
+        spent = f"time {result.spent:.4g} s of {plan.budget:.4g} s"
         sections.insert(1, Section("", (spent,)))
     if (s := result.simulation) is not None:
         decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"
