@@ -186,13 +186,9 @@ class Sweep(Point):
     def _settings_of_this_solve(self) -> Sweep:
         for name in ("transient", "fit"):
             wanted, given = self.solve == name, getattr(self, name) is not None
-            if wanted != given:
-                raise InputError(
-                    name,
-                    f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'",
-                    "a table" if given else "nothing",
-                    f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it",
-                )
+            rule = f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'"
+            advice = f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it"
+            require(wanted == given, name, rule, "a table" if given else "nothing", advice)
         return self
 
     @property
