@@ -43,7 +43,7 @@ from asperity.inference.design.shares import (
 )
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.objective import Minimum, Objective
-from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 
@@ -339,7 +339,8 @@ class _Task:
             theirs, nearest = rival[0].to(n), rival[1]
         for done in range(sets):
             self.report(done, sets, "synthetic sets")
-            drawn = noisy(readings, counts, random)
+            normal = random.normal(size=(readings.rows, len(OBSERVABLES)))
+            drawn = readings.disturbed(readings.values, normal / np.sqrt(counts)[:, None])
             shifted = tuple(_with_drawn_prior(unknown, random) for unknown in truth.unknowns)
             end = _refitted(replace(truth, unknowns=shifted), drawn, counts, u)
             other = None if rival is None else _refitted(theirs, drawn, counts, nearest)
@@ -390,32 +391,6 @@ def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
     low, high = np.quantile(copies, [0.158655, 0.841345], axis=-1)
     half = (high - low) / 2
     return float(half[0]), float(half[1:].std())
-
-
-def noisy(expected: LockInTable, readings: Float, random: np.random.Generator) -> LockInTable:
-    """Means of readings with normal noise; harmonics are disturbed in the complex plane."""
-    values, errors = dict(expected.values), dict(expected.errors)
-
-    def drawn() -> Float:
-        return random.normal(size=expected.rows) / np.sqrt(readings)
-
-    for name in values.keys() & {"mean_friction", "delta_mu"}:
-        values[name] = values[name] + errors[name] * drawn()
-    for n in (1, 2):
-        amplitude, phase = f"mu{n}", f"phase{n}"
-        if amplitude not in values:
-            continue
-        radial = errors[amplitude] * drawn()
-        if phase not in values:
-            values[amplitude] = values[amplitude] + radial
-            continue
-        across = values[amplitude] * errors[phase]
-        turned = values[amplitude] + radial + 1j * across * drawn()
-        values[amplitude] = np.abs(turned)
-        values[phase] = values[phase] + np.angle(turned)
-        # The uncertainty across is that of the noise, whatever the amplitude that was read.
-        errors[phase] = across / np.maximum(np.abs(turned), 1e-300)
-    return LockInTable(expected.name, expected.points, values, errors)
 
 
 def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
