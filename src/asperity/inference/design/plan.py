@@ -98,7 +98,7 @@ class DesignPlan:
     @property
     def budget(self) -> float:
         """What may be spent: a number of readings, or a time (s)."""
-        return float(self.question.points or self.question.time)
+        return float(self.question.points or self.question.time or 0.0)
 
     def cost(self, V: Float) -> Float:
         """What one reading costs at each velocity: 1, or settling_slip/V + integration (s)."""
