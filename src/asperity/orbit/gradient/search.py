@@ -24,10 +24,9 @@ from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
-from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
-from asperity.orbit.solution import Solution
+from asperity.orbit.solution import Solution, response_gap
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
@@ -271,6 +270,11 @@ def search_orbits(
 def _idle(_: int) -> None:
     """No report of progress."""
 
+
+# Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses
+# that move along the period with every parameter: Newton's method from a smooth guess does not find
+# them, and continuation takes seconds. The motion itself settles on them in a few periods, if they
+# are stable, as all are that can be measured.
 
 #: Number of periods of a transient, and the largest number of its steps.
 _PERIODS, _MOST_STEPS = 6, 2000

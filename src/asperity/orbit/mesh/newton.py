@@ -35,7 +35,7 @@ from asperity.orbit.mesh.equations import (
     transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit, equidistributed
-from asperity.orbit.observables import Observables
+from asperity.orbit.solution import Observables
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
@@ -205,7 +205,7 @@ def moved(orbit: Orbit, t: Float, change: Change, length: Float) -> tuple[Orbit,
     nodes = orbit.nodes + length * change.nodes
     centre = orbit.centre + nodes[:, 0]
     slopes = orbit.slopes + length * change.slopes
-    return orbit.moved(centre=centre, nodes=nodes - nodes[:, :1], slopes=slopes), (
+    return orbit._replace(centre=centre, nodes=nodes - nodes[:, :1], slopes=slopes), (
         t + length * change.t
     )
 

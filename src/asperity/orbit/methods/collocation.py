@@ -19,9 +19,15 @@ from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.mesh.equations import VANISHING_GROWTH, read_orbit, split_observables
 from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, MESHES, refined_orbit, remeshed, solve
-from asperity.orbit.observables import Observables, response_gap, waveform
 from asperity.orbit.outcome import Outcome
-from asperity.orbit.solution import Method, SearchOptions, Solution
+from asperity.orbit.solution import (
+    Method,
+    Observables,
+    SearchOptions,
+    Solution,
+    response_gap,
+    waveform,
+)
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.averaged import averaged_limit
@@ -211,7 +217,7 @@ def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
     size, points = centre.shape
     bare = Orbit.empty(GAUSS, size, FIRST_MESH, points)
     mesh = graded_mesh(FIRST_MESH, points, _GRADING)
-    guess = bare.moved(mesh=mesh, centre=centre)
+    guess = bare._replace(mesh=mesh, centre=centre)
     result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS)
     if not isinstance(system, QuasiStatic):
         result = solve(problem, inertial_guess(problem, result.orbit), _NEWTON_STEPS)
