@@ -83,7 +83,7 @@ def test_any_start_ends(law):
 def test_any_start_ends_with_inertia_or_damping(law, options):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD, **options).states[0]
-    for states in starts(len(steady), 12, 7, steady):
+    for states in starts(len(steady), 6, 7, steady):
         assert_ended(slider, HOLD, initial=states, most_steps=1e5, **options)
 
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from asperity.cli.report import Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
-from asperity.errors import InputError
-from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
+from asperity.errors import InputError, require
+from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -33,8 +34,7 @@ class Count(click.ParamType):
             return int(value)
         except ValueError:
             option = "" if param is None else param.opts[0]
-            rule = "be a whole number"
-            raise InputError(option, rule, f"'{value}'", "correct the value") from None
+            raise InputError(option, "be a whole number", f"'{value}'", "correct it") from None
 
 
 class FieldOption(click.Option):
@@ -104,24 +104,34 @@ def set_option(
     )
 
 
-def json_option() -> Decorator:
-    """``--json``."""
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def output_options(*, plot: bool = False) -> Decorator:
+    """``--json``, ``--names`` and, with a figure, ``--plot``; the command gets `output`."""
+
+    def with_options(command: Command) -> Command:
+        @wraps(command)
+        def gathered(
+            *, as_json: bool, names: Names, plot: Path | None = None, **others: Any
+        ) -> Any:
+            return command(output=Output(as_json, names, plot), **others)
+
+        result: Command = gathered
+        for option in reversed(_OUTPUT if plot else _OUTPUT[1:]):
+            result = option(result)
+        return result
+
+    return with_options
 
 
-def names_option() -> Decorator:
-    """``--names``."""
-    return click.option(
+_OUTPUT = (
+    click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes."),
+    click.option(
         "--names",
         type=click.Choice(NAMES),
         default=NAMES[0],
         help="Names on screen and in figures: A, B, D0, K/W0, or geophysics: a, b, D_c, k/sigma_n.",
-    )
-
-
-def plot_option() -> Decorator:
-    """``--plot``."""
-    return click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
+)
 
 
 def point_options(command: Command) -> Command:
@@ -176,10 +186,8 @@ def law_options(default: str | None = None) -> Decorator:
     def with_options(command: Command) -> Command:
         @wraps(command)
         def gathered(*, laws: tuple[str, ...], listed: str | None, **others: Any) -> Any:
-            if laws and listed is not None:
-                raise InputError(
-                    "--law must go without --laws, got both; they say the same, leave one out"
-                )
+            once = not laws or listed is None
+            require(once, "--law", "go without --laws", "both", "they say the same, leave one out")
             if not laws:
                 texts = (listed or default or "").split(",")
                 laws = tuple(known_place(text.strip()) for text in texts if text.strip())
@@ -241,10 +249,8 @@ def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
     result: dict[str, str] = {}
     for pair in pairs:
         name, _, value = (part.strip() for part in pair.partition("="))
-        if not name or not value:
-            raise InputError(
-                f"{option} must be NAME=VALUE, got '{pair}'; write it like {option} \"K=0.2 N/um\""
-            )
+        like = f'write it like {option} "K=0.2 N/um"'
+        require(name and value, option, "be NAME=VALUE", f"'{pair}'", like)
         add_setting(result, name, value)
     return result
 
@@ -253,10 +259,8 @@ def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
     """Add a value that another option gives, if it does; twice the same name is an error."""
     if value is None:
         return
-    if name in settings:
-        raise InputError(
-            f"{name} must be given once, got '{settings[name]}' and '{value}'; leave one out"
-        )
+    twice = f"'{settings.get(name)}' and '{value}'"
+    require(name not in settings, name, "be given once", twice, "leave one out")
     settings[name] = value
 
 

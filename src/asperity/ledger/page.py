@@ -20,6 +20,7 @@ from asperity.materials import Number, citation
 
 if TYPE_CHECKING:
     from asperity.ledger.contents import About, SummaryWords
+    from asperity.ledger.figures import PaperFigure
     from asperity.ledger.paper import Paper
 
 #: Verdicts in the order of the page, with the sign and the meaning of each.
@@ -42,11 +43,7 @@ KIND_TEXTS: Mapping[str, str] = {
 class Plate:
     """A figure as the page shows it, and its files."""
 
-    name: str
-    place: str
-    title: str
-    caption: str
-    alt: str
+    figure: PaperFigure
     png: Path
     files: Sequence[str]
 
@@ -154,10 +151,11 @@ def _chip(kind: str, sign: str, word: str) -> str:
 
 def _figure(plate: Plate) -> str:
     links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in plate.files)
+    shown = plate.figure
     return (
-        f'<figure id="{plate.name}">{embedded_png(plate.png, plate.alt)}'
-        f'<figcaption><p class="kicker">{plate.place}</p><h3>{rich(plate.title)}</h3>'
-        f'<p>{rich(plate.caption)}</p><p class="files">{links}</p></figcaption></figure>'
+        f'<figure id="{shown.name}">{embedded_png(plate.png, shown.alt)}'
+        f'<figcaption><p class="kicker">{shown.place}</p><h3>{rich(shown.title)}</h3>'
+        f'<p>{rich(shown.caption)}</p><p class="files">{links}</p></figcaption></figure>'
     )
 
 

@@ -295,16 +295,30 @@ def _measured(
     pauses = [rates[0]] if rates[0] else []
     if before and after:
         pauses.append(rate_between(before[0], after[0]))
+    load_values = samples.load[cut]
+    steady_force = reading.without_settling(time, force_values)
+    sides = [side[0] if side else None for side in (before, after)]
     answers = (
-        *_asked(
-            reading,
-            time,
-            samples.load[cut],
-            reading.without_settling(time, force_values),
-            checks.transient(reading, chosen_by, pauses),
-        ),
-        *_about_the_instrument(reading, samples, parts, cut),
-        checks.drift(reading, *(b[0] if b else None for b in (before, after))),
+        checks.modulation(reading),
+        checks.periods(reading),
+        checks.signal(reading),
+        checks.contact(reading),
+        checks.friction(reading),
+        steadiness.leakage(reading),
+        steadiness.steady_load(reading, time, load_values),
+        steadiness.steady_response(reading),
+        checks.transient(reading, chosen_by, pauses),
+        checks.stick_slip(reading, time, steady_force),
+        checks.load_harmonics(reading),
+        checks.resolution(reading, load_values, steady_force),
+        *instrument.made_force(reading, samples, time, load_values, force_values),
+        instrument.held_samples(reading, load_values, force_values),
+        instrument.flat_top(reading, time, load_values, force_values),
+        instrument.mains(reading, samples, parts),
+        *instrument.lines_in_the_pauses(reading, samples, parts),
+        instrument.hum(reading, time, force_values),
+        steadiness.shifting_response(reading, time, force_values),
+        checks.drift(reading, *sides),
         *checks.findings(
             about_window(samples, float(time[0]), float(time[-1])),
             time.size,
@@ -328,46 +342,6 @@ def _measured(
         samples=samples,
         window=(first, stop),
         chosen_by=chosen_by,
-    )
-
-
-def _asked(
-    reading: LockInReading, time: Array, load: Array, force: Array, transient: Check
-) -> tuple[Check, ...]:
-    """What is asked of every window; the force is that without its settling."""
-    rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
-    return (
-        checks.modulation(reading),
-        checks.periods(reading),
-        checks.signal(reading),
-        checks.contact(reading),
-        checks.friction(reading),
-        checks.response(reading),
-        checks.aliasing(reading, rate),
-        steadiness.leakage(reading),
-        steadiness.steady_load(reading, time, load),
-        steadiness.steady_force(reading, time, force),
-        steadiness.steady_response(reading),
-        transient,
-        checks.stick_slip(reading, time, force),
-        checks.load_harmonics(reading),
-        checks.resolution(reading, load, force),
-    )
-
-
-def _about_the_instrument(
-    reading: LockInReading, samples: Samples, parts: list[LoadInterval], cut: slice
-) -> tuple[Check, ...]:
-    time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
-    return (
-        *instrument.made_force(reading, samples, time, load, force),
-        instrument.held_samples(reading, load, force),
-        instrument.dropouts(load, force),
-        instrument.flat_top(reading, time, load, force),
-        instrument.mains(reading, samples, parts),
-        *instrument.lines_in_the_pauses(reading, samples, parts),
-        instrument.hum(reading, time, force),
-        steadiness.shifting_response(reading, time, force),
     )
 
 

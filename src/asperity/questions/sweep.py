@@ -187,6 +187,19 @@ class Sweep(Point):
     fit: FitTable | None = None
     title: str = ""
 
+    @model_validator(mode="after")
+    def _settings_of_this_solve(self) -> Sweep:
+        for name in ("transient", "fit"):
+            wanted, given = self.solve == name, getattr(self, name) is not None
+            if wanted != given:
+                raise InputError(
+                    name,
+                    f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'",
+                    "a table" if given else "nothing",
+                    f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it",
+                )
+        return self
+
     @property
     def columns(self) -> dict[str, tuple[Any, ...]]:
         """Columns of the axes as the plan writes them; drawn columns have no values."""

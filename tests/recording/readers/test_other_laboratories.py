@@ -201,14 +201,6 @@ def test_a_quote_without_end_is_one_sentence(tmp_path):
         read(written(tmp_path, "".join(lines)))
 
 
-def test_blanks_where_a_row_should_be_are_named(tmp_path):
-    aligned = " Time(s)  Load(N)  Shear(N)\n" + "".join(
-        f"{t:8.4f}{w:12.3f}{f:12.3f}\n" for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
-    )
-    (found,) = read(written(tmp_path, aligned + "  ")).findings
-    assert (found.name, found.severity) == ("truncated", "warning")
-
-
 def matlab():
     """A file that is not compressed, with numbers, texts, a cell and a struct."""
     file = io.BytesIO()

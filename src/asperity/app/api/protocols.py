@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.laws import registered
 from asperity.materials.loader import packaged
 from asperity.outputs import size_text
@@ -105,14 +105,10 @@ def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
 
 
 def _check_size(protocol: Protocol) -> None:
-    if protocol.rows is None:
-        return
-    size = protocol.rows * protocol.row_bytes
-    if size > _LARGEST_MOTION:
-        raise InputError(
-            f"solver.sampling must leave at most {size_text(_LARGEST_MOTION)} of motion for the "
-            f"page, got {size_text(size)}; lower it, shorten the steps, or use asperity run"
-        )
+    size = (protocol.rows or 0) * protocol.row_bytes
+    rule = f"leave at most {size_text(_LARGEST_MOTION)} of motion for the page"
+    advice = "lower it, shorten the steps, or use asperity run"
+    require(size <= _LARGEST_MOTION, "solver.sampling", rule, size_text(size), advice)
 
 
 def _files_named(content: dict[str, Any], lines: dict[str, int]) -> Iterator[Mistake]:

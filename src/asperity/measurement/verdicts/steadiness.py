@@ -27,7 +27,6 @@ LIMITS: dict[str, tuple[float, float]] = {
     "leakage": (0.01, 0.1),
     "steady response": (0.05, 0.5),
     "steady load": (0.01, 0.05),
-    "steady force": (0.002, 0.02),
     "shifting response": (0.07, 0.4),
 }
 
@@ -136,7 +135,7 @@ def steady_response(reading: LockInReading) -> Check:
 
 def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
     """Whether the load's mean stays where it is."""
-    slow, seen = _wander(reading, time, load, 0)
+    slow, seen = _wander(reading, time, load)
     drift = float(reading.drift[0].sum())
     number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
     motion = "drifts" if abs(drift) > slow else "wanders"
@@ -147,20 +146,6 @@ def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
         LIMITS["steady load"],
         f"the mean load {motion} by {percent(number)} in the window, apart from its modulation",
         significant=significant,
-    )
-
-
-def steady_force(reading: LockInReading, time: Array, force: Array) -> Check:
-    """Whether the force is steady apart from drift and harmonics, be it stick-slip or not."""
-    slow, seen = _wander(reading, time, force, 1)
-    number = slow / max(abs(reading.mean_force), 1e-300)
-    return judged(
-        "steady force",
-        number,
-        LIMITS["steady force"],
-        f"slower than the modulation, the force wanders by {percent(number)} of its mean about "
-        "the fitted drift",
-        significant=seen,
     )
 
 
@@ -182,13 +167,13 @@ def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[fl
     return number, float(power[near].mean() / max(float(power[~near].mean()), 1e-300))
 
 
-def _wander(reading: LockInReading, time: Array, values: Array, channel: int) -> tuple[float, bool]:
-    """Amplitude of what is slower than the modulation, and whether noise does not explain it."""
-    white = float(reading.noise.spectra[1, channel, channel].real)
-    count, sums = reading.blocks.count, reading.residual[:, 0, channel].real
+def _wander(reading: LockInReading, time: Array, load: Array) -> tuple[float, bool]:
+    """Amplitude of slow motion of the load, and whether noise does not explain it."""
+    white = float(reading.noise.spectra[1, 0, 0].real)
+    count, sums = reading.blocks.count, reading.residual[:, 0, 0].real
     # Each block with its samples: a short one at the end says little.
     series = [(sums / count, count)]
-    at, left = left_of_piece(reading, time, values)
+    at, left = left_of_piece(reading, time, load)
     # Half a period keeps what is slower, and of the modulation nothing is left to keep.
     span = float(time[at][-1] - time[at][0])
     blocks = int(min(left.size, max(8, 2 * reading.frequency * span)))

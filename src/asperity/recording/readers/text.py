@@ -8,7 +8,6 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
-import json
 import re
 import warnings
 from dataclasses import dataclass
@@ -32,6 +31,8 @@ _HEADS = (1 << 16, 1 << 22)
 _BUFFER = 1 << 20
 #: Smallest number of complete lines from which the layout is determined.
 _FEWEST_LINES = 8
+#: Beginning of JSON; headings in brackets begin with a letter.
+_JSON = re.compile(r"\{|\[\s*[-\d\[{\"]")
 _SKIPPED = re.compile(r"line (\d+)")
 _GZIP = b"\x1f\x8b"
 _ARCHIVES = {
@@ -101,20 +102,7 @@ def _document(head: bytes) -> str:
     text = head.decode("utf-8-sig", errors="replace").lstrip()
     if text.startswith(("<?xml", "<!DOCTYPE", "<!doctype", "<html", "<HTML", "<svg")):
         return "XML or HTML"
-    return "JSON" if text.startswith(("{", "[")) and _is_json(text) else ""
-
-
-def _is_json(text: str) -> bool:
-    """Whether the beginning of a text is that of JSON, which may be cut."""
-    try:
-        json.JSONDecoder().raw_decode(text)
-    except json.JSONDecodeError as error:
-        # Where only the cut is wrong, the rest is JSON; headings in brackets fail at once.
-        return error.pos > 0.9 * len(text) or "Unterminated" in error.msg
-    except RecursionError:  # deeply nested brackets
-        return True
-    # Values one after the other, a line each; "[1], [2]" is a heading.
-    return text.startswith("{") or text.rstrip().endswith("]")
+    return "JSON" if _JSON.match(text) else ""
 
 
 def _wide_order(head: bytes) -> str:
@@ -220,6 +208,8 @@ def _mismatch(layout: Layout) -> Finding:
     others = (
         f"columns {count} to {width - 1} have no name"
         if count < width
+        else "the last name belongs to no column"
+        if count == width + 1
         else f"the last {count - width} names belong to no column"
     )
     return Finding(
@@ -364,12 +354,8 @@ def _ending_of(file: BinaryIO, size: int, layout: Layout) -> _Ending:
     padded = len(tail) - len(tail.rstrip(b"\0"))
     tail = tail.rstrip(b"\0\x1a")
     stop = begin + len(tail)
-    every = lines_of(tail, begin)
-    lines = [line for line in every if not line.blank]
+    lines = [line for line in lines_of(tail, begin) if not line.blank]
     if not lines or (lines[-1].ended and not padded):
-        indented = bool(lines) and lines[-1].text[:1] == " "
-        if indented and every[-1].blank and not every[-1].ended:
-            return _Ending(stop, 0, "it ends with the blanks that its rows begin with.", sure=False)
         return _Ending(stop)
     last = lines[-1]
     if padded and last.ended:
