@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 
 from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
-from asperity.orbit.floquet import AGREEMENT
+from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
+from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
-from asperity.orbit.solution import Solution, response_gap
+from asperity.orbit.solution import Solution
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
@@ -56,7 +57,8 @@ class MeshOrbits(NamedTuple):
     mean_friction : array, shape (points,)
     harmonics : complex array, shape (count, points)
     log_multipliers : complex array, shape (states, points)
-        Without states after a direct search, which does not resolve them.
+        As `sorted_logs` sorts them; without states after a direct search, which does not resolve
+        them.
     """
 
     orbit: Orbit
@@ -237,6 +239,7 @@ def search_orbits(
         rows = np.flatnonzero(solved)
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
+            logs = np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
             result.add(index[some], orbits._replace(log_multipliers=logs))
         return result
 

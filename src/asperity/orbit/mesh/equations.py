@@ -30,7 +30,7 @@ from asperity.algebra.small_systems import (
 )
 from asperity.loads import Excitation
 from asperity.orbit.mesh.mesh import STAGES, Orbit, split
-from asperity.orbit.solution import Observables
+from asperity.orbit.observables import Observables
 from asperity.slider.pointwise import PointValues, excitation_at, slopes_along, values_at
 from asperity.slider.problem import Problem
 

@@ -35,7 +35,7 @@ from asperity.orbit.mesh.equations import (
     transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit, equidistributed
-from asperity.orbit.solution import Observables
+from asperity.orbit.observables import Observables
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem

@@ -19,15 +19,9 @@ from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.mesh.equations import VANISHING_GROWTH, read_orbit, split_observables
 from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, MESHES, refined_orbit, remeshed, solve
+from asperity.orbit.observables import Observables, response_gap, waveform
 from asperity.orbit.outcome import Outcome
-from asperity.orbit.solution import (
-    Method,
-    Observables,
-    SearchOptions,
-    Solution,
-    response_gap,
-    waveform,
-)
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.averaged import averaged_limit

@@ -39,7 +39,8 @@ from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
 from asperity.orbit.mesh.mesh import eccentric_phase
-from asperity.orbit.solution import Method, Observables, SearchOptions, Solution, waveform
+from asperity.orbit.observables import Observables, waveform
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem

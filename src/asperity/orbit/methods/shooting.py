@@ -42,15 +42,8 @@ from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import Indices, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
-from asperity.orbit.solution import (
-    Float,
-    Method,
-    Observables,
-    SearchOptions,
-    Solution,
-    response_gap,
-    waveform_of,
-)
+from asperity.orbit.observables import Observables, response_gap, waveform_of
+from asperity.orbit.solution import Float, Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases

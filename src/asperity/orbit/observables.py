@@ -1,0 +1,126 @@
+"""Observables of periodic orbits, common to all methods."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
+from asperity.slider.pointwise import excitation_at, values_at
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import even_phases
+
+#: Shares of the first harmonic and of the mean whose round-off a harmonic may have.
+_SMALL_HARMONIC, _SMALL_MEAN = 5e-8, 5e-11
+
+
+class Observables(NamedTuple):
+    """Mean, harmonics and monodromy matrix of orbits; F/W0 = mean + sum Re(c_n e^{i n theta}).
+
+    Attributes
+    ----------
+    mean_friction : array, shape (points,)
+        Mean of F/W0.
+    harmonics : complex array, shape (count, points)
+        c_1, c_2, ...
+    monodromy : array, shape (size, size, points)
+        The monodromy matrix over exp(`log_scale`); of no meaning where `exponent` is known.
+    log_scale : array, shape (points,)
+    log_determinant : array, shape (points,)
+        Logarithm of the determinant of the monodromy matrix: the integral of the trace of the
+        Jacobian (Liouville), free of cancellation.
+    exponent : array, shape (size, size, points)
+        A matrix whose exponential is the monodromy matrix; NaN where it is not known.
+    growth : array, shape (points,)
+        Integral of the largest real part of the eigenvalues of the Jacobian; inf where it was not
+        computed.
+    start : array, shape (size, points)
+        States at theta = 0.
+    """
+
+    mean_friction: Array
+    harmonics: Array
+    monodromy: Array
+    log_scale: Array
+    log_determinant: Array
+    exponent: Array
+    growth: Array
+    start: Array
+
+    @property
+    def numbers(self) -> NDArray[np.complex128]:
+        """Mean, then harmonics, shape (1 + count, points)."""
+        return np.concatenate([np.asarray(self.mean_friction)[None], self.harmonics])
+
+    @property
+    def log_multipliers(self) -> NDArray[np.complex128]:
+        """Logarithms of the Floquet multipliers by falling modulus, shape (size, points)."""
+        monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
+        logs = np.empty(monodromy.shape[1:], complex)
+        # Of multipliers near 1 a matrix of their logarithms keeps more digits.
+        known = np.isfinite(exponent).all((0, 1))
+        logs[:, known] = log_multipliers_of_exponent(exponent[..., known], log_determinant[known])
+        others = monodromy[..., ~known], log_scale[~known], log_determinant[~known]
+        logs[:, ~known] = log_multipliers(*others)
+        return logs
+
+
+def response_gap(
+    before: NDArray[np.complex128], now: NDArray[np.complex128], *, each: int = 2
+) -> NDArray[np.float64]:
+    """Largest relative difference of mean and harmonics, shape (points,); inf where not finite.
+
+    Parameters
+    ----------
+    before, now : complex array, shape (1 + count, points)
+        Mean, then harmonics.
+    each : int
+        Number of harmonics that are compared relative to themselves; higher ones relative to the
+        first. Those that vanish relative to the first, or to the mean, are compared up to
+        round-off.
+    """
+    with np.errstate(all="ignore"):
+        mean, first = np.abs(now[0]), np.abs(now[1])
+        scale = np.abs(now) + _SMALL_HARMONIC * first + _SMALL_MEAN * mean
+        scale[0], scale[1 + each :] = mean, scale[1]
+        gap = (np.abs(now - before) / scale).max(0)
+    return np.where(np.isfinite(gap), gap, np.inf)
+
+
+class PeriodicOrbit(Protocol):
+    """Interface of an orbit, independent of its representation.
+
+    There are two representations. `FourierOrbit` keeps the mean of each state and its zero-mean
+    part on a grid separately, so that a zero-mean part of 1e-9 of the mean keeps its digits;
+    hundreds of points fit into the cache of a core. `Orbit` has polynomials on a separate mesh for
+    every point, with fine intervals where the orbit is steep; the monodromy matrix follows from its
+    equations. Replacing one by the other would lose digits or range. Code outside of the methods
+    works with either.
+    """
+
+    @property
+    def start(self) -> Array:
+        """States at theta = 0, shape (size, points)."""
+        ...
+
+    def states(self, theta: np.ndarray) -> Array:
+        """States at the phases `theta`, a column: shape (size, phases, points)."""
+        ...
+
+
+def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> NDArray[np.float64]:
+    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
+    theta = even_phases(phases)
+    return waveform_of(problem, orbit.states(theta), theta)
+
+
+def waveform_of(
+    problem: Problem, Y: NDArray[np.float64], theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """F/W0 and ln(v_pl/V) of the states `Y`, (size, phases, points), at the phases `theta`."""
+    at = excitation_at(problem.load, theta * np.ones(Y.shape[2]))
+    values = values_at(problem.system, at, np.zeros_like(Y[:, 0]), Y)
+    return np.stack([values.force, values.log_slip])
