@@ -217,7 +217,7 @@ def fit(
     minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
     agreed = True
     if minima and recordings:
-        minima, agreed = with_noise(objective, minima)
+        minima, agreed = with_noise(objective, minima, searched)
     if not minima or not math.isfinite(minima[0][1]):
         return failed_fit(objective)
     if recordings:

@@ -17,8 +17,10 @@ Float = NDArray[np.float64]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
-#: Minima of the search that are nearer than so many standard deviations are followed as one.
+#: Starts that are nearer than so many standard deviations are followed as one.
 _ONE_END = 1.0
+#: Standard deviations of the parameters within which two starts lead to the same minimum.
+_ALLOWED = 5.0
 #: Relative change of the coordinates that ends the way to a minimum of the search.
 _COARSE = 1e-4
 
@@ -29,12 +31,16 @@ def under_drift(objective: Objective) -> Objective:
     return replace(objective, terms=tuple(terms), tolerance=_COARSE)
 
 
-def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimum], bool]:
+def with_noise(
+    objective: Objective, minima: list[Minimum], searched: Objective
+) -> tuple[list[Minimum], bool]:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    Each is followed under the noise that its own residual shows. They are compared by the
-    likelihood, noise included: under the noise of one, which holds its misfit, another is no
-    minimum. The objective takes the noise of the best.
+    From each of the `minima` of `searched`, the objective under a drift, the way goes by that under
+    white noise, and straight on too where the drift does not allow that one. Each is followed under
+    the noise that its own residual shows. They are compared by the likelihood, noise included:
+    under the noise of one, which holds its misfit, another is no minimum. The objective takes the
+    noise of the best.
 
     Returns
     -------
@@ -43,7 +49,13 @@ def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimu
         higher as twice the logarithm of their likelihood is lower.
     bool
     """
-    ends = [_with_own_noise(objective, u) for u in _apart(objective, minima)]
+    starts: list[Float] = []
+    for u, value in minima:
+        white = objective.minimise(u).u
+        # Chi-squared of a drift says how large it is: noise has one a sample.
+        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        starts += [white] if searched.chi2(white) <= allowed else [u, white]
+    ends = [_with_own_noise(objective, u) for u in _apart(objective, starts)]
     ends.sort(key=lambda end: end.deviance)
     best = ends[0]
     objective.terms = best.objective.terms
@@ -57,10 +69,10 @@ def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimu
     return [Minimum(best.u, chi2), *others], best.agreed
 
 
-def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
-    """Minima without those that the data hardly tell from an earlier one: both lead to one end."""
+def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
+    """Starts without those that the data hardly tell from an earlier one: both lead to one end."""
     kept: list[Float] = []
-    for u, _ in minima:
+    for u in starts:
         _, jacobian = objective.residuals(u)
         if all(float(np.linalg.norm(jacobian @ (u - other))) > _ONE_END for other in kept):
             kept.append(u)
