@@ -222,7 +222,7 @@ def read_table(
         n: _numbers(shown, n, column) for n, column in texts.items() if n not in _TEXTS
     }
     if _UNIT in texts and "W0" in columns:
-        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT])
+        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT].tolist())
     run = next((texts[n].tolist() for n in _RUN if n in texts), None)
     table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
     return replace(table, row_names=np.array([f"row {i + 1}" for i in np.flatnonzero(kept)]))
