@@ -162,17 +162,18 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array]:
         quarter = (peak[1:] - trough[:-1]) // 4
         _, _, rate[1:] = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
         rate[0] = rate[1]
-    bounds = peak, trough, first, stop, np.maximum(rate, 0.0)
+    bounds, rate = (peak, trough, first, stop), np.maximum(rate, 0.0)
     large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
     shape, shift = _shape(
         sums,
         large,
         [b[large] for b in bounds],
+        rate[large],
         drop[large],
         lambda samples: _of_mean(falls.scatter, samples) / drop[large],
     )
     parts = [
-        _onset_and_end(sums, part, *(b[part] for b in bounds), shape=shape)
+        _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
         for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
     ]
     onset, end, squares, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
@@ -198,8 +199,8 @@ def _onset_and_end(
     trough: Index,
     first: Index,
     stop: Index,
-    rate: Array,
     *,
+    rate: Array,
     shape: _Shape,
 ) -> tuple[Array, Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in.
@@ -318,7 +319,8 @@ _CLEAR = 3.0
 def _shape(
     sums: _Sums,
     part: Index,
-    bounds: list[Array],
+    bounds: list[Index],
+    rate: Array,
     drop: Array,
     noise: Callable[[Array], Array],
 ) -> tuple[_Shape, float]:
@@ -332,7 +334,7 @@ def _shape(
     any shape. A fall between two shapes, by a share x from one, has residuals in proportion to x of
     the one and to 1 - x of the other: x of the distance between their onsets is the error.
     """
-    fits = [_onset_and_end(sums, part, *bounds, shape=shape) for shape in _SHAPES]
+    fits = [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
     squares = np.array([fit[2] for fit in fits])
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
