@@ -20,14 +20,11 @@ import jax
 import numpy as np
 
 from asperity.orbit import Outcome
-from asperity.orbit import multipliers as multiplier_resolution
 from asperity.orbit.batches import take
-from asperity.orbit.methods import series
-from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES, BranchFollowing
-from asperity.orbit.methods.collocation import method as collocation
-from asperity.orbit.methods.method import Method
+from asperity.orbit.methods import collocation, series
+from asperity.orbit.methods.branch_following import MESHES, BranchFollowing
 from asperity.orbit.search import METHODS, find_orbits
-from asperity.orbit.solution import Solution
+from asperity.orbit.solution import Method, Solution
 from asperity.slider.problem import Problem
 from benchmarks.residual import LAWS, draw, problem_of
 
@@ -71,19 +68,18 @@ STAGES = (
     Stage("branch following", _finished_by("branch following"), _without("branch following")),
     Stage(
         f"the same on {MESHES[1].intervals} intervals",
-        _finished_by("branch following", "frequency path"),
+        _finished_by("branch following"),
         _coarse_branches(),
     ),
-    Stage("frequency path", _finished_by("frequency path"), _without("frequency path")),
     Stage(
         f"refinement to {collocation.MESHES[-1]} intervals",
         lambda s: s.converged & (s.iterations == collocation.MESHES[-1]),
         constant=(collocation, "MESHES", collocation.MESHES[:-1]),
     ),
     Stage(
-        "transfer maps of one interval after the other",
+        "finer transfer maps",
         _finished_by("series"),
-        constant=(multiplier_resolution, "_MOST_INTERVALS", 0),
+        constant=(collocation, "_MOST_INTERVALS", 0),
     ),
 )
 

@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 import asperity as asp
-from asperity.orbit.methods.shooting.method import averaged_start
+from asperity.orbit.methods.shooting import averaged_start
 from asperity.slider.problem import checked_problem, flatten
 from benchmarks.cases import FREQUENCY, Batch, batch
 from benchmarks.clock import pin_to_one_core, timed

@@ -117,6 +117,21 @@ class InputError(ValueError):
         return type(self)(self.field, self.rule, self.got, self.advice + addition)
 
 
+def require(
+    holds: object, field: str | Argument, rule: str, got: object = "", advice: str = ""
+) -> None:
+    """Raise an `InputError` of these parts unless a condition holds.
+
+    Parameters
+    ----------
+    holds : bool, or an object that is true
+    field, rule, got, advice
+        As of `InputError`.
+    """
+    if not holds:
+        raise InputError(field, rule, got, advice)
+
+
 class InputTypeError(InputError, TypeError):
     """An argument of another type than its annotation says."""
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulated import lowest_load, modulated
 from asperity.materials import load_from
@@ -86,8 +86,7 @@ def sourced_numbers(
     for written, value in given.items():
         field = Argument(f"{place}.{written}") if place else Argument("numbers", key=written)
         name = known_name(written, known, field)
-        if name in numbers:
-            raise InputError(field, "be given once", f"{name} too", "leave one out")
+        require(name not in numbers, field, "be given once", f"{name} too", "leave one out")
         if isinstance(value, SourcedNumber):
             numbers[name] = value
             continue
@@ -95,8 +94,8 @@ def sourced_numbers(
             result = known[name].check(value)
         except InputError as error:
             raise error.about(field) from None
-        if np.ndim(result):
-            raise InputError(field, "be one number", shown(value), "give a single value")
+        one = not np.ndim(result)
+        require(one, field, "be one number", shown(value), "give a single value")
         numbers[name] = SourcedNumber(float(result), origin)
     if material is None:
         return numbers
@@ -147,12 +146,9 @@ def numbers_for(
     if missing:
         name, example = missing[0], known[missing[0]].example
         like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
-        raise InputError(
-            law_name,
-            "have all its numbers",
-            f"none for {', '.join(missing)}",
-            f"name a material that has them or give each one, like {like}",
-        )
+        advice = f"name a material that has them or give each one, like {like}"
+        got = f"none for {', '.join(missing)}"
+        raise InputError(law_name, "have all its numbers", got, advice)
     return {name: numbers[name] for name in known if name in numbers}
 
 
@@ -163,13 +159,9 @@ def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:
         owners = [
             n for n, law in registered().items() if canonical_name(name, point_parameters(law))
         ]
-        if canonical_name(name, own) is None and owners:
-            raise InputError(
-                law_name,
-                "be given its own parameters",
-                f"'{name}', which belongs to {', '.join(owners)}",
-                "leave it out or choose another law",
-            )
+        foreign, got = bool(owners), f"'{name}', which belongs to {', '.join(owners)}"
+        known, advice = canonical_name(name, own), "leave it out or choose another law"
+        require(known or not foreign, law_name, "be given its own parameters", got, advice)
 
 
 def point_numbers(
@@ -197,23 +189,20 @@ def point_numbers(
         If law or material are unknown, a name belongs to other laws or to nothing, or a number is
         missing or breaks its rule.
     """
-    offered = offered_numbers(point, origin, among, place)
+    offered = offered_numbers(point, origin, place)
+    for name in point.parameters if place and among is not None else ():
+        known_name(name, among or {}, f"{place}.{name}")
     return numbers_for(point.law, offered, among, needed, place)
 
 
 def offered_numbers(
-    point: Point,
-    origin: str = "given",
-    among: Mapping[str, Parameter] | None = None,
-    place: str = "",
+    point: Point, origin: str = "given", place: str = ""
 ) -> dict[str, SourcedNumber]:
     """Numbers of a point of which some come from elsewhere; arguments as of `point_numbers`."""
     if not point.law:
         advice = f"choose one of {', '.join(sorted(registered()))}"
         raise InputError("law", "be given", "nothing", advice)
     refuse_foreign(point.law, point.parameters)
-    for name in point.parameters if place and among is not None else ():
-        known_name(name, among or {}, f"{place}.{name}")
     return sourced_numbers(point.parameters, material_of(point), origin, point.law, place)
 
 

@@ -165,10 +165,10 @@ def test_shear_viscosity_ratio_from_its_definition():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"P0": 0.0}, "AirLayer.P0 must be finite and positive, got 0 Pa; .* or no layer"),
-        ({"h0": -6.5e-6}, "AirLayer.h0 must be finite and positive, got -6.5e-06 m;"),
-        ({"eta": np.inf}, "AirLayer.eta must be finite and positive, got inf Pa s;"),
-        ({"R": [1e-2, np.nan]}, "AirLayer.R must be finite and positive, got nan m;"),
+        ({"P0": 0.0}, "AirLayer.P0 must be positive, got 0 Pa;"),
+        ({"h0": -6.5e-6}, "AirLayer.h0 must be positive, got -6.5e-06 m;"),
+        ({"eta": np.inf}, "AirLayer.eta must be finite, got inf Pa s;"),
+        ({"R": [1e-2, np.nan]}, "AirLayer.R must be finite, got nan m;"),
         ({"temperature": 0.0}, "AirLayer.temperature .* got 0 K;"),
         ({"gas_flow": "continum"}, "AirLayer.gas_flow .* 'continum'; did you mean 'continuum'?"),
         ({"P0": np.ones(2), "R": np.ones(3)}, "AirLayer.fields must have shapes that broadcast"),
@@ -180,15 +180,13 @@ def test_bad_layer_is_answered_by_one_sentence(change, message):
 
 
 def test_bad_arguments_are_answered_by_one_sentence():
-    with pytest.raises(
-        InputError, match=r"layer.omega must be finite and not negative, got -1 rad"
-    ):
+    with pytest.raises(InputError, match=r"layer.omega must not be negative, got -1"):
         LAYER.dynamic_stiffness(-1.0)
     with pytest.raises(InputError, match=r"layer.r must lie on the disc, got 0.05 m;"):
         LAYER.pressure([0.0, 0.05], 754.0)
-    with pytest.raises(InputError, match=r"layer.squeeze must be finite and not negative"):
+    with pytest.raises(InputError, match=r"layer.squeeze must be finite"):
         bessel_ratio(np.nan)
-    with pytest.raises(InputError, match=r"shear.V must be finite and positive, got 0 m/s;"):
+    with pytest.raises(InputError, match=r"shear.V must be positive, got 0 m/s;"):
         shear_viscosity_ratio(0.0, W0=7.0, A=0.013, layer=LAYER)
 
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
 import asperity as asp
-from asperity.app.api import fits, recordings
+from asperity.app.api import data, fits, recordings
 from asperity.app.uploads import Uploads
 from asperity.cli.main import main
 from asperity.errors import InputError
@@ -50,6 +50,22 @@ def send(ask):
 
 
 @pytest.fixture
+def measured_here(tmp_path):
+    """Measure a file in this process, as a process of the server does; what it sends."""
+
+    def of(content, name="mine.csv", source=None, options=None):
+        path = tmp_path / "0123.csv"
+        path.write_bytes(content)
+        source = recordings.Source.model_validate(source or {}).model_dump()
+        argument = {"path": str(path), "name": name, "source": source, "options": options or {}}
+        sent = []
+        result = recordings.measure(argument, lambda **message: sent.append(message))
+        return [*sent, {"result": result}]
+
+    return of
+
+
+@pytest.fixture
 def measured(ask, send):
     """Send a file and measure it; the messages of the server."""
 
@@ -75,9 +91,9 @@ def test_a_recording_is_measured_as_the_package_does(measured, modulated, tmp_pa
     assert len(last["result"]["measured"]["curves"]["force"]["x"]) <= 1402
 
 
-def test_columns_and_units_are_corrected_by_hand(measured, modulated):
+def test_columns_and_units_are_corrected_by_hand(measured_here, modulated):
     swapped = {"columns": {"W": "Ft", "F": "Fn"}, "units": {"Fn": "kN", "Ft": "kN"}}
-    lines = measured(modulated, source=swapped, options={"modulated": True})
+    lines = measured_here(modulated, source=swapped, options={"modulated": True})
     recording = next(m["recording"] for m in lines if "recording" in m)
     assert recording["roles"]["W"] == "Ft"
     assert recording["channels"][0]["mean"] == pytest.approx(7e3, rel=1e-3)
@@ -98,8 +114,8 @@ def sawtooth():
 DROP = 0.08
 
 
-def test_stick_slip_is_recognised_and_its_events_are_counted(measured, sawtooth):
-    last = measured(sawtooth, "events.csv")[-1]["result"]
+def test_stick_slip_is_recognised_and_its_events_are_counted(measured_here, sawtooth):
+    last = measured_here(sawtooth, "events.csv")[-1]["result"]
     record = last["measured"]["record"]
     assert record["mode"] == "stick-slip"
     assert record["regime"] == "regular stick-slip"
@@ -111,17 +127,16 @@ def test_stick_slip_is_recognised_and_its_events_are_counted(measured, sawtooth)
     # The spring of 168 N/m is loaded by DROP * 0.3 N in 0.9 s, and the slip takes 0.1 s.
     velocity = DROP * 0.3 / 168 / 0.9
     options = {"stick_slip": True, "stiffness": "168 N/m", "normal_load": 0.3, "velocity": velocity}
-    machine = measured(sawtooth, "events.csv", options=options)[-1]["result"]
+    machine = measured_here(sawtooth, "events.csv", options=options)[-1]["result"]
     assert "--set 'K=168.0 N/m'" in machine["command"]
     assert "--set 'W0=0.3 N'" in machine["command"]
     slip = velocity * 1.0
     assert machine["measured"]["record"]["catalogue"][3]["slip"] == pytest.approx(slip, rel=0.1)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_channels_without_a_finite_value_do_not_matter(modulated, tmp_path, seed):
+def test_channels_without_a_finite_value_do_not_matter(measured_here, modulated):
     """A recorder writes columns of inputs to which nothing is connected."""
-    draw = np.random.default_rng(seed)
+    draw = np.random.default_rng(2)
     lines = modulated.decode().splitlines()
     spare = draw.integers(1, 30)
     places = draw.integers(0, 4, spare)
@@ -131,14 +146,10 @@ def test_channels_without_a_finite_value_do_not_matter(modulated, tmp_path, seed
         head.insert(place, f"spare {k} (V)")
         for row in rows:
             row.insert(place, word)
-    path = tmp_path / "0123.csv"
-    path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    content = "\n".join(",".join(row) for row in [head, *rows]) + "\n"
     source = {"columns": {"time": "time", "W": "Fn", "F": "Ft"}}
-    source = recordings.Source.model_validate(source).model_dump()
-    argument = {"path": str(path), "name": "mine.csv", "source": source, "options": {}}
-    sent = []
-    result = recordings.measure(argument, lambda **message: sent.append(message))
-    assert result["measured"]["record"]["mu1"] == pytest.approx(MU1, rel=0.01)
+    sent = measured_here(content.encode(), source=source)
+    assert sent[-1]["result"]["measured"]["record"]["mu1"] == pytest.approx(MU1, rel=0.01)
     channels = next(m["recording"]["channels"] for m in sent if "recording" in m)
     assert sum(c["not_finite"] == 6000 for c in channels) == spare
     assert {c["name"] for c in channels if "mean" in c} == {"Fn", "Ft"}
@@ -207,14 +218,10 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("what", HOSTILE)
-def test_what_is_no_recording_gets_a_sentence(what, tmp_path):
+def test_what_is_no_recording_gets_a_sentence(measured_here, what, tmp_path):
     """What the process does that reads a file."""
-    path = tmp_path / "0123.csv"
-    path.write_bytes(HOSTILE[what])
-    source = recordings.Source().model_dump()
-    argument = {"path": str(path), "name": "mine.csv", "source": source, "options": {}}
     with pytest.raises(InputError, match=" must ") as refused:
-        recordings.measure(argument, lambda **message: None)
+        measured_here(HOSTILE[what])
     assert str(tmp_path) not in str(refused.value)
     assert "0123" not in str(refused.value)
 
@@ -228,13 +235,9 @@ def test_what_is_no_recording_gets_a_sentence(what, tmp_path):
         (b"PK\x03\x04" + b"\0" * 300, {}, "The recording must be"),
     ],
 )
-def test_a_sentence_names_what_the_page_names(content, source, begin, tmp_path):
-    path = tmp_path / "0123.csv"
-    path.write_bytes(content)
-    asked = recordings.Source.model_validate(source).model_dump()
-    argument = {"path": str(path), "name": "mine.csv", "source": asked, "options": {}}
+def test_a_sentence_names_what_the_page_names(measured_here, content, source, begin):
     with pytest.raises(InputError) as refused:
-        recordings.measure(argument, lambda **message: None)
+        measured_here(content, source=source)
     assert str(refused.value).startswith(begin)
     assert "columns=" not in str(refused.value)
     assert "columns[" not in str(refused.value)
@@ -289,9 +292,8 @@ velocity = "10 um/s"
         ('folder = "/etc"\n', 1, "folder"),
     ],
 )
-def test_a_mistake_of_a_protocol_has_a_sentence_and_a_line(ask, text, line, word):
-    result = ask("data/protocol", {"text": text}).lines[-1]["result"]
-    mistake = result["mistakes"][0]
+def test_a_mistake_of_a_protocol_has_a_sentence_and_a_line(text, line, word):
+    mistake = data.check_protocol({"text": text}, lambda: None)["mistakes"][0]
     assert mistake["line"] == line
     assert word in mistake["sentence"]
     assert " must " in mistake["sentence"]
@@ -311,25 +313,6 @@ TABLE = """V,epsilon,frequency,mean_friction,mean_friction_err
 2e-6,1e-4,120,0.48,0.001
 3e-6,1e-4,120,0.47,0.001
 """
-
-
-def test_a_table_is_fitted(ask, measured):
-    """Hardly modulated, the mean friction is mu0 + (A - B) ln(V/V0)."""
-    *_, last = measured(TABLE.encode(), "readings.csv")
-    table = last["result"]["table"]
-    assert table["count"] == 3
-    asked = {
-        "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000",
-        "tables": [{"name": "readings.csv", "text": table["text"]}],
-    }  # fmt: skip
-    result = ask("data/fit", asked).lines[-1]["result"]
-    p = asp.materials.load("bureau2000")
-    V = np.array([1e-6, 2e-6, 3e-6])
-    mu0 = np.mean([0.49, 0.48, 0.47] - (p.A - p.B) * np.log(V / p.V0))
-    estimate = result["fit"]["parameters"]["mu0"]
-    assert estimate["value"] == pytest.approx(mu0, abs=1e-6)
-    assert estimate["se"] == pytest.approx(0.001 / np.sqrt(3), rel=1e-4)
-    assert "--free mu0" in result["command"]
 
 
 def test_the_report_of_a_fit_is_packed_whole(monkeypatch):
@@ -362,7 +345,11 @@ class Drawn:
         Path(path).write_bytes(b"draws")
 
 
-def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
+def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, monkeypatch):
+    """Hardly modulated, the mean friction is mu0 + (A - B) ln(V/V0)."""
+    table = measured_here(TABLE.encode(), "readings.csv")[-1]["result"]["table"]
+    assert table["count"] == 3
+
     def sampled(found, *, chains, draws, seed, progress):
         assert (chains, draws, seed) == (2, 100, 7)
         progress(50, 800)
@@ -377,7 +364,7 @@ def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
     monkeypatch.setattr("asperity.inference.report.posterior_sections", lambda posterior: [said])
     asked = {
         "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000", "report": True,
-        "names": "geophysics", "tables": [{"name": "readings.csv", "text": TABLE}],
+        "names": "geophysics", "tables": [{"name": "readings.csv", "text": table["text"]}],
         "posterior": True, "chains": 2, "draws": 100, "seed": 7,
     }  # fmt: skip
     sent = []
@@ -389,8 +376,14 @@ def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
     middles, heights = (np.array(result["posterior"]["histograms"]["mu0"][n]) for n in "xy")
     width = middles[1] - middles[0]
     mu0 = result["fit"]["parameters"]["mu0"]
+    p = asp.materials.load("bureau2000")
+    V = np.array([1e-6, 2e-6, 3e-6])
+    expected = np.mean([0.49, 0.48, 0.47] - (p.A - p.B) * np.log(V / p.V0))
+    assert mu0["value"] == pytest.approx(expected, abs=1e-6)
+    assert mu0["se"] == pytest.approx(0.001 / np.sqrt(3), rel=1e-4)
     assert heights.sum() * width == pytest.approx(1)
     assert (heights * middles).sum() * width == pytest.approx(mu0["value"], abs=0.1 * width)
+    assert "--free mu0" in result["command"]
     assert "--posterior --chains 2 --draws 100 --seed 7" in result["command"]
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(result["report"]))) as folder:
         assert folder.read("report/a.nc") == b"draws"
@@ -591,7 +584,7 @@ def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, wo
     assert "0123" not in str(refused.value)
 
 
-def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, barriers, stepped):
+def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, barriers, stepped):
     page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files(
@@ -605,12 +598,7 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     for label in ("eps_ratio", "A", "B", "D0"):
         form.get_by_label(label, exact=True).set_checked(label != "eps_ratio")
     form.get_by_label("Mean values per second for long recordings").fill("full")
-    form.get_by_label("Intervals by profile likelihood").check()
     fit = page.locator("section.fit")
-    fit.get_by_role("button", name="Fit", exact=True).click()
-    fit.get_by_role("button", name="Cancel").click()
-    fit.get_by_text("Cancelled.").wait_for()
-    form.get_by_label("Intervals by profile likelihood").uncheck()
     fit.get_by_role("button", name="Fit", exact=True).click()
     table = fit.get_by_role("region", name="Parameters")
     table.wait_for()
@@ -637,6 +625,10 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     controls = ".fit-form :is(input, select, textarea), .by-hand input.number"
     first, second = (p.locator(controls).evaluate_all(values) for p in (page, again))
     assert first == second
+    form.get_by_label("Intervals by profile likelihood").check()
+    fit.get_by_role("button", name="Fit", exact=True).click()
+    fit.get_by_role("button", name="Cancel").click()
+    fit.get_by_text("Cancelled.").wait_for()
 
 
 def number(text):

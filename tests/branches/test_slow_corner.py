@@ -8,7 +8,7 @@ import pytest
 import asperity as asp
 from asperity.loads import Harmonic
 from asperity.orbit import Outcome
-from asperity.orbit.methods.branch_following.from_steady_sliding import (
+from asperity.orbit.methods.branch_following import (
     MESHES,
     follow_from_steady_sliding,
 )

@@ -148,7 +148,10 @@ def test_friction_without_motion_says_which_options_give_it(asperity, tmp_path: 
         (f"{HEADER}\nrice-ruina,quick,0.2,120\n", ["in column 'V', got 'quick' in row 1"]),
         (f"{HEADER}\nrice-ruina,nan,0.2,120\n", ["in column 'V', got 'nan' in row 1"]),
         (f"{HEADER}\nrice-ruina,,0.2,120\n", ["got none for V;"]),
-        (f'{HEADER}\nrice-ruina,"1e-6,0.2,120\n', ["must be valid CSV"]),
+        (
+            f'{HEADER}\nrice-ruina,"1e-6,0.2,120\n',
+            ["must be a CSV that can be read", "check the quotation marks"],
+        ),
         ("no table at all", ["must have rows of data, got only column names"]),
         ("no table\nat all\n", ["got no column 'law'"]),
     ],
@@ -163,7 +166,7 @@ def test_a_bad_table(asperity, tmp_path: Path, text: str, parts: list[str]) -> N
 def test_a_table_that_is_no_text(asperity, tmp_path: Path) -> None:
     table = tmp_path / "in.csv"
     table.write_bytes(f"{HEADER},Reibflächen\n{ROW},1\n".encode("latin-1"))
-    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "UTF-8", "0xe4")
+    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "not UTF-8 text")
     table.write_bytes(f"{HEADER}\n{ROW}\n".encode("utf-16"))
     refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "UTF-8")
     assert list(tmp_path.iterdir()) == [table]
@@ -171,8 +174,12 @@ def test_a_table_that_is_no_text(asperity, tmp_path: Path) -> None:
 
 def test_a_table_that_is_not_there(asperity, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "out.csv")
-    refused(asperity(*OF, "--table", tmp_path / "in.csv", *out), "there is none")
-    refused(asperity(*OF, "--table", tmp_path, *out), "must be a readable file", "directory")
+    refused(
+        asperity(*OF, "--table", tmp_path / "in.csv", *out),
+        "must be a CSV that can be read",
+        "no such file",
+    )
+    refused(asperity(*OF, "--table", tmp_path, *out), "must be a CSV that can be read", "directory")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -186,9 +193,6 @@ def test_an_output_that_cannot_be_written(asperity, tmp_path: Path) -> None:
     refused(asperity(*call, "--out", table), "must be another file than the table")
     refused(asperity(*call, "--out", tmp_path / "no" / "o.csv"), "must lie in a folder that exists")
     refused(asperity(*call, "--out", table / "o.csv"), "out must")
-    (tmp_path / "o.csv.partial.json").mkdir()
-    refused(asperity(*call, "--out", tmp_path / "o.csv"), "leave room for 'o.csv.partial.json'")
-    (tmp_path / "o.csv.partial.json").rmdir()
     assert list(tmp_path.iterdir()) == [table]
 
 
@@ -209,23 +213,23 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (("air", "--material", "bureau2000"), ["Missing option", "--frequency"]),
+        (("air", "--material", "bureau2000"), ["--frequency must be given, got nothing"]),
         (("air", "-f", "120 Hz"), ["got none for R, h0, P0, eta, W0, M, lambda_z;"]),
         (("air", "-f", "120 Hz", "--vacuum"), ["got none for W0, M, lambda_z;"]),
         ((*AIR, "-f", "10 rad/s"), ["frequency must be a frequency (Hz)"]),
-        ((*AIR, "--set", "h0=-1 um"), ["AirLayer.h0 must be finite and positive"]),
+        ((*AIR, "--set", "h0=-1 um"), ["AirLayer.h0 must be positive"]),
         ((*AIR, "--set", "h=1 um"), ["got 'h'"]),
         ((*AIR, "--set", "P0=1000"), ["air.P0 must carry a unit"]),
         ((*AIR, "--set", "R=1 cm", "--vacuum"), ["R must not be given with --vacuum"]),
         ((*AIR, "--inverse", "0.48"), ["--inverse and --for must be given together"]),
         ((*AIR, "--for", "gap"), ["--inverse and --for must be given together"]),
-        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be radius or gap"]),
-        ((*AIR, "--inverse", "0 %", "--for", "gap"), ["inverse.ratio must be finite and positive"]),
+        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be one of radius, gap"]),
+        ((*AIR, "--inverse", "0 %", "--for", "gap"), ["inverse.ratio must be positive"]),
         ((*AIR, "--inverse", "0.4", "--for", "gap", "--vacuum"), ["must have an air layer"]),
         ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),
         (("materials", "bureau"), ["did you mean 'bureau2000'?"]),
         (("materials", "no.toml", "--cite"), ["must be a readable TOML file"]),
-        (("reproduce",), ["Missing option '--out'"]),
+        (("reproduce",), ["--out must be given, got nothing; add it, like --out DIR"]),
     ],
 )
 def test_the_other_commands(asperity, arguments: tuple[str, ...], parts: list[str]) -> None:

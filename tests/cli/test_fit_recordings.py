@@ -151,7 +151,7 @@ def under_stress(tmp_path_factory):
 def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
     path, stress = under_stress
     common = [path, "--law", "rice-ruina", "--start", "A=0.009", "--start", "B=0.0105"]
-    common += ["--start", "D0=6.5 um"]
+    common += ["--start", "D0=6.5 um", "--fit-rate", "5 Hz"]
 
     def record(*more):
         found = run_fit(*common, *more, "--json")

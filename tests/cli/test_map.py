@@ -67,7 +67,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--x", "alpha=0:0.2:5"), ["rice-ruina must be given its own", "linker-dieterich"]),
         (("--x", "V=1:10:5 um/s"), ["V must be given once"]),
         (("--set", "K=0.2 N/um"), ["K must be given once"]),
-        (("--show", "mu9"), ["--show must be a quantity of the map, got 'mu9'"]),
+        (("--show", "mu9"), ["--show must be one of mean_friction, delta_mu"]),
         (("--plot", "map.jpg"), ["--plot must be a PNG file"]),
         (("--plot", "no/map.png"), ["--plot must lie in a folder that exists"]),
         (("--law", "rice-runia"), ["did you mean 'rice-ruina'?"]),

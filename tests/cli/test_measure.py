@@ -9,6 +9,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from references.populations import population
 
 F, EPSILON, MU1, PHASE1 = 40.02, 0.2, 2e-3, -1.4
 
@@ -162,7 +163,7 @@ def test_a_velocity_step(asperity, step) -> None:
 
 
 @pytest.mark.parametrize("load", [True, False])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", population(3))
 def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
     """Steps and holds are read without --no-modulation, and stderr says so."""
     rng = np.random.default_rng(seed)

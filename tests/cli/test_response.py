@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.cli.report import to_json
+from asperity.outputs.json import to_json
 
 POINT = ("--law", "elasto-plastic", "-V", "1 um/s", "-e", "0.24", "-f", "120 Hz")
 KEYS = {

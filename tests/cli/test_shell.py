@@ -88,7 +88,7 @@ def test_options_come_in_one_order(command: str) -> None:
     assert shared == [option for option in order if option in shared]
     if command in ("compare", "fit", "map", "response"):
         assert listed.index("--law") < listed.index("--plot")
-    assert ("--plot" in listed) == ("--names" in listed)
+    assert ("--json" in listed) == ("--names" in listed)
 
 
 def test_an_unknown_command_names_the_nearest(asperity) -> None:

@@ -22,13 +22,14 @@ sys.modules["snippets"] = pages
 _spec.loader.exec_module(pages)
 
 ROOT = pages.ROOT
-#: Pages whose code takes more than about ten seconds; tests of fits have the same recording as the
-#: tutorial on velocity steps.
+#: Pages whose code takes more than about eight seconds. What they do, others prove in every run:
+#: fits of the same recording and of tables (`tests/inference`), folds, bifurcations and boundaries
+#: (`tests/branches`).
 SLOW = {
     "docs/tutorials/python.md",
     "docs/tutorials/velocity_step.md",
     *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
-    "docs/healing.md",
+    *("docs/healing.md", "docs/fitting.md", "docs/theory/continuation.md"),
 }
 #: Pages that `tests/papers/test_claims.py` runs, with the ledger that it has computed.
 ELSEWHERE = {"docs/claims.md"}
@@ -65,7 +66,7 @@ def run_python(snippet, namespace, capsys, where) -> None:
     assert pages.difference(snippet.prints or "", printed) == "", f"{where}\n{printed}"
 
 
-def run_console(snippet, where, capsys) -> None:
+def run_console(snippet, where, capsys, included) -> None:
     for command in pages.commands(snippet.text):
         program, *arguments = command.arguments
         if program == "asperity" and arguments[0] == "reproduce":
@@ -85,7 +86,11 @@ def run_console(snippet, where, capsys) -> None:
                 assert re.search(rf"^{target}:", makefile, re.M), f"{where}: no make {target}"
         elif program == "python":
             capsys.readouterr()
-            runpy.run_path(str(ROOT / arguments[0]), run_name="__main__")
+            script = ROOT / arguments[0]
+            if script in included:  # its class has compiled programs
+                included[script]["main"]()
+            else:
+                runpy.run_path(str(script), run_name="__main__")
             printed = capsys.readouterr().out
             assert pages.difference(command.prints, printed) == "", f"{where}\n{printed}"
         else:
@@ -100,18 +105,19 @@ def run_console(snippet, where, capsys) -> None:
     ],
 )
 def test_page_runs_as_it_says(page, workplace, capsys) -> None:
-    namespace = {"__name__": "page"}
+    namespace, included = {"__name__": "page"}, {}
     for snippet in pages.snippets(page):
         where = f"{named(page)}:{snippet.line}"
         if snippet.kind == "python":
             run_python(snippet, namespace, capsys, where)
         elif snippet.kind == "console":
-            run_console(snippet, where, capsys)
+            run_console(snippet, where, capsys, included)
         elif snippet.kind == "file":
             (workplace / snippet.name).write_text(snippet.text, encoding="utf-8")
         elif snippet.name.endswith(".py"):
-            included = runpy.run_path(str((page.parent / snippet.name).resolve()))
-            namespace |= {k: v for k, v in included.items() if not k.startswith("__")}
+            script = (page.parent / snippet.name).resolve()
+            included[script] = runpy.run_path(str(script))
+            namespace |= {k: v for k, v in included[script].items() if not k.startswith("__")}
 
 
 def documented(page: str, head: str) -> set[str]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.inference import read_plan
+from asperity.inference.design.plan import expected_values
 from asperity.laws import ElastoPlastic, LinkerDieterich, registry
 
 PLAN = Path(__file__).parents[2] / "examples" / "load_on_age.toml"
@@ -19,13 +20,13 @@ def plan(monkeypatch):
 
 
 def test_the_plan_covers_the_frequencies_of_stick_slip(plan):
-    levels = {axis.name: axis.levels for axis in plan.axes}
-    known = {**plan.truth.fixed, **plan.truth.values}
+    levels = plan.axes
+    known = {**plan.truth.fixed, **expected_values(plan.truth)}
     critical = np.sqrt((known["B"] - known["A"]) / known["A"]) * levels["V"] / known["D0"]
     # At 10 um/s within the range; at 1 um/s a little below it.
     assert levels["frequency"].min() < critical.max() / (2 * np.pi) < levels["frequency"].max()
-    assert plan.measured == ("alpha",)
-    assert plan.truth.values["alpha"] == 0.02
+    assert plan.question.measure == ("alpha",)
+    assert expected_values(plan.truth)["alpha"] == 0.02
 
 
 def test_the_law_is_its_two_parents_together(plan):

@@ -10,6 +10,7 @@ from asperity.experiment import stick_slip_response
 from asperity.laws import Amontons, RiceRuina, registered
 from asperity.theory import overshooting_cycle
 from references.memory_tests import STATE_RATES
+from references.populations import draws
 
 MU0, V0 = 0.6, 1e-6
 
@@ -42,9 +43,10 @@ def of_scipy(name, A, B, D0, K, M, W0, V, cycles):
 
 
 @pytest.mark.parametrize("name", list(STATE_RATES))
-def test_cycles_are_those_of_scipy(name):
+@draws(1, 4)
+def test_cycles_are_those_of_scipy(name, draws):
     draw = np.random.default_rng(len(name))
-    for _ in range(2):
+    for _ in range(draws):
         A, D0, W0 = draw.uniform(0.005, 0.02), 10 ** draw.uniform(-6.5, -5), draw.uniform(0.2, 20)
         B = A * draw.uniform(1.2, 1.8)
         K = (B - A) * W0 / D0 * 10 ** draw.uniform(-2, -0.7)

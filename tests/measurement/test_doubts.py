@@ -53,12 +53,6 @@ def load_wanders(time, load, force):
     return time, load + 0.3 * np.sin(np.pi * time), force
 
 
-def irregular_stick_slip(time, load, force):
-    rng = np.random.default_rng(0)
-    speed = np.repeat(2.5 * (1 + 0.4 * rng.standard_normal(200)), time.size // 200)
-    return time, load, force + 0.1 * (np.cumsum(speed) / RATE % 1 - 0.5)
-
-
 def response_changes(time, load, force):
     phi = 2 * np.pi * 60.013 * time + 0.7
     return time, load, force + 7e-3 * np.sin(2 * np.pi * 0.15 * time) * np.cos(phi - 1.5)
@@ -87,20 +81,19 @@ def coarse_load(time, load, force):
 
 #: Defect, the checks that name it, and the verdict of the gravest.
 DOUBTS = {
-    "columns exchanged": (swapped, {"friction", "response", "load harmonics", "mains"}, "bad"),
+    "columns exchanged": (swapped, {"friction", "load harmonics", "mains"}, "bad"),
     "sign of the force": (flipped, {"friction"}, "suspicious"),
     "units a thousand apart": (in_kilonewton, {"friction"}, "suspicious"),
     "zero of the load": (off_zero, {"contact", "friction"}, "bad"),
     "drift of the load": (load_drifts, {"steady load"}, "suspicious"),
     "slow wave of the load": (load_wanders, {"steady load"}, "suspicious"),
-    "irregular stick-slip": (irregular_stick_slip, {"steady force"}, "suspicious"),
     "a response that changes": (
         response_changes,
         {"steady response", "shifting response"},
         "bad",
     ),
     "another line beside it": (hum_beside_the_line, {"steady response"}, "bad"),
-    "dropped bits": (dropped_bits, {"spike", "dropouts"}, "suspicious"),
+    "dropped bits": (dropped_bits, {"spike"}, "suspicious"),
     "sparks of two samples": (sparks, {"spike"}, "bad"),
     "steps of the load": (coarse_load, {"resolution", "leakage"}, "suspicious"),
 }
@@ -110,13 +103,9 @@ DOUBTS = {
 NUMBERS = {
     "sign of the force": ("friction", -0.4, 1e-3),
     "zero of the load": ("contact", 7 * 0.24, 1e-3),
-    # mu1/(mean epsilon) of the exchanged pair: 0.24 * 7/(2e-3 * 7), less 1/0.4 over 1/0.4.
-    "columns exchanged": ("response", 0.24 * 0.4 / 2e-3, 1e-2),
     "drift of the load": ("steady load", 0.03 * END / 7.15, 1e-2),
     # Half of the line's slope is fitted as drift: ten half-turns hold next to none.
     "slow wave of the load": ("steady load", 0.3 / 7, 0.05),
-    # A sawtooth of 0.1 N has a standard deviation of 0.1/sqrt(12).
-    "irregular stick-slip": ("steady force", 0.1 / np.sqrt(12) * np.sqrt(2) / 2.8, 0.1),
     "steps of the load": ("resolution", 0.5 / 1.68, 0.05),
 }
 
@@ -152,18 +141,6 @@ def test_recordings_that_stand_still_have_a_verdict(made, trace) -> None:
         record = modulated_record(found)
         assert np.isfinite([record[name] for name in ("W0", "epsilon", "mu1", "mu2")]).all()
         assert np.isfinite(list(record["intervals_95"].values())).all()
-
-
-def test_harmonics_that_are_folded_onto_those_read_are_told(truth, trace) -> None:
-    # Four samples a period: the third harmonic looks like the first.
-    time = np.arange(4000) / 240.0
-    for frequency, verdict in ((60.0, "suspicious"), (57.3, "ok")):
-        source = truth.but(frequency=frequency)
-        noise = 1e-3 * np.random.default_rng(0).standard_normal((2, time.size))
-        made = (time, source.load(time) + noise[0], source.force(time) + noise[1])
-        found = measure(trace(*made), harmonics=1, frequency=frequency)
-        (said,) = [c for c in found.checks if c.name == "aliasing"]
-        assert said.verdict == verdict, said
 
 
 @pytest.mark.parametrize(

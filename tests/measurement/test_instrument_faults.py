@@ -53,13 +53,6 @@ def load_is_clipped_before_noise(time, load, force):
     return time, clipped + 2e-3 * rng.standard_normal(time.size), force
 
 
-def load_is_lost(time, load, force):
-    load = load.copy()
-    for at in (15_000, 22_000, 30_000):
-        load[at : at + 60] = 0.0
-    return time, load, force
-
-
 def hum_in_the_force(frequency):
     def plant(time, load, force):
         return time, load, force + 5e-3 * np.cos(2 * np.pi * frequency * time + 1)
@@ -99,7 +92,6 @@ def test_the_fault_is_named(whole, trace, fault, seed) -> None:
 
 NEW = {
     "held samples",
-    "dropouts",
     "flat top",
     "mains",
     "lines in the pauses",
@@ -139,8 +131,6 @@ def test_numbers_are_those_planted(whole, trace) -> None:
     assert flat.number == pytest.approx(np.arccos(0.75) / np.pi, abs=0.03)
     shifted = by_name(measure(trace(*response_shifts(time, load, force))), "shifting response")
     assert shifted.number == pytest.approx(0.2 * 7 / 8, abs=0.06)
-    lost = by_name(measure(trace(*load_is_lost(time, load, force)), window=(6.0, 18.0)), "dropouts")
-    assert lost.number == pytest.approx(180 / 24_000, rel=0.01)
 
 
 @pytest.mark.parametrize("base", [50.0, 60.0])

@@ -6,14 +6,10 @@ import pytest
 import asperity as asp
 from asperity.laws import RiceRuina
 from asperity.loads import Harmonic
-from asperity.orbit.methods.branch_following.from_steady_sliding import RUNAWAY, BranchProgress
-from asperity.orbit.methods.collocation import frequency_path
-from asperity.orbit.methods.collocation import method as collocation
-from asperity.orbit.methods.collocation.initial_guess import InitialGuess
-from asperity.orbit.methods.method import Method
+from asperity.orbit.methods.branch_following import RUNAWAY, continues
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits, mark_too_unstable
-from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten
 
@@ -52,10 +48,9 @@ def test_what_nothing_could_hold_is_called_too_unstable(lost, share, said):
 
 
 def test_a_branch_may_run_ahead_a_little_where_it_is_about_to_arrive():
-    progress = BranchProgress.from_steady(4)
-    progress.fastest[:] = RUNAWAY + np.array([0.2, 0.2, 0.9, -0.1])
-    continues = progress.continues(np.array([0.995, 0.9, 0.995, 0.9]))
-    assert continues.tolist() == [True, False, False, True]
+    fastest = RUNAWAY + np.array([0.2, 0.2, 0.9, -0.1])
+    still = continues(np.array([0.995, 0.9, 0.995, 0.9]), fastest)
+    assert still.tolist() == [True, False, False, True]
 
 
 class Stub(Method):
@@ -95,18 +90,6 @@ def test_points_go_from_method_to_method_until_one_solves_them():
     assert (solving.given, late.given) == ([2], [])
     assert solution.mean_friction.tolist() == [0.5, 0.5]
     assert solution.method.tolist() == ["stub", "stub"]
-
-
-def test_an_unresolved_orbit_of_another_branch_is_not_reported(monkeypatch):
-    problem = points(np.array([2.0]) * KC, 40.0, 0.6)
-    another = InitialGuess.none(problem, 1)._replace(solved=np.array([True]))
-
-    def unresolved(problem, solution, orbit, index, options, meshes):
-        solution.outcome[index], solution.detail[index] = Outcome.NOT_RESOLVED, np.inf
-
-    monkeypatch.setattr(frequency_path, "orbits_from_high_frequency", lambda *_: another)
-    monkeypatch.setattr(collocation, "refine", unresolved)
-    assert not frequency_path.FrequencyPath().solve(problem, OPTIONS).informed[0]
 
 
 def test_a_point_whose_branch_was_not_followed_is_not_said_to_have_one():

@@ -12,8 +12,7 @@ import pytest
 from asperity import materials
 from asperity.app.api.protocols import checked
 from asperity.errors import InputError
-from asperity.inference import read_table
-from asperity.inference.design.plan_file import read_plan
+from asperity.inference import read_plan, read_table
 from asperity.ledger.contents import read_contents
 from asperity.parameters import toml_file
 from asperity.parameters.toml_file import parsed_toml

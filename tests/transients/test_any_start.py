@@ -83,7 +83,7 @@ def test_any_start_ends(law):
 def test_any_start_ends_with_inertia_or_damping(law, options):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD, **options).states[0]
-    for states in starts(len(steady), 12, 7, steady):
+    for states in starts(len(steady), 6, 7, steady):
         assert_ended(slider, HOLD, initial=states, most_steps=1e5, **options)
 
 
@@ -144,7 +144,7 @@ def test_compiled_steps_return_however_many_are_rejected(monkeypatch):
             return steps.TrialStep(Y, jnp.asarray(error), jnp.asarray(factor), memory, False, (Y,))
 
         zero, Y = jnp.zeros(()), jnp.zeros(2)
-        limits = steps.LengthLimits(0.999999, 6.0)
+        limits = 0.999999, 6.0
         return jax.jit(
             lambda h: steps.run_steps(
                 system, zero, Y, h, jnp.ones(()), jnp.ones(()), attempt, zero, limits

@@ -85,8 +85,8 @@ def test_an_accelerometer_sees_only_what_changes() -> None:
         (lambda: LoadCell(bandwidth=0), "LoadCell.bandwidth must be positive, got 0 Hz"),
         (lambda: LoadCell(bandwidth="1 kHz", noise="2 nm"), "LoadCell.noise must be a force"),
         (lambda: SpringGauge(stiffness=1.0, bandwidth=1.0, noise="2 mN"), "must be a length"),
-        (lambda: DisplacementGauge(bandwidth=1.0, resolution=-1.0), "not negative"),
-        (lambda: LoadCell(bandwidth=1.0, delay="-1 ms"), "LoadCell.delay must be not negative"),
+        (lambda: DisplacementGauge(bandwidth=1.0, resolution=-1.0), "not be negative"),
+        (lambda: LoadCell(bandwidth=1.0, delay="-1 ms"), "LoadCell.delay must not be negative"),
         (lambda: quiet(LoadCell(bandwidth="11 kHz"), TIME), "at most half the sampling rate"),
     ],
 )

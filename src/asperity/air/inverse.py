@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +91,7 @@ def patch_radius(
     InputError
         When an argument is not one finite positive number, or the bracket is empty.
     """
-
-    def fraction(R: NDArray[np.float64]) -> NDArray[np.float64]:
-        return _fraction(frequency, W0, M, lambda_z, replace(layer, R=R))
-
-    _check_single(W0, M, lambda_z, frequency, layer)
-    return _invert("R", ratio, fraction, bracket)
+    return _invert("R", ratio, frequency, (W0, M, lambda_z), layer, bracket)
 
 
 def gap(
@@ -112,19 +108,7 @@ def gap(
 
     Parameters, result and errors as in `patch_radius`, with h0 in the place of R.
     """
-
-    def fraction(h0: NDArray[np.float64]) -> NDArray[np.float64]:
-        return _fraction(frequency, W0, M, lambda_z, replace(layer, h0=h0))
-
-    _check_single(W0, M, lambda_z, frequency, layer)
-    return _invert("h0", ratio, fraction, bracket)
-
-
-def _fraction(
-    frequency: float, W0: float, M: float, lambda_z: float, layer: AirLayer
-) -> NDArray[np.float64]:
-    value = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
-    return np.asarray(value)
+    return _invert("h0", ratio, frequency, (W0, M, lambda_z), layer, bracket)
 
 
 def _check_single(*values: object) -> None:
@@ -141,19 +125,27 @@ def _check_single(*values: object) -> None:
 def _invert(
     field: str,
     ratio: float,
-    fraction: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    frequency: float,
+    machine: tuple[float, float, float],
+    layer: AirLayer,
     bracket: tuple[float, float],
 ) -> InverseResult:
-    _check_single(ratio)
-    wanted = as_real("inverse.ratio", ratio, "", "give the measured eps_eff/eps, a positive number")
+    """Solutions of the field of the layer; `machine` is W0, M and lambda_z."""
+    _check_single(ratio, frequency, layer, *machine)
+    W0, M, lambda_z = machine
+    wanted = as_real("inverse.ratio", ratio, "dimensionless")
     target = float(np.log(wanted))
     lower, upper = _limits(bracket)
 
+    def log_fractions(u: Any) -> Any:
+        chosen: AirLayer = replace(layer, **{field: np.exp(u)})
+        return np.log(effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=chosen))
+
     def log_fraction(u: float) -> float:
-        return float(np.log(fraction(np.exp(np.asarray(u)))))
+        return float(log_fractions(u))
 
     u = np.linspace(np.log(lower), np.log(upper), _SCAN)
-    scan = np.log(fraction(np.exp(u)))
+    scan = log_fractions(u)
     knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
     roots = _roots(log_fraction, np.array(knots), target)
     values = np.exp(np.append(scan, [log_fraction(k) for k in knots]))
@@ -169,11 +161,10 @@ def _invert(
 
 
 def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
-    advice = "give the smallest and the largest length in metres"
-    ends = np.asarray(as_real("inverse.bracket", bracket, "m", advice))
+    ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
     if ends.shape != (2,) or not ends[0] < ends[1]:
         raise InputError(
-            f"inverse.bracket must be two ascending lengths, got {bracket} m; {advice}"
+            "inverse.bracket", "be two ascending lengths", f"{bracket} m", "swap or correct them"
         )
     return float(ends[0]), float(ends[1])
 

@@ -19,9 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.air.normal_contact import Real, as_real, check_shapes
-from asperity.errors import InputError, closest
+from asperity.errors import InputError
+from asperity.parameters.arguments import one_of
 
 GasFlow = Literal["continuum", "slip", "free-molecular"]
+#: Kind of quantity of the fields of a layer.
+_KINDS = {
+    "P0": "pressure", "h0": "length", "eta": "viscosity", "R": "length",
+    "temperature": "temperature",
+}  # fmt: skip
 #: sqrt(pi R_gas T/(2 m_air)) is the molecular speed in mfp = eta/P times it: R_gas of CODATA, in
 #: J/(mol K), the molar mass of dry air of the US Standard Atmosphere 1976, in kg/mol.
 _GAS_CONSTANT, _MOLAR_MASS_AIR = 8.314462618, 28.9644e-3
@@ -76,8 +82,7 @@ def bessel_ratio(squeeze: ArrayLike) -> Any:
         Both parts are <= 0: an elastic and a damping force, whatever s.
         -> -i s^2/8 - s^4/48 for s -> 0, -> -1 + sqrt(2) (1 - i)/s for s -> infinity.
     """
-    advice = "give the modulus of gamma R"
-    s = np.asarray(as_real("layer.squeeze", squeeze, "", advice, zero=True))
+    s = np.asarray(as_real("layer.squeeze", squeeze, "dimensionless", "not negative"))
     large = s > _HANDOVER
     ratio = np.empty(s.shape, dtype=complex)
     ratio[large] = _ratio_by_asymptotics(s[large])
@@ -123,29 +128,17 @@ class AirLayer:
     temperature: Real = 300.0
 
     def __post_init__(self) -> None:
-        advice = {
-            "P0": ("Pa", "give the ambient pressure in pascals, or no layer for a vacuum"),
-            "h0": ("m", "give the gap at rest in metres, about 5 times the roughness"),
-            "eta": ("Pa s", "give the viscosity of the gas in pascal seconds, 1.8e-5 for air"),
-            "R": ("m", "give the radius of the contact patch in metres"),
-            "temperature": ("K", "give the absolute temperature in kelvins"),
-        }
-        for field, (unit, what) in advice.items():
-            value = as_real(f"AirLayer.{field}", getattr(self, field), unit, what)
+        for field, kind in _KINDS.items():
+            value = as_real(f"AirLayer.{field}", getattr(self, field), kind)
             object.__setattr__(self, field, value)
         with np.errstate(over="ignore"):
-            finite = np.isfinite(np.square(self.R))
-        if not np.all(finite):
-            raise InputError(
-                "AirLayer.R must have a square that is a finite number, got "
-                f"{np.max(self.R):g} m; give the radius of the contact patch in metres"
-            )
-        check_shapes("AirLayer.fields", *(getattr(self, field) for field in advice))
-        if self.gas_flow not in get_args(GasFlow):
-            way_out = closest(str(self.gas_flow), get_args(GasFlow))
-            raise InputError(
-                f"AirLayer.gas_flow must be a known model, got {self.gas_flow!r}; {way_out}"
-            )
+            if not np.all(np.isfinite(np.square(self.R))):
+                raise InputError(
+                    "AirLayer.R", "have a square that is a finite number", f"{np.max(self.R):g} m",
+                    "give the radius of the contact patch",
+                )  # fmt: skip
+        check_shapes("AirLayer.fields", *(getattr(self, field) for field in _KINDS))
+        one_of(self.gas_flow, get_args(GasFlow), "AirLayer.gas_flow")
 
     @property
     def area(self) -> Real:
@@ -181,8 +174,7 @@ class AirLayer:
 
     def squeeze(self, omega: ArrayLike) -> Real:
         """Return s = |gamma R| = sqrt(12 eta w R^2/(P0 h0^2)) at `omega` = w (rad/s)."""
-        advice = "give the angular frequency in rad/s, 2 pi times the frequency in hertz"
-        w = as_real("layer.omega", omega, "rad/s", advice, zero=True)
+        w = as_real("layer.omega", omega, "dimensionless", "not negative")
         check_shapes("layer.omega", w, self.P0, self.h0, self.eta, self.R, self.temperature)
         s: Real = np.sqrt(12 * self.effective_viscosity * w / self.P0) * (self.R / self.h0)
         return s
@@ -221,14 +213,13 @@ class AirLayer:
         InputError
             When a radius lies outside the disc.
         """
-        advice = "keep 0 <= r <= R"
-        radius = as_real("layer.r", r, "m", advice, zero=True)
+        radius = as_real("layer.r", r, "length", "not negative")
         s = self.squeeze(omega)
         check_shapes("layer.r", radius, s, self.R)
         rho = np.asarray(radius / self.R)
         if (rho > 1).any():
             worst = float(np.max(np.broadcast_to(radius, rho.shape)[rho > 1]))
-            raise InputError(f"layer.r must lie on the disc, got {worst:g} m; {advice}")
+            raise InputError("layer.r", "lie on the disc", f"{worst:g} m", "keep 0 <= r <= R")
         rho, squeeze = np.broadcast_arrays(rho, s)
         return -self.P0 / self.h0 * _profile(rho, squeeze)[()]
 
@@ -268,9 +259,8 @@ def shear_viscosity_ratio(
     as_printed : bool
         Leave A out, as the paper does.
     """
-    velocity = as_real("shear.V", V, "m/s", "give the sliding velocity in metres per second")
-    load = as_real("shear.W0", W0, "N", "give the mean normal load in newtons")
-    rate = as_real("shear.A", A, "", "give the rate coefficient, about 0.01")
+    velocity = as_real("shear.V", V, "velocity")
+    load, rate = as_real("shear.W0", W0, "force"), as_real("shear.A", A, "dimensionless")
     check_shapes("shear arguments", velocity, load, rate, layer.eta, layer.R, layer.h0)
     printed: Real = layer.eta * layer.area * velocity / (load * layer.h0)
     return printed if as_printed else printed / rate

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
+from asperity.parameters import obeying
 
 #: A number or an array of numbers, in SI.
 Real: TypeAlias = float | NDArray[np.float64]
@@ -24,60 +25,21 @@ Real: TypeAlias = float | NDArray[np.float64]
 _I0_SERIES = (*(1.0 / factorial(k) ** 2 for k in range(10, 0, -1)), 0.0)
 
 
-def as_real(field: str, value: ArrayLike, unit: str, advice: str, *, zero: bool = False) -> Real:
-    """Return `value` as a float or a new float array, all finite and positive.
-
-    Parameters
-    ----------
-    field : str
-        ``<object>.<field>`` of the message.
-    value : array_like
-        SI value(s).
-    unit : str
-        Unit of the message, empty when dimensionless.
-    advice : str
-        Advice, the last clause of the message.
-    zero : bool
-        Whether zero is allowed too.
-
-    Raises
-    ------
-    InputError
-        When an element is no number, not finite, negative, or zero where that is not allowed.
-    """
-    rule = "be finite and not negative" if zero else "be finite and positive"
-    suffix = f" {unit}" if unit else ""
-    try:
-        array = np.array(value)
-    except ValueError:  # a ragged list
-        array = np.array(None)
-    if array.dtype.kind not in "iuf":
-        rule = "be a number or an array of numbers"
-        raise InputError(f"{field} must {rule}, got {value!r}{suffix}; {advice}")
-    array = array.astype(float)
-    good = np.isfinite(array) & ((array >= 0) if zero else (array > 0))
-    if not good.all():
-        first = float(array[~good].flat[0])
-        raise InputError(f"{field} must {rule}, got {first:g}{suffix}; {advice}")
+def as_real(label: str, value: ArrayLike, kind: str, rule: str = "positive") -> Real:
+    """`asperity.parameters.obeying` as a float or a new float array."""
+    array = np.array(obeying(value, label, kind, rule))
     return array if array.ndim else float(array)
 
 
-def check_shapes(field: str, *values: ArrayLike) -> tuple[int, ...]:
-    """Return the common shape of `values`, numpy's rules of broadcasting.
-
-    Raises
-    ------
-    InputError
-        If they do not broadcast.
-    """
+def check_shapes(label: str, *values: ArrayLike) -> None:
+    """Refuse `values` that do not broadcast."""
     shapes = [np.shape(v) for v in values]
     try:
-        return np.broadcast_shapes(*shapes)
+        np.broadcast_shapes(*shapes)
     except ValueError:
         listed = " and ".join(str(s) for s in dict.fromkeys(shapes) if s)
         raise InputError(
-            f"{field} must have shapes that broadcast together, got {listed}; "
-            "add axes of length one so that the shapes match as numpy's do"
+            label, "have shapes that broadcast together", listed, "give arrays of one shape"
         ) from None
 
 
@@ -102,9 +64,8 @@ class NormalContact:
     lambda_z: Real
 
     def __post_init__(self) -> None:
-        load = as_real("NormalContact.W0", self.W0, "N", "give the mean normal load in newtons")
-        advice = "give the normal elastic length in metres, about 0.4e-6 for lapped PMMA"
-        length = as_real("NormalContact.lambda_z", self.lambda_z, "m", advice)
+        load = as_real("NormalContact.W0", self.W0, "force")
+        length = as_real("NormalContact.lambda_z", self.lambda_z, "length")
         check_shapes("NormalContact.lambda_z", load, length)
         object.__setattr__(self, "W0", load)
         object.__setattr__(self, "lambda_z", length)
@@ -116,8 +77,7 @@ class NormalContact:
 
     def omega0(self, M: ArrayLike) -> Real:
         """Return the resonance w0z = sqrt(kappa_z/M) (rad/s) of a slider of mass `M` (kg)."""
-        mass = as_real("NormalContact.M", M, "kg", "give the mass of the slider in kilograms")
-        omega0: Real = np.sqrt(self.stiffness / mass)
+        omega0: Real = np.sqrt(self.stiffness / as_real("NormalContact.M", M, "mass"))
         return omega0
 
     def load(self, closure: ArrayLike) -> Real:
@@ -132,8 +92,7 @@ class NormalContact:
         InputError
             When a load is not positive: the contact would be lost.
         """
-        advice = "keep the contact closed, the law holds for compressive loads only"
-        relative = as_real("NormalContact.load", load, "N", advice) / self.W0
+        relative = as_real("NormalContact.load", load, "force") / self.W0
         closure: Real = self.lambda_z * np.log(relative)
         return closure
 
@@ -199,11 +158,7 @@ class NormalContact:
         InputError
             When eps is not in [0, 1).
         """
-        advice = "keep the contact closed with 0 <= epsilon < 1"
-        eps = np.asarray(as_real("NormalContact.epsilon", epsilon, "", advice, zero=True))
-        if (eps >= 1).any():
-            worst = float(eps.max())
-            raise InputError(f"NormalContact.epsilon must be below 1, got {worst:g}; {advice}")
+        eps = np.asarray(as_real("NormalContact.epsilon", epsilon, "dimensionless", "amplitude"))
         check_shapes("NormalContact.epsilon", eps, self.lambda_z)
         rho = (eps / (1 + np.sqrt((1 - eps) * (1 + eps))))[..., np.newaxis]
         order = np.arange(1, count + 1)
@@ -211,8 +166,7 @@ class NormalContact:
         return np.asarray(-2 * length * (-rho) ** order / order)
 
     def _beta(self, amplitude: ArrayLike) -> Real:
-        advice = "give the peak amplitude of the gap's motion in metres"
-        a = as_real("NormalContact.amplitude", amplitude, "m", advice, zero=True)
+        a = as_real("NormalContact.amplitude", amplitude, "length", "not negative")
         check_shapes("NormalContact.amplitude", a, self.lambda_z)
         return a / self.lambda_z
 
@@ -235,10 +189,10 @@ def mindlin_length_ratio(nu: ArrayLike) -> Real:
     InputError
         When nu is outside that range.
     """
-    advice = "give Poisson's ratio between 0 and 0.5"
-    ratio = np.asarray(as_real("material.nu", nu, "", advice, zero=True))
+    ratio = np.asarray(as_real("material.nu", nu, "dimensionless", "not negative"))
     if (ratio > 0.5).any():
-        raise InputError(f"material.nu must be at most 0.5, got {float(ratio.max()):g}; {advice}")
+        worst = f"{float(ratio.max()):g}"
+        raise InputError("material.nu", "be at most 0.5", worst, "give a ratio from 0 to 0.5")
     quotient: Real = ((2 - ratio) / (2 * (1 - ratio)))[()]
     return quotient
 
@@ -253,7 +207,7 @@ def normal_length(lambda_: ArrayLike, length_ratio: ArrayLike) -> Real:
     length_ratio : array
         lambda/lambda_z: the paper's number is 1.7, the derived one `mindlin_length_ratio`.
     """
-    shear = as_real("material.lambda_", lambda_, "m", "give the shear elastic length in metres")
-    ratio = as_real("material.length_ratio", length_ratio, "", "give lambda over lambda_z")
+    shear = as_real("material.lambda_", lambda_, "length")
+    ratio = as_real("material.length_ratio", length_ratio, "dimensionless")
     check_shapes("material.length_ratio", shear, ratio)
     return shear / ratio

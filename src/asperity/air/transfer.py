@@ -60,9 +60,8 @@ def transfer_function(
         stiffnesses leave the range of doubles.
     """
     contact = NormalContact(W0=W0, lambda_z=lambda_z)  # type: ignore[arg-type]
-    advice = "give the frequency of the modulation in hertz"
-    f = as_real("modulation.frequency", frequency, "Hz", advice, zero=True)
-    mass = as_real("slider.M", M, "kg", "give the mass of the slider in kilograms", zero=True)
+    f = as_real("modulation.frequency", frequency, "frequency", "not negative")
+    mass = as_real("slider.M", M, "mass", "not negative")
     fields: tuple[Real, ...] = ()
     if layer is not None:
         fields = (layer.P0, layer.h0, layer.eta, layer.R, layer.temperature)
@@ -136,7 +135,7 @@ def air_vacuum_ratio(
         Also if `layer` is None.
     """
     if layer is None:
-        raise InputError("air_vacuum_ratio.layer must be an AirLayer, got None; give the layer")
+        raise InputError("air_vacuum_ratio.layer", "be an AirLayer", "None", "give the layer")
     air = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
     vacuum = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z)
     return air / vacuum

@@ -1,8 +1,19 @@
-"""Linear systems solved by a fixed-point iteration."""
+"""Fixed points of contractions: their derivatives, and linear systems.
+
+Derivatives follow from the implicit function theorem. Where R(p, Y) = 0 fixes the unknowns Y as
+functions of the parameters p,
+
+    dY = -R_Y^-1 R_p dp.
+
+No iteration of a solver is differentiated. The rule refers to itself, so that derivatives of any
+order follow from R; the linear solve has a transpose, so that they do in forward and reverse mode.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -16,7 +27,7 @@ _PASSES = 12
 
 
 def contracted(
-    contract: Callable[[Any], Any], right: Any, steps: Array | int, *, points_last: bool
+    contract: Callable[[Any], Any], right: Any, steps: Array | int, *, points_first: bool = False
 ) -> Any:
     """Solve y = right + contract(y) by repetition; NaN at points where it does not converge.
 
@@ -29,11 +40,9 @@ def contracted(
     contract : callable
         Linear.
     right : pytree of arrays
-        Of shape (points,), (..., points) or (points, ...).
+        Of shape (points,), (..., points) or, with `points_first`, (points, ...).
     steps : int
         That are enough, as a rule.
-    points_last : bool
-        Whether the points are the last axis of the arrays, or the first.
     """
 
     def step(_: Any, y: Any) -> Any:
@@ -43,7 +52,10 @@ def contracted(
         """Largest entry for each point."""
         leaves = jax.tree.leaves(tree)
         return jnp.stack(
-            [jnp.abs(a).max(range(a.ndim - 1) if points_last else range(1, a.ndim)) for a in leaves]
+            [
+                jnp.abs(a).max(range(1, a.ndim) if points_first else range(a.ndim - 1))
+                for a in leaves
+            ]
         ).max(0)
 
     def several(carry: tuple) -> tuple:
@@ -63,8 +75,73 @@ def contracted(
     new, left, _, _ = jax.lax.while_loop(unfinished, several, several(start))
 
     def kept(y: Array) -> Array:
-        shape = (1,) * (y.ndim - 1)
-        good = (left == 0).reshape((*shape, -1) if points_last else (-1, *shape))
+        good = (left == 0).reshape(-1, *(1,) * (y.ndim - 1)) if points_first else left == 0
         return jnp.where(good, y, jnp.nan)
 
     return jax.tree.map(kept, new)
+
+
+class Equations(ABC):
+    """Equations R(p, Y) = 0 of many operating points; hashable, without arrays.
+
+    R is the unknowns less the result of one step of a contraction.
+    """
+
+    @abstractmethod
+    def residual(self, parameters: Any, unknowns: Any, at: Any) -> Any:
+        """R, a pytree like the unknowns, each leaf of which depends on the parameters.
+
+        Parameters
+        ----------
+        parameters, unknowns : pytree
+        at : pytree
+            From `prepare`; of no derivative. It may scale and combine the equations.
+        """
+
+    @abstractmethod
+    def prepare(self, parameters: Any, unknowns: Any) -> tuple[Any, Array]:
+        """What `residual` needs at a solution, and the steps that linear systems take."""
+
+    def solve(
+        self, product: Callable[[Any], Any], right: Any, at: Any, steps: Array, *, transposed: bool
+    ) -> Any:
+        """Solve R_Y y = right, or the transposed system, by repeating y -> right + y - R_Y y.
+
+        `product` is R_Y y, or its transpose, as a function of y; NaN where it fails.
+        """
+        return contracted(lambda y: jax.tree.map(jnp.subtract, y, product(y)), right, steps)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def implicit_solution(equations: Equations, parameters: Any, solution: Any) -> Any:
+    """`solution` as a function of the parameters.
+
+    Parameters
+    ----------
+    equations : Equations
+    parameters : pytree of arrays
+    solution : pytree of arrays
+        Unknowns that solve the equations to round-off; a derivative of theirs does not count.
+
+    Returns
+    -------
+    pytree
+        `solution`, with the derivatives of all orders to `parameters`.
+    """
+    return solution
+
+
+@implicit_solution.defjvp
+def _implicit_rule(equations: Equations, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+    parameters, solution = primals
+    unknowns = implicit_solution(equations, parameters, solution)
+    at, steps = jax.lax.stop_gradient(equations.prepare(parameters, unknowns))
+    _, right = jax.jvp(lambda p: equations.residual(p, unknowns, at), (parameters,), (tangents[0],))
+    _, product = jax.linearize(lambda Y: equations.residual(parameters, Y, at), unknowns)
+    moved = jax.lax.custom_linear_solve(
+        product,
+        jax.tree.map(lambda a: -a, right),
+        solve=lambda multiply, b: equations.solve(multiply, b, at, steps, transposed=False),
+        transpose_solve=lambda m, b: equations.solve(m, b, at, steps, transposed=True),
+    )
+    return unknowns, moved

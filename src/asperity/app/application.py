@@ -22,18 +22,9 @@ from starlette.staticfiles import StaticFiles
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, asked
-from asperity.app.jobs import processes
 from asperity.app.jobs.processes import Jobs
-from asperity.app.jobs.threads import Busy, Lane, Preparation, Superseded
-from asperity.app.security import (
-    BODY_LIMIT,
-    BodyTooLarge,
-    BodyTooSlow,
-    Guard,
-    sentence,
-    too_large,
-    too_slow,
-)
+from asperity.app.jobs.threads import Lane, Preparation
+from asperity.app.security import BODY_LIMIT, Guard, body_too_slow, sentence
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming
@@ -42,7 +33,6 @@ from asperity.outputs.json import to_json
 STATIC = Path(__file__).parent / "static"
 
 _CLIENT = re.compile(r"[A-Za-z0-9-]{1,40}")
-_BUSY = "too many computations wait; try again in a while"
 
 _log = logging.getLogger("asperity.app")
 
@@ -89,7 +79,6 @@ def build(
                 limits[path] = endpoint.largest or BODY_LIMIT
             else:
                 handler = _answer(endpoint, lane)
-            handler = _refusing(handler, limits.get(path, BODY_LIMIT))
             routes.append(Route(path, handler, methods=["POST"]))
     preparation = Preparation(tasks)
     for module in modules:
@@ -127,7 +116,12 @@ def build(
             await jobs.close()
         uploads.close()
 
-    handlers: dict[Any, Any] = {HTTPException: _http_error, Exception: _fault}
+    handlers: dict[Any, Any] = {
+        InputError: _bad_input,
+        HTTPException: _http_error,
+        ClientDisconnect: _disconnected,
+        Exception: _fault,
+    }
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=handlers)
     app.router.redirect_slashes = False
     return Guard(app, port, in_notebook, limits)
@@ -146,9 +140,8 @@ def _upload(endpoint: Upload, uploads: Uploads) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
         # A form of another site cannot send this type without a preflight request.
         if request.headers.get("content-type", "") != "application/octet-stream":
-            raise InputError(
-                "request.body must be a file, got another type; send application/octet-stream"
-            )
+            advice = "send application/octet-stream"
+            raise InputError("request.body", "be a file", "another type", advice)
         upload = uploads.begin(unquote(request.headers.get("x-file-name", "recording")))
         whole, size = False, 0
         try:
@@ -159,7 +152,7 @@ def _upload(endpoint: Upload, uploads: Uploads) -> Callable[[Request], Any]:
                         file.write(piece)
             whole = True
         except TimeoutError:
-            raise BodyTooSlow from None
+            raise body_too_slow() from None
         finally:
             if not whole:
                 uploads.remove(upload.key)
@@ -186,39 +179,12 @@ def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any
 
         async def lines() -> AsyncIterator[str]:
             async with contextlib.aclosing(messages):
-                try:
-                    async for message in messages:
-                        yield to_json(message) + "\n"
-                except processes.Busy:
-                    yield to_json({"error": _BUSY, "done": True}) + "\n"
+                async for message in messages:
+                    yield to_json(message) + "\n"
 
         return StreamingResponse(lines(), media_type="application/x-ndjson")
 
     return handle
-
-
-def _refusing(handle: Callable[[Request], Any], limit: int) -> Callable[[Request], Any]:
-    """The same handler, with a sentence for each refusal."""
-
-    async def handle_or_refuse(request: Request) -> Response:
-        try:
-            response: Response = await handle(request)
-        except InputError as error:
-            with naming(in_labels):
-                return sentence(400, str(error))
-        except Superseded:
-            return sentence(409, "a newer request took the place of this one")
-        except Busy:
-            return sentence(503, _BUSY)
-        except BodyTooLarge:
-            return too_large(limit)
-        except BodyTooSlow:
-            return too_slow()
-        except ClientDisconnect:
-            return Response(status_code=499)
-        return response
-
-    return handle_or_refuse
 
 
 def _client(request: Request) -> str:
@@ -230,11 +196,22 @@ def _json(text: str) -> Response:
     return Response(text, media_type="application/json")
 
 
+async def _bad_input(request: Request, error: InputError) -> Response:
+    with naming(in_labels):
+        return sentence(HTTPException(400, str(error)))
+
+
 async def _http_error(request: Request, error: HTTPException) -> Response:
     texts = {404: "there is no such page", 405: "this address takes another method"}
-    return sentence(error.status_code, texts.get(error.status_code, "the request is refused"))
+    error.detail = texts.get(error.status_code, error.detail)
+    return sentence(error)
+
+
+async def _disconnected(request: Request, error: ClientDisconnect) -> Response:
+    return Response(status_code=499)
 
 
 async def _fault(request: Request, error: Exception) -> Response:
     _log.error("%s failed", request.url.path, exc_info=error)
-    return sentence(500, "the server failed by a defect of the program; its console says more")
+    text = "the server failed by a defect of the program; its console says more"
+    return sentence(HTTPException(500, text))

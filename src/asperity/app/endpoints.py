@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.questions import record as questions
 
 
@@ -119,7 +119,7 @@ async def asked(request: Request, kind: type[Question]) -> Any:
         If the body is no JSON, or is no question of this kind.
     """
     if request.headers.get("content-type", "").split(";")[0].strip() != "application/json":
-        raise InputError("request.body must be JSON, got another type; send application/json")
+        raise InputError("request.body", "be JSON", "another type", "send application/json")
     body = await request.body()
     try:
         value = json.loads(body, parse_constant=_no_constant)
@@ -127,20 +127,18 @@ async def asked(request: Request, kind: type[Question]) -> Any:
         # Half a surrogate pair is JSON and no text: nothing can write it again.
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
-        raise InputError(
-            "request.body must hold texts of whole characters, got half a surrogate pair; leave it "
-            "out"
-        ) from None
+        rule, got = "hold texts of whole characters", "half a surrogate pair"
+        raise InputError("request.body", rule, got, "leave it out") from None
     except (ValueError, RecursionError):
-        raise InputError("request.body must be JSON, got something else; send JSON") from None
-    if not isinstance(value, dict):
-        raise InputError("request.body must be a JSON object, got another value; send an object")
+        raise InputError("request.body", "be JSON", "something else", "send JSON") from None
+    holds = isinstance(value, dict)
+    require(holds, "request.body", "be a JSON object", "another value", "send an object")
     try:
         return kind.model_validate(value)
     except ValidationError as error:
         raise questions.mistakes_in(error, kind, "request", shown=_shown)[0] from None
     except RecursionError:
-        raise InputError("request.body must not be nested so deep, got more; send less") from None
+        raise InputError("request.body", "not be nested so deep", "more", "send less") from None
 
 
 #: Most characters of a text, except in fields ``text``, and most parts of a list or table.
@@ -149,13 +147,12 @@ _LONGEST_TEXT, _MOST_PARTS = 300, 1000
 
 def _require_short(value: Any, field: str = "request") -> None:
     """Refuse what no form of the page holds, before anything looks at it."""
-    if isinstance(value, str) and len(value) > _LONGEST_TEXT and field != "text":
-        raise InputError(
-            field, f"have at most {_LONGEST_TEXT} characters", len(value), "send fewer"
-        )
+    if isinstance(value, str) and field != "text":
+        rule = f"have at most {_LONGEST_TEXT} characters"
+        require(len(value) <= _LONGEST_TEXT, field, rule, len(value), "send fewer")
     if isinstance(value, list | dict):
-        if len(value) > _MOST_PARTS:
-            raise InputError(field, f"have at most {_MOST_PARTS} parts", len(value), "send fewer")
+        rule = f"have at most {_MOST_PARTS} parts"
+        require(len(value) <= _MOST_PARTS, field, rule, len(value), "send fewer")
         named = value.items() if isinstance(value, dict) else ((field, part) for part in value)
         for name, part in named:
             _require_short(name, "a name")

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.laws import registered
 from asperity.parameters import DRIVE
 from asperity.parameters.arguments import at_least, typed
@@ -78,11 +78,8 @@ def explore(
     values: dict[str, Any] = {}
     if slider is not None:
         law = type(slider.law)
-        if registered().get(law.name) is not law:
-            raise InputError(
-                f"slider.law must be a registered one, got {law.__name__}; "
-                "register it with asperity.laws.register"
-            )
+        known, advice = registered().get(law.name) is law, "register it with asperity.laws.register"
+        require(known, "slider.law", "be a registered one", law.__name__, advice)
         values = {"law": law.name, "laws": "", **slider_values(slider)}
     for name, value in (("V", velocity), ("epsilon", epsilon), ("frequency", frequency)):
         if value is not None:
@@ -90,11 +87,8 @@ def explore(
     for name, value in values.items():
         if isinstance(value, str):
             continue
-        if np.size(value) != 1:
-            raise InputError(
-                f"{name} must be one number, got an array of shape {np.shape(value)}; "
-                "the page shows one operating point"
-            )
+        got, advice = f"an array of shape {np.shape(value)}", "the page shows one operating point"
+        require(np.size(value) == 1, name, "be one number", got, advice)
         values[name] = repr(float(np.ravel(value)[0]))
     fragment = f"#explore?{urlencode(values)}" if values else "#explore"
     return Page(_server() + fragment, height)

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -79,33 +80,36 @@ class Guard:
         limit = self.body_limits.get(scope["path"], BODY_LIMIT)
         refusal = self._refusal(scope, limit)
         if refusal is not None:
-            await refusal(scope, receive, send_guarded)
+            await sentence(refusal)(scope, receive, send_guarded)
             return
         body = _LimitedBody(receive, limit)
         await self.app(scope, body, send_guarded)
 
-    def _refusal(self, scope: Scope, limit: int) -> JSONResponse | None:
+    def _refusal(self, scope: Scope, limit: int) -> HTTPException | None:
         hosts = list(_values(scope["headers"], b"host"))
         if len(hosts) != 1 or hosts[0].lower() not in self.hosts:
-            return sentence(421, "the address must be that of this machine, such as localhost")
+            return HTTPException(421, "the address must be that of this machine, such as localhost")
         origins = list(_values(scope["headers"], b"origin"))
-        if any(origin.lower() not in self.origins for origin in origins):
-            return sentence(403, "a request must come from the page itself, not from another site")
         site = next(_values(scope["headers"], b"sec-fetch-site"), "same-origin")
-        if scope["path"].startswith("/api/") and site not in ("same-origin", "none"):
-            return sentence(403, "a request must come from the page itself, not from another site")
+        elsewhere = scope["path"].startswith("/api/") and site not in ("same-origin", "none")
+        if elsewhere or any(origin.lower() not in self.origins for origin in origins):
+            text = "a request must come from the page itself, not from another site"
+            return HTTPException(403, text)
         length = next(_values(scope["headers"], b"content-length"), "0")
         if not length.isdecimal() or len(length) > 20 or int(length) > limit:
-            return too_large(limit)
+            return _too_large(limit)
         return None
 
 
-class BodyTooLarge(Exception):  # noqa: N818
-    """A body went beyond its limit while it was read."""
+def body_too_slow() -> HTTPException:
+    """A body did not arrive in time; the connection ends with the answer."""
+    text = "the request did not arrive in time; send it again"
+    return HTTPException(408, text, {"connection": "close"})
 
 
-class BodyTooSlow(Exception):  # noqa: N818
-    """A body did not arrive in time."""
+def _too_large(limit: int) -> HTTPException:
+    shown = f"{limit // 1024**2} MB" if limit >= 1024**2 else f"{limit // 1024} kB"
+    return HTTPException(413, f"a request must be at most {shown} long; send less")
 
 
 class _LimitedBody:
@@ -117,7 +121,7 @@ class _LimitedBody:
 
     def __init__(self, receive: Receive, limit: int) -> None:
         self.receive = receive
-        self.left = limit
+        self.left = self.limit = limit
         self.patience = BODY_PAUSE
         self.complete = False
 
@@ -128,7 +132,7 @@ class _LimitedBody:
         try:
             message = await asyncio.wait_for(self.receive(), self.patience)
         except TimeoutError:
-            raise BodyTooSlow from None
+            raise body_too_slow() from None
         if message["type"] == "http.request":
             size = len(message.get("body", b""))
             waited = time.monotonic() - begin
@@ -136,25 +140,13 @@ class _LimitedBody:
             self.left -= size
             self.complete = not message.get("more_body", False)
             if self.left < 0:
-                raise BodyTooLarge
+                raise _too_large(self.limit)
         return message
 
 
-def sentence(status: int, text: str, headers: dict[str, str] | None = None) -> JSONResponse:
+def sentence(refusal: HTTPException) -> JSONResponse:
     """An answer that says in one sentence why there is no other."""
-    return JSONResponse({"error": text}, status_code=status, headers=headers)
-
-
-def too_slow() -> JSONResponse:
-    """The answer to a body that does not come; the connection ends with it."""
-    text = "the request did not arrive in time; send it again"
-    return sentence(408, text, {"connection": "close"})
-
-
-def too_large(limit: int) -> JSONResponse:
-    """The answer to a body above its limit."""
-    shown = f"{limit // 1024**2} MB" if limit >= 1024**2 else f"{limit // 1024} kB"
-    return sentence(413, f"a request must be at most {shown} long; send less")
+    return JSONResponse({"error": refusal.detail}, refusal.status_code, refusal.headers)
 
 
 def _values(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> Any:

@@ -20,7 +20,7 @@ from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.parameters.arguments import shown
 
 #: Longest time (s) from the opening of a connection, or from its last answer, to the end of the
@@ -100,11 +100,9 @@ def require_extra() -> None:
         If one is not.
     """
     missing = [name for name in _PACKAGES if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"the extra 'app' must be installed to serve the page, got no {', '.join(missing)}; "
-            "write make app in a clone, or pip install 'asperity[app]' in an environment"
-        )
+    rule, got = "be installed to serve the page", f"no {', '.join(missing)}"
+    advice = "write make app in a clone, or pip install 'asperity[app]' in an environment"
+    require(not missing, "the extra 'app'", rule, got, advice)
 
 
 ADDRESS = "127.0.0.1"
@@ -176,19 +174,16 @@ def listen(port: int) -> socket.socket:
     InputError
         If the port is no port or is taken.
     """
-    if not 0 <= port < 65536:
-        raise InputError(
-            f"--port must be from 0 to 65535, got {shown(port)}; leave it out for 8765"
-        )
+    holds, advice = 0 <= port < 65536, "leave it out for 8765"
+    require(holds, "--port", "be from 0 to 65535", shown(port), advice)
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((ADDRESS, port))
     except OSError as error:
         listening.close()
-        raise InputError(
-            f"--port must be free, got {port} ({error.strerror}); name another one, or 0 for any"
-        ) from None
+        got, advice = f"{port} ({error.strerror})", "name another one, or 0 for any"
+        raise InputError("--port", "be free", got, advice) from None
     return listening
 
 
@@ -208,7 +203,6 @@ def server_on(
     import uvicorn
 
     from asperity.app.application import build
-    from asperity.app.server import HEAD_PAUSE, Connection
 
     config = uvicorn.Config(
         build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare, laws=laws),

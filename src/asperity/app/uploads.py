@@ -19,7 +19,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 
-from asperity.errors import InputError, printable
+from asperity.errors import InputError, printable, require
 from asperity.outputs import free_disk, size_text
 from asperity.outputs.written import held_folder
 
@@ -72,10 +72,8 @@ class Uploads:
         try:
             self.folder, lock = held_folder(Path(tempfile.gettempdir()), _PREFIX)
         except OSError as error:
-            raise InputError(
-                "the folder for temporary files must be one that can be written, got none "
-                f"({error.strerror}); set TMPDIR"
-            ) from None
+            field, got = "the folder for temporary files", f"none ({error.strerror})"
+            raise InputError(field, "be one that can be written", got, "set TMPDIR") from None
         self._end = weakref.finalize(self, _remove, self.folder, lock)
         self._files: OrderedDict[str, Upload] = OrderedDict()
 
@@ -88,11 +86,9 @@ class Uploads:
             If the disk is full.
         """
         self._make_room()
-        if free_disk(self.folder) < LARGEST + _SPARE:
-            raise InputError(
-                f"the disk must have {size_text(LARGEST + _SPARE)} free for a file of the page, "
-                f"got {size_text(free_disk(self.folder))}; make room"
-            )
+        free, needed = free_disk(self.folder), LARGEST + _SPARE
+        rule = f"have {size_text(needed)} free for a file of the page"
+        require(free >= needed, "the disk", rule, size_text(free), "make room")
         key = secrets.token_hex(16)
         ending = re.search(r"\.(\w{1,5})$", name)
         known = ending is not None and ending[1].lower() in _ENDINGS
@@ -111,9 +107,8 @@ class Uploads:
         """
         upload = self._files.get(key)
         if upload is None or not upload.path.is_file():
-            raise InputError(
-                "recording must be one that the server still has, got another; drop the file again"
-            )
+            rule, advice = "be one that the server still has", "drop the file again"
+            raise InputError("recording", rule, "another", advice)
         self._files.move_to_end(key)
         return upload
 

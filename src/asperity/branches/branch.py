@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from asperity.branches.parameters import ContinuedParameter
     from asperity.branches.steps import BranchFollower, BranchOrbit
-    from asperity.orbit.methods.branch_following.arclength import ContinuationPoint
+    from asperity.orbit.mesh.arclength import ContinuationPoint
     from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]

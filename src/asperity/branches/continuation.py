@@ -186,7 +186,7 @@ def continuation(
     Notes
     -----
     Collocation with the arclength condition of Keller (1977), see
-    `asperity.orbit.methods.branch_following.arclength`.
+    `asperity.orbit.mesh.arclength`.
     """
     problem = one_problem(
         slider,

@@ -23,15 +23,15 @@ from asperity.branches.continuation import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.equations import condensed, transfer_maps
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import Change
-from asperity.orbit.methods.branch_following.arclength import (
+from asperity.orbit.mesh.arclength import (
     ContinuationPoint,
     ParameterLine,
     slip_units,
     weighted_row,
 )
+from asperity.orbit.mesh.equations import condensed, transfer_maps
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import Change
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider.problem import Problem
 

@@ -15,8 +15,8 @@ import numpy as np
 from asperity.errors import InputError, closest
 from asperity.laws import Law
 from asperity.loads import Modulation
+from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.methods.branch_following.arclength import ParameterLine, still
 from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from asperity._jax import spare_mappings
 from asperity.algebra.continuation import STEPS, Attempt, Curves, Indices, StepControl, follow
 from asperity.orbit.floquet import log_multipliers
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import Change
-from asperity.orbit.mesh.reading import read_orbit
-from asperity.orbit.mesh.remeshing import remeshed
-from asperity.orbit.methods.branch_following.arclength import (
+from asperity.orbit.mesh.arclength import (
     ArclengthStep,
     ContinuationPoint,
     ParameterLine,
@@ -23,6 +19,9 @@ from asperity.orbit.methods.branch_following.arclength import (
     first_point,
     interpolated,
 )
+from asperity.orbit.mesh.equations import read_orbit
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import Change, remeshed
 
 Float = NDArray[np.float64]
 

@@ -6,14 +6,16 @@ import csv
 import io
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option
+from asperity.cli.options import output_options
+from asperity.cli.report import Output
 
 if TYPE_CHECKING:
     from asperity.inference import Design
+    from asperity.outputs.tables import Section
 
 _EPILOG = """\b
 Examples:
@@ -41,8 +43,8 @@ line by line, examples/load_on_age.toml is one.
 @click.option(
     "--csv", "table", type=Path, metavar="CSV", help="Write the points as a table for `response`."
 )
-@json_option()
-def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
+@output_options()
+def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int:
     """Operating points that measure parameters or exclude a law best.
 
     Points, expected standard errors, and how many times fewer readings they are than an even grid
@@ -50,7 +52,6 @@ def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
     """
     from asperity import inference
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
     from asperity.outputs import output_file, written_file
 
     target = None
@@ -62,7 +63,7 @@ def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
     if target is not None:
         with written_file(target) as fresh:
             fresh.write_text(_csv(result), encoding="utf-8")
-    click.echo(to_json(result.record()) if as_json else design_text(result))
+    output.answer(result.record, lambda: _sections(result), checked.truth.law.name)
     return 0
 
 
@@ -75,36 +76,34 @@ def _csv(result: Design) -> str:
     return text.getvalue()
 
 
-def design_text(result: Design) -> str:
+def _sections(result: Design) -> list[Section]:
     """A design as a person reads it."""
-    from asperity.outputs.tables import aligned
+    from asperity.outputs.tables import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
     plan = result.plan
     known = point_parameters(plan.truth.law)
-    axes = [a.name for a in plan.axes]
-    rows: list[tuple[str, ...]] = [(*axes, "readings", *plan.noise)]
+    axes = list(plan.axes)
+    rows = []
     for p in result.points:
         settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
         predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
         rows.append((*settings, str(p.readings), *predicted))
-    aim = f"to measure {', '.join(plan.measured)}"
+    aim = f"to measure {', '.join(plan.question.measure)}"
     if plan.rival is not None:
         aim = f"to exclude {plan.rival.law.name}"
-    lines = [f"{plan.truth.law.name}: {result.readings} readings {aim}", aligned(rows, "  ")]
-    if plan.budget.time is not None:
-        lines.append(f"time {result.spent:.4g} s of {plan.budget.time:.4g} s")
-    table = [("", "expected", "std. error", "even grid", "")]
-    table += [
+    title = f"{plan.truth.law.name}: {result.readings} readings {aim}"
+    points = Section(title, head=(*axes, "readings", *plan.noise), rows=tuple(rows))
+    numbers = tuple(
         (n, f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
         for n, p in result.parameters.items()
-    ]
-    lines += ["parameters", aligned(table, "  ")]
+    )
+    head = ("", "expected", "std. error", "even grid", "")
     grid = " x ".join(f"{m} {n}" for n, m in zip(axes, result.grid_levels, strict=True))
     what = "chi-squared" if plan.rival is not None else "interval"
     fewer = "infinitely many" if math.isinf(result.fewer) else f"{result.fewer:.3g}"
-    lines += [
+    lines = [
         f"{fewer} times fewer readings than an even grid for the same {what} ({grid}; "
         f"{result.grid_usable[0]} of {result.grid_usable[1]} usable)",
         f"efficiency at least {result.efficiency:.3f}, of the whole readings "
@@ -127,20 +126,20 @@ def design_text(result: Design) -> str:
             f"readings at one {axis} alone, in multiples of the design's: {', '.join(several)}; "
             f"best {format_si(best[0], known[axis].kind, 3)}"
         )
-    lines += _simulation_lines(result)
-    return "\n".join([*lines, *(f"warning: {w}" for w in result.warnings)])
-
-
-def _simulation_lines(result: Design) -> list[str]:
-    from asperity.outputs.tables import aligned
-
-    s: Any = result.simulation
-    if s is None:
-        return []
-    rows = [("", "spread", "expected")]
-    rows += [
-        (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{result.parameters[n].se:.3g}")
-        for n, x in s.spread.items()
+    sections = [
+        points,
+        Section("parameters", head=head, rows=numbers),
+        Section("", tuple(lines)),
     ]
-    decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"
-    return [f"{s.sets} simulated fits{decided}", aligned(rows, "  ")]
+    if plan.question.time is not None:
+        spent = f"time {result.spent:.4g} s of {plan.budget:.4g} s"
+        sections.insert(1, Section("", (spent,)))
+    if (s := result.simulation) is not None:
+        decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"
+        spread = tuple(
+            (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{result.parameters[n].se:.3g}")
+            for n, x in s.spread.items()
+        )
+        title = f"{s.sets} simulated fits{decided}"
+        sections.append(Section(title, head=("", "spread", "expected"), rows=spread))
+    return [*sections, Section("", warnings=tuple(result.warnings))]

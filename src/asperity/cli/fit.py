@@ -9,23 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import (
-    field_option,
-    json_option,
-    law_options,
-    names_option,
-    plot_option,
-    settings_of,
-)
+from asperity.cli.options import field_option, law_options, output_options, settings_of
 from asperity.cli.recording import listed_times, source_options
+from asperity.cli.report import Output, say
 from asperity.cli.words import fields_as_options
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.outputs import require_folder
 
 if TYPE_CHECKING:
     from asperity.inference import Fit as FitResult
     from asperity.inference.posterior import Posterior
-    from asperity.parameters import Names
 
 _EPILOG = """\b
 Examples:
@@ -125,17 +118,13 @@ _THEN = (
 )
 
 
-def _question_options(
-    *further: Any, laws: str | None = None
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
     Parameters
     ----------
     *further : click options
         Of this command alone, which follow those that are needed first.
-    laws : str, optional
-        The laws where none is named.
     """
 
     def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -171,16 +160,14 @@ def _question_options(
 
         first = (
             click.argument("data", nargs=-1, required=True, type=Path),
-            law_options(laws),
-            plot_option(),
+            law_options,
             click.option(
                 "--report",
                 type=Path,
                 metavar="DIR",
                 help="Folder for a page with pictures, the numbers, and a material.",
             ),
-            names_option(),
-            json_option(),
+            output_options(plot=True),
             *_FIRST,
         )
         result: Callable[..., Any] = gathered
@@ -211,9 +198,7 @@ def fit(
     seed: int,
     out: Path | None,
     report: Path | None,
-    plot: Path | None,
-    names: Names,
-    as_json: bool,
+    output: Output,
 ) -> int:
     """Fit a friction law to recordings, to tables of readings, or to holds.
 
@@ -221,22 +206,19 @@ def fit(
     describes the data.
     """
     from asperity.cli.progress import bar
-    from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference import WindowedFit
     from asperity.inference.answers import answer_fit
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import fit_report, posterior_sections, windows_sections
     from asperity.questions.fit import Fit
 
-    if len(laws) > 1 or "all" in laws:
-        raise InputError(
-            "--law", "be one law for a fit", ",".join(laws), "compare several: asperity compare"
-        )
+    one, advice = len(laws) < 2 and "all" not in laws, "compare several: asperity compare"
+    require(one, "--law", "be one law for a fit", ",".join(laws), advice)
     sampling = {"chains": chains, "draws": draws, "seed": seed}
     _check_sampling(posterior, sampling, out)
     if report is not None:
         require_folder(report, "--report")
-    require_picture(plot, *(d["file"] for d in fields["data"]))
+    output.require_picture(*(d["file"] for d in fields["data"]))
     question = Fit(law=laws[0] if laws else None, **fields)
     with bar("window" if question.windows else "step", "fit", raising=False) as update:
         answer = answer_fit(question, progress=update)
@@ -247,32 +229,33 @@ def fit(
         from asperity.fit_report import write_report
 
         write_report(report, result, sampled)
-    if as_json:
-        more = {"posterior": sampled.record()} if sampled else {}
-        more |= {"windows": over.record()} if over else {}
-        click.echo(to_json({**fit_record(result), **more}, names, result.law))
-    else:
-        sections = fit_report(result)
-        sections += windows_sections(over) if over else []
-        sections += posterior_sections(sampled) if sampled else []
-        click.echo(sections_text(sections, names, result.law))
+    more = {"posterior": sampled.record()} if sampled else {}
+    more |= {"windows": over.record()} if over else {}
+    output.answer(
+        lambda: {**fit_record(result), **more},
+        lambda: [
+            *fit_report(result),
+            *(windows_sections(over) if over else []),
+            *(posterior_sections(sampled) if sampled else []),
+        ],
+        result.law,
+    )
     if report is not None and result.converged:
         _say_written(report)
     if result.converged:
-        write_picture(result, plot, names)
+        output.draw(result)
     return 0 if result.converged and (sampled is None or sampled.converged) else 1
 
 
 def _say_written(report: Path) -> None:
     files = ", ".join(sorted(p.name for p in report.iterdir() if p.name != "report.html"))
-    click.echo(f"asperity: the report is {report / 'report.html'}, with {files}", err=True)
+    say(f"the report is {report / 'report.html'}, with {files}")
 
 
 def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None) -> None:
     """Refuse what cannot be sampled or written before anything is computed."""
     if not posterior:
-        if out is not None:
-            raise InputError("--out must come with --posterior, got it alone; add --posterior")
+        require(out is None, "--out", "come with --posterior", "it alone", "add --posterior")
         return
     from asperity.inference.posterior import require_bayes
     from asperity.inference.posterior.sampling import require_sizes
@@ -281,10 +264,8 @@ def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None)
     require_sizes(sampling["chains"], sampling["draws"])
     require_bayes()
     if out is not None:
-        if out.suffix.lower() != ".nc":
-            raise InputError(
-                f"--out must be a NetCDF file, got '{out}'; write it like --out posterior.nc"
-            )
+        netcdf, like = out.suffix.lower() == ".nc", "write it like --out posterior.nc"
+        require(netcdf, "--out", "be a NetCDF file", f"'{out}'", like)
         output_file(out, "--out", example="posterior.nc")
 
 
@@ -316,36 +297,30 @@ if its AICc exceeds the lowest by 10 or more.
 
 
 @click.command(epilog=_EPILOG_OF_COMPARE)
-@_question_options(
-    click.option("--windows", hidden=True, metavar="SPANS"),
-    laws="all",
-)
+@_question_options(click.option("--windows", hidden=True, metavar="SPANS"))
 def compare(
     laws: tuple[str, ...],
     fields: dict[str, Any],
     report: Path | None,
-    plot: Path | None,
-    names: Names,
-    as_json: bool,
+    output: Output,
 ) -> int:
     """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
-    from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference.answers import answer_comparison
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.report import comparison_report
     from asperity.questions.fit import Comparison
 
     if fields.pop("windows", None) is not None:
-        raise InputError(
-            "--windows must go with asperity fit, got it with compare: windows of one recording "
-            "overlap, so that what they say against a law does not add up; compare with --window "
-            "START:END, one at a time"
+        got = (
+            "it with compare: windows of one recording overlap, and their evidence does not add up"
         )
+        advice = "compare with --window START:END, one at a time"
+        raise InputError("--windows", "go with asperity fit", got, advice)
     if report is not None:
         require_folder(report, "--report")
-    require_picture(plot, *(d["file"] for d in fields["data"]))
-    fields["laws"] = laws
+    output.require_picture(*(d["file"] for d in fields["data"]))
+    fields["laws"] = laws or ("all",)
     question = Comparison(**fields)
     with bar("%", raising=False) as update:
 
@@ -357,15 +332,16 @@ def compare(
             update(round(100 * done / total), 100, label)
 
         comparison = answer_comparison(question, progress=progress)
-    if as_json:
-        click.echo(to_json(comparison_record(comparison), names, comparison.best))
-    else:
-        click.echo(sections_text(comparison_report(comparison), names, comparison.best))
+    output.answer(
+        lambda: comparison_record(comparison),
+        lambda: comparison_report(comparison),
+        comparison.best,
+    )
     if report is not None and comparison.best:
         from asperity.fit_report import write_comparison
 
         write_comparison(report, comparison)
         _say_written(report)
     if comparison.best:
-        write_picture(comparison, plot, names)
+        output.draw(comparison)
     return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

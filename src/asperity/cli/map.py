@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, names_option, plot_option, point_options
-from asperity.errors import InputError, closest
+from asperity.cli.options import output_options, point_options
+from asperity.cli.report import Output, save_figure, say
+from asperity.errors import require
+from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.parameters import Names
     from asperity.questions.point import Point
 
 _EPILOG = """\b
@@ -36,9 +37,7 @@ bifurcation and the frequency of its mode.
 @click.option("--x", "x", metavar="AXIS", help='Number along x, like "epsilon=0.01:0.5:200".')
 @click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
 @point_options
-@plot_option()
-@names_option()
-@json_option()
+@output_options(plot=True)
 @click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
 @click.option(
     "--show",
@@ -57,115 +56,67 @@ def map(
     log_y: bool,
     point: Point,
     out: Path | None,
-    plot: Path | None,
-    names: Names,
+    output: Output,
     show: str,
     resume: bool,
-    as_json: bool,
 ) -> int:
     """Response and stability over any two numbers, with the stability boundary.
 
     The boundary is located to 1e-4 of the axes or better, with the bifurcation and the frequency
     of the mode at each of its points.
     """
-    _check_outputs(out, plot, show)
-    result = _solve(point, (x, log_x), (y, log_y), out, resume)
-    if plot is not None:
-        from asperity.cli.report import save_figure
-        from asperity.figures.map import draw_map
-
-        save_figure(lambda: draw_map(result, show), plot, names)
-    _print(result, out, as_json, names)
-    unresolved = int(result.attrs["boundary_unresolved_chords"])
-    if unresolved:
-        click.echo(
-            f"asperity: the boundary bends too much for the grid at {unresolved} places, where "
-            "it is not known to 1e-4; refine the grid",
-            err=True,
-        )
-    failed = int((~result["converged"]).sum())
-    if failed:
-        click.echo(
-            f"asperity: {failed} of {result['converged'].size} points have no response; the "
-            f"variable 'result' of {out} says why",
-            err=True,
-        )
-    return 1 if failed else 0
-
-
-def _solve(
-    point: Point,
-    x: tuple[str | None, bool],
-    y: tuple[str | None, bool],
-    out: Path | None,
-    resume: bool,
-) -> xarray.Dataset:
     from asperity.cli.progress import bar
+    from asperity.figures.map import draw_map
     from asperity.operating_point import offered_numbers
-    from asperity.study.map import Axis, write_map
+    from asperity.outputs import output_files
+    from asperity.outputs.tables import Section
+    from asperity.study.map import SHOWN, Axis, write_map
 
-    axes = []
-    for option, (text, log) in (("--x", x), ("--y", y)):
-        if text is None:
-            raise InputError(
-                f"{option} must be given, got nothing; write it like {option} "
-                "'epsilon=0.01:0.5:200'"
-            )
-        axes.append(Axis.parse(text, log))
+    one_of(show, SHOWN, "--show")
+    for option, text, example in (
+        ("--out", out, "map.nc"),
+        ("--x", x, "'epsilon=0.01:0.5:200'"),
+        ("--y", y, "'K=0.05:0.5:200 N/um'"),
+    ):
+        require(text, option, "be given", "nothing", f"write it like {option} {example}")
+    assert out is not None
+    output.require_picture()
+    output_files({"--out": out, "--plot": output.plot})
+    along_x, along_y = Axis.parse(str(x), log_x), Axis.parse(str(y), log_y)
     # A material's number gives way to an axis; one that was given for this map does not.
-    kept, varied = point.parameters, {axis.name for axis in axes}
     numbers = {
         name: number
         for name, number in offered_numbers(point, "command line").items()
-        if name in kept or name not in varied
+        if name in point.parameters or name not in (along_x.name, along_y.name)
     }
-    assert out is not None
     with bar("point", "map") as update:
-        return write_map(
-            out,
-            point.law,
-            numbers,
-            x=axes[0],
-            y=axes[1],
-            resume=resume,
-            progress=lambda done, total: update(done, total, ""),
+        result = write_map(
+            out, point.law, numbers, x=along_x, y=along_y, resume=resume, progress=update
         )
-
-
-def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
-    """Check files and quantity before anything is solved."""
-    from asperity.cli.report import require_picture
-    from asperity.outputs import output_files
-    from asperity.study.map import SHOWN
-
-    if show not in SHOWN:
-        raise InputError(
-            f"--show must be a quantity of the map, got '{show}'; {closest(show, SHOWN)}"
-        )
-    if out is None:
-        raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
-    require_picture(plot)
-    output_files({"--out": out, "--plot": plot})
-
-
-def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool, names: Names) -> None:
-    from asperity.cli.report import to_json
-    from asperity.outputs.tables import aligned
-    from asperity.parameters import display_name
-
-    record = _record(dataset, out)
-    if as_json:
-        click.echo(to_json(record, names, str(dataset.attrs["law"])))
-        return
-    rows = [(name, str(record[name])) for name in ("points", "stable", "unstable", "failed")]
-    click.echo(aligned(rows))
+    if output.plot is not None:
+        save_figure(lambda: draw_map(result, show), output.plot, output.names)
+    record = _record(result, out)
+    rows = tuple((name, str(record[name])) for name in ("points", "stable", "unstable", "failed"))
+    boundaries = []
     for line in record["boundaries"]:
         kinds = " and ".join(dict.fromkeys(line["kind"]))
         spans = ", ".join(
-            f"{display_name(name, names)} {min(line[name]):.6g} to {max(line[name]):.6g}"
+            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g}"
             for name in (record["x"], record["y"])
         )
-        click.echo(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
+        boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
+    table = [Section("", rows=rows), Section("", tuple(boundaries))]
+    output.answer(lambda: record, lambda: table, point.law, "")
+    unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
+    say(
+        unresolved
+        and f"the boundary bends too much for the grid at {unresolved} places, where it is not "
+        "known to 1e-4; refine the grid",
+        failed
+        and f"{failed} of {record['points']} points have no response; the variable 'result' of "
+        f"{out} says why",
+    )
+    return 1 if failed else 0
 
 
 def _record(dataset: xarray.Dataset, out: Path | None) -> dict[str, Any]:

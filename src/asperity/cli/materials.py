@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option
-from asperity.errors import InputError
+from asperity.cli.options import output_options
+from asperity.cli.report import Output
+from asperity.errors import require
 
 if TYPE_CHECKING:
     from asperity.materials import Material, Number
@@ -27,40 +28,33 @@ a fit), assumed (not in the paper).
 @click.command(epilog=_EPILOG)
 @click.argument("name", required=False)
 @click.option("--cite", is_flag=True, help="Print the source as BibTeX.")
-@json_option()
-def materials(name: str | None, cite: bool, as_json: bool) -> int:
+@output_options()
+def materials(name: str | None, cite: bool, output: Output) -> None:
     """List the materials, or every number of one.
 
     NAME is a material, or the path of your TOML file.
     """
+    from asperity import materials as known
+    from asperity.outputs.tables import Section
+
     if cite:
-        return _cite(name, as_json)
-    from asperity import materials as known
-    from asperity.cli.report import to_json
-    from asperity.outputs.tables import aligned
-
-    if name is not None:
-        material = known.load(name)
-        click.echo(to_json(_record(material)) if as_json else _text(material))
-        return 0
-    loaded = [known.load(n) for n in known.available()]
-    if as_json:
-        click.echo(to_json({m.name: {"title": m.title, "source": m.source} for m in loaded}))
+        keys = known.available_citations() if name is None else (known.load(name).source,)
+        require(all(keys), str(name), "have a source to cite", "none", "add it to the file")
+        entries = {key: known.citation(key) for key in keys}
+        output.answer(lambda: entries, lambda: [Section("\n\n".join(entries.values()))])
+    elif name is None:
+        loaded = [known.load(n) for n in known.available()]
+        output.answer(
+            lambda: {m.name: {"title": m.title, "source": m.source} for m in loaded},
+            lambda: [Section("", rows=tuple((m.name, m.title) for m in loaded))],
+            indent="",
+        )
     else:
-        click.echo(aligned((m.name, m.title) for m in loaded))
-    return 0
-
-
-def _cite(name: str | None, as_json: bool) -> int:
-    from asperity import materials as known
-    from asperity.cli.report import to_json
-
-    keys = known.available_citations() if name is None else (known.load(name).source,)
-    if not all(keys):
-        raise InputError(f"{name} must have a source to cite, got none; add it to the file")
-    entries = {key: known.citation(key) for key in keys}
-    click.echo(to_json(entries) if as_json else "\n\n".join(entries.values()))
-    return 0
+        material = known.load(name)
+        head = ("name", "value", "kind", "place", "note")
+        rows = tuple((n, str(v), v.kind, v.place, v.note) for n, v in material.numbers.items())
+        table = Section(f"{material.name}: {material.title}\n", head=head, rows=rows)
+        output.answer(lambda: _record(material), lambda: [table], indent="")
 
 
 def _record(material: Material) -> dict[str, Any]:
@@ -83,11 +77,3 @@ def _number(number: Number) -> dict[str, Any]:
         "unit": number.si_unit,
     }
     return number.model_dump() | {"si": in_si}
-
-
-def _text(material: Material) -> str:
-    from asperity.outputs.tables import aligned
-
-    rows = [("name", "value", "kind", "place", "note")]
-    rows += [(n, str(v), v.kind, v.place, v.note) for n, v in material.numbers.items()]
-    return f"{material.name}: {material.title}\n\n{aligned(rows)}"

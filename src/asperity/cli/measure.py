@@ -11,23 +11,20 @@ import click
 
 from asperity.cli.options import (
     field_option,
-    json_option,
     law_option,
     material_option,
-    names_option,
-    plot_option,
+    output_options,
     point_of,
     set_option,
     settings_of,
 )
 from asperity.cli.recording import listed_times, source_options
+from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
-from asperity.errors import InputError, naming
+from asperity.errors import InputError, naming, require
 
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
-    from asperity.measurement.verdicts.verdict import Check
-    from asperity.parameters import Names
     from asperity.questions.recording import Measurement as Question
     from asperity.questions.recording import Source
 
@@ -120,9 +117,6 @@ Examples:
   asperity measure day1/*.csv --out campaign.csv
   asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
       --conditions "run_k{K N/m}_v{V um/s}" --thresholds bifurcation.csv
-  asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
-      --conditions "run_k{K N/m}_v{V um/s}" --plot campaign.png \\
-      --law rice-ruina --material bureau2000
   asperity measure run_*.csv --stick-slip --set "W0=7 N" --set "M=1 kg" \\
       --conditions "run_k{K N/m}_v{V um/s}" --out campaign.csv --plot campaign.png \\
       --law rice-ruina --material bureau2000
@@ -139,9 +133,7 @@ in place of numbers; 2: bad input.
 
 @click.command(epilog=_EPILOG)
 @click.argument("recordings", type=Path, nargs=-1, required=True)
-@plot_option()
-@names_option()
-@json_option()
+@output_options(plot=True)
 @field_option(
     _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
     "START:END",
@@ -233,9 +225,7 @@ def measure(
     thresholds: Path | None,
     resume: bool,
     jobs: int | None,
-    as_json: bool,
-    plot: Path | None,
-    names: Names,
+    output: Output,
     **fields: Any,
 ) -> int:
     """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
@@ -244,7 +234,6 @@ def measure(
     laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. Several are
     measured into one table with --out.
     """
-    from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
 
     if fields["frequency"] == "auto":
@@ -258,73 +247,84 @@ def measure(
     given = settings_of(settings)
     known = {name: value for name, value in fields.items() if value is not None}
     question = Question(**known, **_machine(given, law is None))
-    if (law or material) and not (out and plot and stick_slip):
-        raise InputError(
-            "--law and --material must go with --out, --stick-slip and --plot, got them without; "
-            "add what is missing: they are drawn with a campaign"
-        )
-    if stick_slip and amplitudes:
-        raise InputError("--stick-slip must go without --amplitudes, got both; leave one out")
+    plot, count, one = output.plot, len(recordings), "leave one out"
+    drawn = not (law or material) or (out and plot and stick_slip)
+    rule, advice = (
+        "go with --out, --stick-slip and --plot",
+        "add what is missing: they draw a campaign",
+    )
+    require(drawn, "--law and --material", rule, "them without", advice)
+    apart = not (stick_slip and amplitudes)
+    require(apart, "--stick-slip", "go without --amplitudes", "both", one)
+    several = not out or not ((plot and not stick_slip) or events or steps or holds)
+    options, rule = "--plot, --events, --steps and --holds", "go with one recording without --out"
+    advice = "measure that recording by itself, or draw a campaign of --stick-slip"
+    require(several, options, rule, "both", advice)
+    rule, advice = "be given with several recordings", "name the table, like --out campaign.csv"
+    require(out or count == 1, "--out", rule, f"{count} without", advice)
+    table, options = out or not (resume or jobs or thresholds), "--resume, --jobs and --thresholds"
+    require(table, options, "go with --out", "no table", "name it or leave them out")
+    alone = not amplitudes or out or not (no_modulation or plot)
+    require(alone, "--amplitudes", "go without --no-modulation and --plot", "both", one)
+    rows_of = _file_rows(recordings, source, question, conditions)
+    output.require_picture(*recordings)
     if out is not None:
-        if (plot is not None and not stick_slip) or events is not None or steps or holds:
-            raise InputError(
-                "--plot, --events, --steps and --holds must go with one recording without --out, "
-                "got both; measure that recording by itself, or draw a campaign of --stick-slip"
-            )
-        rows_of = _file_rows(recordings, source, question, conditions)
-        require_picture(plot, *recordings)
         cycles = _cycles(law, material, given, conditions)
-        return _campaign(
-            recordings, rows_of, out, thresholds, plot, cycles, resume, jobs, as_json, names
-        )
-    if len(recordings) > 1:
-        raise InputError(
-            f"--out must be given with several recordings, got {len(recordings)} without; name "
-            "the table, like --out campaign.csv"
-        )
-    if resume or jobs is not None or thresholds is not None:
-        raise InputError(
-            "--resume, --jobs and --thresholds must go with --out, got no table; name it or leave "
-            "them out"
-        )
-    (recording,) = recordings
-    question = _file_rows(recordings, source, question, conditions).question_of(recording)
+        return _campaign(recordings, rows_of, out, thresholds, cycles, resume, jobs, output)
+    question = rows_of.question_of(recordings[0])
     if amplitudes:
-        if no_modulation or plot is not None:
-            raise InputError(
-                "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
-            )
-        return _amplitudes(recording, source, question, as_json)
-    require_picture(plot, recording)
-    if events is not None:
-        _check_catalogue(events, recording)
-    from asperity.measurement.from_file import answer_measurement
-    from asperity.recording.readers.from_file import read_source
-
-    trace = read_source(recording, source)
-    result, why = answer_measurement(trace, question)
-    if why:
-        click.echo(f"asperity: {why}", err=True)
-    if events is not None:
-        _catalogue(result, events)
-    _print(result, recording, trace.provenance, as_json, names)
-    write_picture(result, plot, names)
-    return _verdict(result.checks)
+        return _amplitudes(recordings[0], source, question, output)
+    return _one(recordings[0], source, question, events, output)
 
 
-def _amplitudes(recording: Path, source: Source, question: Question, as_json: bool) -> int:
-    from asperity.cli.measurement_text import amplitudes_text
-    from asperity.cli.report import to_json
+def _amplitudes(recording: Path, source: Source, question: Question, output: Output) -> int:
+    from asperity.cli.measurement_text import amplitude_sections
     from asperity.measurement.campaign import modulated_rows
     from asperity.measurement.from_file import modulated_parts
     from asperity.recording.readers.from_file import read_source
 
     rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
-    if as_json:
-        click.echo(to_json({"recording": str(recording), "amplitudes": rows}))
-    else:
-        click.echo(amplitudes_text(rows, recording.name))
+    output.answer(
+        lambda: {"recording": str(recording), "amplitudes": rows},
+        lambda: amplitude_sections(rows, recording.name),
+    )
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
+
+
+def _one(
+    recording: Path, source: Source, question: Question, events: Path | None, output: Output
+) -> int:
+    from asperity._version import __version__
+    from asperity.cli.measurement_text import measured_sections
+    from asperity.measurement.from_file import answer_measurement
+    from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.stick_slip import catalogue
+    from asperity.outputs import output_files
+    from asperity.recording.readers.from_file import read_source
+
+    if events is not None:
+        catalogue.check_catalogue(events)
+        output_files({"--events": events}, inputs={"recording": recording})
+    trace = read_source(recording, source)
+    result: Any
+    result, why = answer_measurement(trace, question)
+    say(why)
+    record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
+    if hasattr(result, "regimes"):
+        record_of = catalogue.stick_slip_record
+    if events is not None:
+        slips, advice = hasattr(result, "regimes"), "leave it out, or add --stick-slip"
+        require(slips, "--events", "go with a stick-slip recording", "another", advice)
+        catalogue.write_catalogue(result, events)
+    about = {"recording": str(recording), "version": __version__, **trace.provenance}
+    output.answer(
+        lambda: {**record_of(result), "provenance": about},
+        lambda: measured_sections(result, recording.name, output.names),
+    )
+    output.draw(result)
+    bad = [check for check in result.checks if check.verdict == "bad"]
+    say(*(f"{check.name} is bad: {check.sentence}" for check in bad))
+    return int(bool(bad))
 
 
 def _file_rows(
@@ -337,11 +337,10 @@ def _file_rows(
         return FileRows(source, question)
     rows_of = FileRows(source, question, conditions_of(recordings, conditions))
     for path, fields in rows_of.conditions.items():
-        twice = [n for n, f in MACHINE_FIELDS.items() if f in fields and getattr(question, f)]
-        if twice:
-            raise InputError(
-                f"{twice[0]} must be given once, got it by --set and by --conditions; leave one out"
-            )
+        for name, about in MACHINE_FIELDS.items():
+            once = about not in fields or not getattr(question, about)
+            got = "it by --set and by --conditions"
+            require(once, name, "be given once", got, "leave one out")
         try:
             rows_of.question_of(path)
         except InputError as error:
@@ -356,15 +355,16 @@ def _cycles(
     if law is None and material is None:
         return lambda campaign: campaign
     from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, offered_numbers
+    from asperity.operating_point import point_numbers
     from asperity.parameters import point_parameters
 
     with fields_as_options(POINT_OPTIONS):
-        offered = offered_numbers(point_of(law, material, given), "command line")
+        require(law, "law", "be given", "a material alone", "name the law of the cycles")
         chosen = get_law(str(law))
         among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
         needed = ("M",) if conditions is None else ()
-        numbers = numbers_for(chosen.name, offered, among, needed)
+        point = point_of(law, material, given)
+        numbers = point_numbers(point, "command line", among, needed)
     values = {name: number.value for name, number in numbers.items()}
 
     def added(campaign: StickSlipCampaign) -> StickSlipCampaign:
@@ -381,10 +381,9 @@ def _cycles(
         V = np.array([v for series in campaign.series for v in series.column("V")])
         V = V[np.isfinite(V)]
         if not modelled or not V.size:
-            click.echo(
-                "asperity: no curve of the law: K, W0, M and V must be known; give them by --set "
-                "or --conditions",
-                err=True,
+            say(
+                "no curve of the law: K, W0, M and V must be known; give them by --set or "
+                "--conditions"
             )
             return campaign
         columns = np.array([machines[k] for k in modelled]).T[:, :, None]
@@ -402,18 +401,15 @@ def _campaign(
     rows_of: FileRows,
     out: Path,
     thresholds: Path | None,
-    plot: Path | None,
     with_cycles: Cycles,
     resume: bool,
     jobs: int | None,
-    as_json: bool,
-    names: Names,
+    output: Output,
 ) -> int:
     import os
 
-    from asperity.cli.measurement_text import healing_text
+    from asperity.cli.measurement_text import healing_section
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json, write_picture
     from asperity.measurement.campaign import run_campaign
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
@@ -421,14 +417,12 @@ def _campaign(
     from asperity.outputs import output_files, written_file
 
     question = rows_of.question
-    if thresholds is not None and not question.stick_slip:
-        raise InputError(
-            "--thresholds must go with --stick-slip, got it without; add it: the end "
-            "of stick-slip needs the recordings of steady sliding too"
-        )
-    if thresholds is not None or plot is not None:
+    advice = "add it: the end of stick-slip needs the recordings of steady sliding too"
+    holding = thresholds is None or question.stick_slip
+    require(holding, "--thresholds", "go with --stick-slip", "it without", advice)
+    if thresholds is not None or output.plot is not None:
         output_files(
-            {"--thresholds": thresholds, "--plot": plot, "--out": out},
+            {"--thresholds": thresholds, "--plot": output.plot, "--out": out},
             inputs={f"recording '{f}'": f for f in recordings},
         )
     with bar("file", "measurements") as update:
@@ -442,99 +436,41 @@ def _campaign(
             progress=update,
         )
     campaign = StickSlipCampaign.of(done.table)
-    if as_json:
-        record: dict[str, Any] = {"files": done.files, "rows": done.rows, "failed": done.failed}
-        record["out"] = str(out)
-        if campaign.series:
-            record["healing"] = campaign.healing_record()
-        click.echo(to_json(record, names))
-    elif campaign.series:
-        click.echo(healing_text(campaign, names))
-    if plot is not None:
-        write_picture(with_cycles(campaign), plot, names)
-    untold = []
+    if output.as_json or campaign.series:
+        healing = {"healing": campaign.healing_record()} if campaign.series else {}
+        counts = {"files": done.files, "rows": done.rows, "failed": done.failed, "out": str(out)}
+        output.answer(
+            lambda: {**counts, **healing}, lambda: [healing_section(campaign, output.names)]
+        )
+    if output.plot is not None:
+        output.draw(with_cycles(campaign))
+    unknown = []
     if thresholds is not None:
         ends = ends_of_stick_slip(done.table)
-        untold = [end.reason for end in ends if end.reason]
+        unknown = [end.reason for end in ends if end.reason]
         if not ends:
-            untold = ["no row has a regime, K, V and W0; give them by --set or --conditions"]
+            unknown = ["no row has a regime, K, V and W0; give them by --set or --conditions"]
         with written_file(thresholds, "--thresholds") as file:
             write_thresholds(file, ends)
-        for reason in untold:
-            click.echo(f"asperity: cannot tell where stick-slip ends: {reason}", err=True)
-    if done.sliding and question.modulated is None and not question.stick_slip:
-        click.echo(
-            f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
-            "steps and holds are in the table, as with --no-modulation",
-            err=True,
-        )
-    if done.failed:
-        click.echo(
-            f"asperity: {done.failed} of {done.rows} rows have no numbers; the column 'reason' of "
-            f"{out} says why",
-            err=True,
-        )
-    return int(done.failed > 0 or bool(untold))
-
-
-def _check_catalogue(path: Path, recording: Path) -> None:
-    from asperity.measurement.stick_slip.catalogue import check_catalogue
-    from asperity.outputs import output_files
-
-    check_catalogue(path)
-    output_files({"--events": path}, inputs={"recording": recording})
-
-
-def _catalogue(result: Any, path: Path) -> None:
-    from asperity.measurement.stick_slip.catalogue import write_catalogue
-
-    if not hasattr(result, "regimes"):
-        raise InputError(
-            "--events must go with a stick-slip recording, got another; leave it out, or read slip "
-            "events with --stick-slip"
-        )
-    write_catalogue(result, path)
+    say(
+        *(f"cannot tell where stick-slip ends: {reason}" for reason in unknown),
+        done.sliding
+        and question.modulated is None
+        and not question.stick_slip
+        and f"{done.sliding} of {done.files} files have a constant load: their velocity steps and "
+        "holds are in the table, as with --no-modulation",
+        done.failed
+        and f"{done.failed} of {done.rows} rows have no numbers; the column 'reason' of {out} "
+        "says why",
+    )
+    return int(done.failed > 0 or bool(unknown))
 
 
 def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """What ``--set`` says of the machine, by the fields of the question."""
     from asperity.measurement.conditions import MACHINE_FIELDS
 
-    for name in given:
-        if strict and name not in MACHINE_FIELDS:
-            raise InputError(
-                f"--set must name one of {', '.join(MACHINE_FIELDS)}, got '{name}'; write it like "
-                '--set "K=168 N/m"'
-            )
+    rule, like = f"name one of {', '.join(MACHINE_FIELDS)}", 'write it like --set "K=168 N/m"'
+    for name in given if strict else ():
+        require(name in MACHINE_FIELDS, "--set", rule, f"'{name}'", like)
     return {MACHINE_FIELDS[name]: given[name] for name in given if name in MACHINE_FIELDS}
-
-
-def _print(
-    result: Any, recording: Path, provenance: dict[str, Any], as_json: bool, names: Names
-) -> None:
-    from asperity._version import __version__
-    from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
-    from asperity.cli.report import to_json
-    from asperity.measurement.record import modulated_record, sliding_record
-    from asperity.measurement.stick_slip.catalogue import stick_slip_record
-
-    record_of: Any
-    text_of: Any
-    if hasattr(result, "reading"):
-        record_of, text_of = modulated_record, modulated_text
-    elif hasattr(result, "regimes"):
-        record_of, text_of = stick_slip_record, stick_slip_text
-    else:
-        record_of, text_of = sliding_record, sliding_text
-    if as_json:
-        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record_of(result), "provenance": provenance_record}, names))
-    else:
-        click.echo(text_of(result, recording.name, names))
-
-
-def _verdict(checks: tuple[Check, ...]) -> int:
-    for check in checks:
-        if check.verdict == "bad":
-            click.echo(f"asperity: {check.name} is bad: {check.sentence}", err=True)
-    return int(any(check.verdict == "bad" for check in checks))

@@ -1,4 +1,4 @@
-"""Measurements as aligned text."""
+"""Measurements as sections of text."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.outputs.tables import Row, aligned, rounded
-from asperity.parameters import Names, display_name, in_names
+from asperity.outputs.tables import Section, rounded
+from asperity.parameters import Names
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -22,16 +22,25 @@ if TYPE_CHECKING:
 _STILL = 1e-15
 
 
-def modulated_text(measurement: Measurement, name: str, names: Names = "friction") -> str:
-    """A reading, as the command prints it.
+def measured_sections(measurement: Any, name: str, names: Names = "friction") -> list[Section]:
+    """A measurement of any kind.
 
     Parameters
     ----------
-    measurement : Measurement
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
     name : str
         Of the recording.
     names : {"friction", "geophysics"}
+        In which a load that is a force keeps a name of its own: it is no stress.
     """
+    if hasattr(measurement, "reading"):
+        return _modulated(measurement, name, names)
+    if hasattr(measurement, "regimes"):
+        return _stick_slip(measurement, name)
+    return _sliding(measurement, name)
+
+
+def _modulated(measurement: Measurement, name: str, names: Names) -> list[Section]:
     reading, unit = measurement.reading, measurement.samples.unit
     rows = [
         _row(number, getattr(reading, number), reading.uncertainty(number), of, meaning)
@@ -43,6 +52,8 @@ def modulated_text(measurement: Measurement, name: str, names: Names = "friction
             ("mean_friction", "", "mean of F/W0"),
         )
     ]
+    if names == "geophysics" and "Pa" not in unit:
+        rows[0] = ("load", *rows[0][1:])
     if math.isfinite(measurement.delta_mu):
         change, doubt = measurement.delta_mu, measurement.delta_mu_uncertainty
         meaning = "mean_friction - F(0)/W0 without modulation"
@@ -61,18 +72,15 @@ def modulated_text(measurement: Measurement, name: str, names: Names = "friction
         f"{name}: {reading.start:.6g} s to {reading.end:.6g} s, {reading.samples} samples, "
         f"{reading.periods:.5g} periods; window chosen by the {measurement.chosen_by}"
     )
-    return "\n".join(
-        [
-            head,
-            _named(rows, names),
-            *_quality(measurement.checks),
-            *_findings(measurement.samples.findings),
-            *_unread(measurement.samples.unread),
-        ]
-    )
+    return [
+        Section(head, rows=tuple(rows)),
+        _quality(measurement.checks),
+        *_findings(measurement.samples.findings),
+        *_unread(measurement.samples.unread),
+    ]
 
 
-def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
+def amplitude_sections(rows: list[dict[str, Any]], name: str) -> list[Section]:
     """The amplitudes of a recording as a table.
 
     Parameters
@@ -83,37 +91,21 @@ def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
         Of the recording.
     """
     shown = ("epsilon", "frequency", "mean_friction", "delta_mu", "mu1", "phase1", "mu2")
-    head = ("part", "from (s)", "to (s)", *shown, "verdict")
-    table: list[tuple[str, ...]] = [head]
-    reasons = []
+    table = []
     for row in rows:
-        if row["reason"]:
-            reasons.append(f"part {row['part']}: {row['reason']}")
-            continue
-        cells = []
-        for number in shown:
-            value, doubt = row.get(number), row.get(f"{number}_uncertainty", math.nan)
-            if value is None or not math.isfinite(value):
-                cells.append("-")
-                continue
-            cells.append(_number(value, doubt))
-        times = f"{row['start']:.6g}", f"{row['end']:.6g}"
-        table.append((str(row["part"]), *times, *cells, row["verdict"]))
-    named = [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
+        if not row["reason"]:
+            values = [(row.get(n), row.get(f"{n}_uncertainty", math.nan)) for n in shown]
+            cells = ["-" if v is None or not math.isfinite(v) else _number(v, d) for v, d in values]
+            times = f"{row['start']:.6g}", f"{row['end']:.6g}"
+            table.append((str(row["part"]), *times, *cells, row["verdict"]))
+    notes = [f"part {row['part']}: {row['reason']}" for row in rows if row["reason"]]
+    notes += [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
     count = f"{name}: {len(rows)} modulated {'part' if len(rows) == 1 else 'parts'}"
-    return "\n".join([count, aligned(table, "  "), *reasons, *named])
+    head = ("part", "from (s)", "to (s)", *shown, "verdict")
+    return [Section(count, head=head, rows=tuple(table)), Section("", tuple(notes))]
 
 
-def sliding_text(measurement: SlidingMeasurement, name: str, names: Names = "friction") -> str:
-    """A recording without modulation, as the command prints it.
-
-    Parameters
-    ----------
-    measurement : SlidingMeasurement
-    name : str
-        Of the recording.
-    names : {"friction", "geophysics"}
-    """
+def _sliding(measurement: SlidingMeasurement, name: str) -> list[Section]:
     friction = measurement.friction
     rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in measurement.rates)
     rows = [_row("friction", friction.value, friction.uncertainty, "", "mean of F/W")]
@@ -123,26 +115,29 @@ def sliding_text(measurement: SlidingMeasurement, name: str, names: Names = "fri
         f"{name}: {_time(friction.start)} s to {_time(friction.end)} s, "
         f"{measurement.time.size} samples at {rates}"
     )
-    lines = [
-        head,
-        aligned(rows, "  "),
-        *_segments(measurement),
-        *_steps(measurement, names),
+    segments = tuple(
+        (
+            _time(s.start),
+            _time(s.end),
+            "hold" if s.hold else velocity_text(s.velocity),
+            _number(s.steady.value, s.steady.uncertainty),
+            f"{s.slope:.2g}",
+            f"{s.scatter:.2g}",
+        )
+        for s in measurement.segments
+    )
+    columns = ("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")
+    return [
+        Section(head, rows=tuple(rows)),
+        Section(f"segments, chosen by the {measurement.chosen_by}", head=columns, rows=segments),
+        *_steps(measurement),
         *_holds(measurement),
+        _quality(measurement.checks),
+        *_unread(measurement.unread),
     ]
-    return "\n".join([*lines, *_quality(measurement.checks), *_unread(measurement.unread)])
 
 
-def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names = "friction") -> str:
-    """A stick-slip recording, as the command prints it.
-
-    Parameters
-    ----------
-    measurement : StickSlipMeasurement
-    name : str
-        Of the recording.
-    names : {"friction", "geophysics"}
-    """
+def _stick_slip(measurement: StickSlipMeasurement, name: str) -> list[Section]:
     from asperity.measurement.stick_slip.catalogue import summary_rows
 
     time = measurement.time
@@ -162,57 +157,33 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names =
         rows.append(_row("stiffness", stiffness, doubt, "N/m", "loading_slope W0/V"))
     smallest = f"{measurement.smallest_drop:.2g}"
     rows.append(("smallest_drop", smallest, "", "a smaller one may not have been seen"))
-    return "\n".join(
-        [
-            head,
-            "regimes",
-            aligned([("from (s)", "to (s)", "regime", "evidence"), *parts], "  "),
-            "slip events",
-            _named(rows, names),
-            *_quality(measurement.checks),
-        ]
-    )
+    columns = ("from (s)", "to (s)", "regime", "evidence")
+    return [
+        Section(f"{head}\nregimes", head=columns, rows=tuple(parts)),
+        Section("slip events", rows=tuple(rows)),
+        _quality(measurement.checks),
+    ]
 
 
-def healing_text(campaign: StickSlipCampaign, names: Names = "friction") -> str:
-    """Healing of each machine of a campaign, as the command prints it.
+def healing_section(campaign: StickSlipCampaign, names: Names = "friction") -> Section:
+    """Healing of each machine of a campaign.
 
     Parameters
     ----------
     campaign : StickSlipCampaign
     names : {"friction", "geophysics"}
     """
-    _, lines = campaign.summary()
     twice = "(B - A)" if names == "friction" else "(b - a)"
-    return "\n".join(
-        [
-            "drop per e-fold of stick time; about 2 "
-            f"{twice} of a rate-and-state law, far below the critical stiffness",
-            aligned([(line.name, line.value) for line in lines], "  "),
-        ]
+    title = (
+        f"drop per e-fold of stick time; about 2 {twice} of a rate-and-state law, far below the "
+        "critical stiffness"
     )
+    return Section(title, rows=tuple((line.name, line.value) for line in campaign.summary()[1]))
 
 
 def _time(seconds: float) -> str:
     """A time of a recording, to a nanosecond: what a fit of the clock leaves about zero is zero."""
     return f"{round(float(seconds), 9) + 0.0:.10g}"
-
-
-def _segments(measurement: SlidingMeasurement) -> list[str]:
-    table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
-    for s in measurement.segments:
-        steady = _number(s.steady.value, s.steady.uncertainty)
-        table.append(
-            (
-                _time(s.start),
-                _time(s.end),
-                "hold" if s.hold else velocity_text(s.velocity),
-                steady,
-                f"{s.slope:.2g}",
-                f"{s.scatter:.2g}",
-            )
-        )
-    return [f"segments, chosen by the {measurement.chosen_by}", aligned(table, "  ")]
 
 
 def velocity_text(velocity: float) -> str:
@@ -224,8 +195,8 @@ def velocity_text(velocity: float) -> str:
     return "0 m/s" if abs(velocity) < _STILL else format_si(velocity, "velocity", 4)
 
 
-def _steps(measurement: SlidingMeasurement, names: Names) -> list[str]:
-    lines = []
+def _steps(measurement: SlidingMeasurement) -> list[Section]:
+    sections = []
     for k, step in enumerate(measurement.steps, 1):
         meaning = (
             f"of steady friction at the step; noise {step.noise_uncertainty:.2g}, choice of "
@@ -241,20 +212,18 @@ def _steps(measurement: SlidingMeasurement, names: Names) -> list[str]:
             before, after = (_slope(measurement, s) for s in (step.slope_before, step.slope_after))
             rows.append(("trend", step.trend, "", f"{before} before, {after} after"))
         speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
-        lines += [f"step {k} at {step.time:.10g} s, {speeds}", _named(rows, names)]
-    return lines
+        sections.append(Section(f"step {k} at {step.time:.10g} s, {speeds}", rows=tuple(rows)))
+    return sections
 
 
 def _slope(measurement: SlidingMeasurement, slope: float) -> str:
     return f"{1e-3 * slope:.2g} /mm" if measurement.velocity_from else f"{slope:.2g} /s"
 
 
-def _holds(measurement: SlidingMeasurement) -> list[str]:
+def _holds(measurement: SlidingMeasurement) -> list[Section]:
     if not measurement.holds:
         return []
-    table: list[tuple[str, ...]] = [
-        ("from (s)", "hold (s)", "level", "relaxation", "peak", "healing", "reload (1/mm)")
-    ]
+    table = []
     for hold in measurement.holds:
         numbers = (
             (hold.level, hold.level_uncertainty),
@@ -265,13 +234,13 @@ def _holds(measurement: SlidingMeasurement) -> list[str]:
         cells = [_number(value, doubt) if doubt else f"{value:.5g}" for value, doubt in numbers]
         reload = f"{1e-3 * hold.reload_slope:.3g}" if math.isfinite(hold.reload_slope) else "-"
         table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells, reload))
-    lines = ["holds", aligned(table, "  ")]
-    if measurement.healing is not None:
-        rate = measurement.healing
+    head = ("from (s)", "hold (s)", "level", "relaxation", "peak", "healing", "reload (1/mm)")
+    sections = [Section("holds", head=head, rows=tuple(table))]
+    if (rate := measurement.healing) is not None:
         meaning = f"per decade of hold time, {rate.holds} holds; 95 %: +- {rate.interval_95:.2g}"
         row = _row("healing rate", rate.per_decade, rate.uncertainty, "", meaning)
-        lines.append(aligned([row], "  "))
-    return lines
+        sections.append(Section("", rows=(row,)))
+    return sections
 
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
@@ -285,38 +254,30 @@ def _number(value: float, doubt: float) -> str:
     return " ".join(part for part in rounded(value, doubt) if part)
 
 
-def _named(rows: Iterable[Row], names: Names) -> str:
-    """Rows in a set of names; a load that is a force is no stress."""
-    texts = [list(row) for row in rows]
-    for row in texts if names == "geophysics" else ():
-        row[0] = "load" if row[0] == "W0" and "Pa" not in row[1] else display_name(row[0], names)
-        row[-1] = in_names(row[-1], names)
-    return aligned(texts, "  ")
-
-
-def _quality(checks: Iterable[Check]) -> list[str]:
+def _quality(checks: Iterable[Check]) -> Section:
     """A row for each name of a check: the worst of that name, and the number of the others."""
+    from asperity.measurement.verdicts.verdict import worst
+
     by_name: dict[str, list[Check]] = {}
     for check in checks:
         by_name.setdefault(check.name, []).append(check)
-    from asperity.measurement.verdicts.verdict import worst
-
     rows = []
     for name, same in by_name.items():
         gravest = worst(same)
         check = next(c for c in same if c.verdict == gravest)
         more = f" (and {len(same) - 1} more)" if len(same) > 1 else ""
         rows.append((check.verdict, name, f"{check.number:.3g}", check.sentence + more))
-    return ["quality", aligned(rows, "  ")]
+    return Section("quality", rows=tuple(rows))
 
 
-def _findings(findings: Iterable[Finding]) -> list[str]:
+def _findings(findings: Iterable[Finding]) -> list[Section]:
     """Findings of the whole recording, within the window or not."""
-    rows = [(f.severity, f.name, f.sentence) for f in findings]
-    return ["whole recording", aligned(rows, "  ")] if rows else []
+    rows = tuple((f.severity, f.name, f.sentence) for f in findings)
+    return [Section("whole recording", rows=rows)] if rows else []
 
 
-def _unread(count: int) -> list[str]:
+def _unread(count: int) -> list[Section]:
     """One line for findings about columns that are not read."""
     findings = "finding is" if count == 1 else "findings are"
-    return [f"{count} more {findings} about columns that were not read"] if count else []
+    text = f"{count} more {findings} about columns that were not read"
+    return [Section(text)] if count else []

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from asperity.cli.report import Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
-from asperity.errors import InputError
-from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
+from asperity.errors import InputError, require
+from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -104,24 +105,34 @@ def set_option(
     )
 
 
-def json_option() -> Decorator:
-    """``--json``."""
-    return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def output_options(*, plot: bool = False) -> Decorator:
+    """``--json``, ``--names`` and, with a figure, ``--plot``; the command gets `output`."""
+
+    def with_options(command: Command) -> Command:
+        @wraps(command)
+        def gathered(
+            *, as_json: bool, names: Names, plot: Path | None = None, **others: Any
+        ) -> Any:
+            return command(output=Output(as_json, names, plot), **others)
+
+        result: Command = gathered
+        for option in reversed(_OUTPUT if plot else _OUTPUT[1:]):
+            result = option(result)
+        return result
+
+    return with_options
 
 
-def names_option() -> Decorator:
-    """``--names``."""
-    return click.option(
+_OUTPUT = (
+    click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes."),
+    click.option(
         "--names",
         type=click.Choice(NAMES),
         default=NAMES[0],
         help="Names on screen and in figures: A, B, D0, K/W0, or geophysics: a, b, D_c, k/sigma_n.",
-    )
-
-
-def plot_option() -> Decorator:
-    """``--plot``."""
-    return click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
+)
 
 
 def point_options(command: Command) -> Command:
@@ -164,45 +175,25 @@ def law_option(
     )
 
 
-def law_options(default: str | None = None) -> Decorator:
-    """``--law``, which may be repeated, and ``--laws``; the command gets `laws`, a tuple of names.
+def law_options(command: Command) -> Command:
+    """``--law``, which may be repeated, and ``--laws``, with commas between names: `laws`."""
 
-    Parameters
-    ----------
-    default : str, optional
-        Of ``--laws``, without either option.
-    """
+    def names(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> Any:
+        parts = (part.strip() for text in texts for part in text.split(","))
+        return tuple(known_place(part) for part in parts if part)
 
-    def with_options(command: Command) -> Command:
-        @wraps(command)
-        def gathered(*, laws: tuple[str, ...], listed: str | None, **others: Any) -> Any:
-            if laws and listed is not None:
-                raise InputError(
-                    "--law must go without --laws, got both; they say the same, leave one out"
-                )
-            if not laws:
-                texts = (listed or default or "").split(",")
-                laws = tuple(known_place(text.strip()) for text in texts if text.strip())
-            return command(laws=laws, **others)
-
-        result: Command = click.option(
-            "--laws",
-            "listed",
-            metavar="NAMES",
-            help="The same as several --law: a,b,c or all"
-            + (f"; {default} if neither is given." if default else "."),
-        )(gathered)
-        return click.option(
-            "--law",
-            "laws",
-            metavar="NAME",
-            multiple=True,
-            callback=lambda context, option, texts: tuple(map(known_place, texts)),
-            help="Friction law, such as rice-ruina, or one of your own as module:Name or "
-            "file.py:Name; of a comparison, repeatable.",
-        )(result)
-
-    return with_options
+    option = click.option(
+        "--law",
+        "--laws",
+        "laws",
+        metavar="NAME",
+        multiple=True,
+        callback=names,
+        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        "of a comparison, repeatable, also as a,b,c, or all, the default.",
+    )
+    result: Command = option(command)
+    return result
 
 
 def known_place(text: str) -> str:
@@ -241,10 +232,8 @@ def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
     result: dict[str, str] = {}
     for pair in pairs:
         name, _, value = (part.strip() for part in pair.partition("="))
-        if not name or not value:
-            raise InputError(
-                f"{option} must be NAME=VALUE, got '{pair}'; write it like {option} \"K=0.2 N/um\""
-            )
+        like = f'write it like {option} "K=0.2 N/um"'
+        require(name and value, option, "be NAME=VALUE", f"'{pair}'", like)
         add_setting(result, name, value)
     return result
 
@@ -253,10 +242,8 @@ def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
     """Add a value that another option gives, if it does; twice the same name is an error."""
     if value is None:
         return
-    if name in settings:
-        raise InputError(
-            f"{name} must be given once, got '{settings[name]}' and '{value}'; leave one out"
-        )
+    twice = f"'{settings.get(name)}' and '{value}'"
+    require(name not in settings, name, "be given once", twice, "leave one out")
     settings[name] = value
 
 

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, settings_of
+from asperity.cli.options import output_options, settings_of
+from asperity.cli.report import Output
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.ledger import RecipeResult
+    from asperity.outputs.tables import Section
 
 _EPILOG = """\b
 Example:
@@ -37,13 +39,13 @@ oscillations, frequency_err. They give A, B and D0.
     "--thresholds", type=Path, required=True, metavar="CSV", help="Table of bifurcations."
 )
 @click.option("--fix", "fixes", multiple=True, metavar="NAME=VALUE", help="K, W0 or V0.")
-@json_option()
+@output_options()
 def recipe(
     paper: str,
     readings: tuple[Path, ...],
     thresholds: Path,
     fixes: tuple[str, ...],
-    as_json: bool,
+    output: Output,
 ) -> int:
     """Parameters by the steps of a PAPER, compared with the numbers that it prints.
 
@@ -52,16 +54,13 @@ def recipe(
     """
     from asperity import inference
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
     from asperity.inference.tables.table import joined
     from asperity.ledger import available, find_paper
 
     if not find_paper(paper).has("recipe"):
         others = [name for name in available() if find_paper(name).has("recipe")]
-        raise InputError(
-            f"paper must have a recipe, got '{paper}', which has none; "
-            f"name {' or '.join(others) or 'another paper'}"
-        )
+        advice = f"name {' or '.join(others) or 'another paper'}"
+        raise InputError("paper", "have a recipe", f"'{paper}', which has none", advice)
     steps: Any = find_paper(paper).module("recipe")
     bifurcations = steps.read_thresholds(thresholds)
     tables = [inference.read_table(path) for path in readings]
@@ -69,15 +68,15 @@ def recipe(
     fixed = settings_of(fixes, "--fix")
     with bar("step", "recipe") as update:
         result = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
-    click.echo(to_json(result.record()) if as_json else recipe_text(result))
+    output.answer(result.record, lambda: [_section(result)], indent="")
     return 0
 
 
-def recipe_text(result: RecipeResult) -> str:
-    """The numbers next to the published ones, as text."""
-    from asperity.outputs.tables import aligned
+def _section(result: RecipeResult) -> Section:
+    """The numbers next to the published ones."""
+    from asperity.outputs.tables import Section
 
-    rows = [("step", "", "here", "paper", "", "from")]
+    rows = []
     for name, r in result.numbers.items():
         here = f"{r.value:.4g} +- {r.se:.2g} {r.unit}".rstrip()
         if r.upper_limit is not None:
@@ -90,4 +89,5 @@ def recipe_text(result: RecipeResult) -> str:
             paper = f"{paper} {r.unit}".rstrip() + f" ({r.published_place})"
         apart = "" if r.deviation is None else f"{r.deviation:+.1f} s.d."
         rows.append((str(r.step), name, here, paper, apart, r.how))
-    return "\n".join([aligned(rows), *(f"warning: {w}" for w in result.warnings)])
+    head = ("step", "", "here", "paper", "", "from")
+    return Section("", head=head, rows=tuple(rows), warnings=tuple(result.warnings))

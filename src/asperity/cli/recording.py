@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 Command = Callable[..., Any]
 
@@ -28,18 +28,14 @@ def listed_times(text: str, option: str) -> list[str]:
         try:
             lines = path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError):
-            raise InputError(
-                f"{option} must be times or a file that can be read, got '{text}'; check the name"
-            ) from None
+            rule = "be times or a file that can be read"
+            raise InputError(option, rule, f"'{text}'", "check the name") from None
         # Two columns are a span.
         parts = [re.sub(r"[\s,;]+", ":", line.split("#")[0].strip()) for line in lines]
     else:
         parts = re.split(r"[,;]", text)
     result = [part.strip() for part in parts if part.strip()]
-    if not result:
-        raise InputError(
-            f"{option} must hold times, got '{text}'; write them like {option} 12.5,60"
-        )
+    require(result, option, "hold times", f"'{text}'", f"write them like {option} 12.5,60")
     return result
 
 
@@ -129,11 +125,9 @@ def _name_value_pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, st
     pairs = []
     for text in texts:
         name, _, value = (part.strip() for part in text.rpartition("="))
-        if not name or not value:
-            raise InputError(
-                f"{option} must be NAME=VALUE, got '{text}'; write it like {option} "
-                + ("velocity=speed" if option == "--column" else "Fn=N")
-            )
+        like = "velocity=speed" if option == "--column" else "Fn=N"
+        given, advice = name and value, f"write it like {option} {like}"
+        require(given, option, "be NAME=VALUE", f"'{text}'", advice)
         pairs.append((name, value))
     return pairs
 
@@ -143,13 +137,10 @@ def _expressions_of(texts: tuple[str, ...]) -> dict[str, str]:
     made: dict[str, str] = {}
     for text in texts:
         name, _, expression = (part.strip() for part in text.partition("="))
-        if not name or not expression:
-            raise InputError(
-                f"--channel must be NAME=EXPRESSION, got '{text}'; write it like "
-                '--channel "force = 2.4 N/V * Gauge"'
-            )
-        if name in made:
-            raise InputError(f"--channel must be given once for '{name}', got two; leave one out")
+        like = 'write it like --channel "force = 2.4 N/V * Gauge"'
+        require(name and expression, "--channel", "be NAME=EXPRESSION", f"'{text}'", like)
+        once = f"be given once for '{name}'"
+        require(name not in made, "--channel", once, "two", "leave one out")
         made[name] = expression
     return made
 

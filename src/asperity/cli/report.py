@@ -1,67 +1,97 @@
-"""Answers as they leave: records for programs, sections for people, pictures."""
+"""Answers as they leave: JSON for programs, sections for people, pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
-from asperity.errors import InputError
-from asperity.outputs import json, output_files, written_file
-from asperity.outputs.tables import Section, as_text
-from asperity.parameters import NAMES, OUTPUTS, Names, in_names
-from asperity.parameters.names import plain_names
-from asperity.parameters.parameter import Drawn, labelled
+from asperity.errors import require
+from asperity.parameters import NAMES, Names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from asperity.laws import Law
-    from asperity.operating_point import SourcedNumber
-    from asperity.orbit import PeriodicResponse
+    from asperity.outputs.tables import Section
+    from asperity.parameters.parameter import Drawn
 
 
-def to_json(record: Mapping[str, Any], names: Names = "friction", law: str = "") -> str:
-    """JSON for people and programs, indented; a number that is not finite becomes null.
+@dataclass(frozen=True)
+class Output:
+    """How a command answers: its options ``--json``, ``--names`` and ``--plot``.
 
-    Keys keep the one name of each parameter; ``names`` says what another set of names calls it.
+    Attributes
+    ----------
+    as_json : bool
+    names : {"friction", "geophysics"}
+    plot : Path, optional
     """
-    if names != "friction":
-        record = {**record, "names": plain_names(_law_of(law))}
-    return json.to_json(record, indent=2)
+
+    as_json: bool = False
+    names: Names = NAMES[0]
+    plot: Path | None = None
+
+    def answer(
+        self,
+        record: Callable[[], Mapping[str, Any]],
+        sections: Callable[[], Iterable[Section]],
+        law: str = "",
+        indent: str = "  ",
+    ) -> None:
+        """Print the record as JSON, or the sections as text.
+
+        Keys of JSON keep the one name of each parameter; ``names`` among them says what another
+        set of names calls it. A number that is not finite becomes null.
+
+        Parameters
+        ----------
+        record, sections : callable
+            Only the one that is printed is called.
+        law : str
+            Whose parameters have names too.
+        indent : str
+            Before the rows of a table.
+        """
+        from asperity.laws import get_law
+        from asperity.outputs import json
+        from asperity.outputs.tables import as_text
+        from asperity.parameters import in_names
+        from asperity.parameters.names import plain_names
+
+        known = get_law(law) if law and self.names != NAMES[0] else None
+        if self.as_json:
+            names = {} if self.names == NAMES[0] else {"names": plain_names(known)}
+            click.echo(json.to_json({**record(), **names}, indent=2))
+        else:
+            words = partial(in_names, names=self.names, law=known)
+            click.echo(as_text((section.worded(words) for section in sections()), indent))
+
+    def require_picture(self, *inputs: Path) -> None:
+        """Check the path of ``--plot`` before anything is computed."""
+        from asperity.outputs import output_files
+
+        if self.plot is not None:
+            png = self.plot.suffix.lower() == ".png"
+            require(
+                png, "--plot", "be a PNG file", f"'{self.plot}'", "write it like --plot out.png"
+            )
+            output_files({"--plot": self.plot}, inputs={f"the file {p}": p for p in inputs})
+
+    def draw(self, drawn: Drawn) -> None:
+        """Draw an answer where ``--plot`` was given."""
+        if self.plot is not None:
+            save_figure(lambda: drawn.plot(self.names), self.plot)
+            click.echo(f"asperity: the figure is {self.plot}", err=True)
 
 
-def sections_text(sections: Iterable[Section], names: Names, law: str = "") -> str:
-    """Sections as text, the parameters in a set of names."""
-    chosen = _law_of(law)
-    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
-
-
-def _law_of(name: str) -> type[Law] | None:
-    from asperity.laws import get_law
-
-    return get_law(name) if name else None
-
-
-def require_picture(path: Path | None, *inputs: Path) -> None:
-    """Check the path of ``--plot`` before anything is computed."""
-    if path is None:
-        return
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
-    output_files({"--plot": path}, inputs={f"the file {p}": p for p in inputs})
-
-
-def write_picture(drawn: Drawn, path: Path | None, names: Names) -> None:
-    """Draw an answer where ``--plot`` was given."""
-    if path is None:
-        return
-    save_figure(lambda: drawn.plot(names), path)
-    click.echo(f"asperity: the figure is {path}", err=True)
+def say(*sentences: object) -> None:
+    """Sentences on stderr, a line each, without those that are empty."""
+    for sentence in filter(None, sentences):
+        click.echo(f"asperity: {sentence}", err=True)
 
 
 def save_figure(
@@ -79,64 +109,8 @@ def save_figure(
         That names the path, for messages.
     """
     from asperity.figures.style import style
+    from asperity.outputs import written_file
+    from asperity.parameters.parameter import labelled
 
     with style(), written_file(path, option) as file:
         labelled(draw(), names).savefig(file, metadata={"Software": None})
-
-
-#: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.
-_JSON = (
-    *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
-    *("harmonics", "multipliers", "log_multipliers", "floquet_max"),
-    *("stable", "mode", "mode_frequency", "growth_rate", "converged", "result"),
-)
-
-
-def response_record(
-    response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
-) -> dict[str, Any]:
-    """Everything about the response at one point.
-
-    Parameters
-    ----------
-    response : PeriodicResponse
-        Of a single point.
-    numbers : mapping of str to SourcedNumber
-        Inputs by name.
-    """
-    converged = bool(response.converged)
-
-    def shown(value: Any) -> Any:
-        """A number as JSON has it, None without a converged response."""
-        array = np.asarray(value)
-        if array.dtype.kind in "bOU":
-            return array.item()
-        if not converged:
-            return np.full(array.shape, None).tolist()
-        return array.astype(float).tolist()
-
-    record: dict[str, Any] = {}
-    for name in _JSON:
-        value = np.asarray(getattr(response, name))
-        if np.iscomplexobj(value):
-            value = np.stack([value.real, value.imag], axis=-1)
-        for key in (name, *OUTPUTS[name].former):
-            record[key] = shown(value)
-    return {**record, "provenance": _provenance(response, numbers)}
-
-
-def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]) -> dict[str, Any]:
-    from asperity.materials import cited_works
-    from asperity.parameters import point_parameters
-
-    units = point_parameters(type(response.slider.law))
-    provenance = response.provenance
-    return {
-        "version": provenance.pop("asperity_version"),
-        **provenance,
-        "parameters": {
-            name: {"value": number.value, "unit": units[name].unit, "from": number.origin}
-            for name, number in numbers.items()
-        },
-        "citation": cited_works(provenance["source"]),
-    }

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, names_option, plot_option, point_options
-from asperity.errors import InputError
+from asperity.cli.options import output_options, point_options
+from asperity.cli.report import Output, say
+from asperity.errors import require
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
-    from asperity.parameters import Names
+    from asperity.outputs.tables import Section
     from asperity.questions.point import Point
 
 _EPILOG = """\b
@@ -48,13 +49,18 @@ _SHOWN = (
     *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
     *("floquet_max", "stable", "mode", "mode_frequency", "growth_rate"),
 )
+#: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.
+_JSON = (
+    *_SHOWN[:6],
+    *("harmonics", "multipliers", "log_multipliers"),
+    *_SHOWN[6:],
+    *("converged", "result"),
+)
 
 
 @click.command(epilog=_EPILOG)
 @point_options
-@plot_option()
-@names_option()
-@json_option()
+@output_options(plot=True)
 @click.option(
     "--stick-slip",
     is_flag=True,
@@ -65,13 +71,11 @@ _SHOWN = (
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 def response(
     point: Point,
+    output: Output,
     stick_slip: bool,
     table: Path | None,
     out: Path | None,
     resume: bool,
-    plot: Path | None,
-    names: Names,
-    as_json: bool,
 ) -> int:
     """Periodic response to a modulated normal load.
 
@@ -79,160 +83,150 @@ def response(
     stable or not; without inertia by default.
     """
     if stick_slip:
-        if table is not None or out is not None or resume:
-            raise InputError(
-                "--stick-slip must go with one point, got --table, --out or --resume; leave it "
-                "out, or take asperity.experiment.stick_slip_response with arrays"
-            )
-        return _stick_slip(point, as_json, plot, names)
-    if table is not None:
-        if out is None:
-            raise InputError("--out must be given with --table, got nothing; name the output file")
-        if plot is not None:
-            raise InputError("--plot must go with one point, got a table; leave one of them out")
-        return _table(table, out, point, resume, as_json)
-    if out is not None or resume:
-        raise InputError(
-            "--out and --resume must go with --table, got no table; name it or leave them out"
-        )
-    return _point(point, as_json, plot, names)
+        alone, others = not (table or out or resume), "--table, --out or --resume"
+        advice = "leave it out, or take asperity.experiment.stick_slip_response with arrays"
+        require(alone, "--stick-slip", "go with one point", others, advice)
+        return _stick_slip(point, output)
+    if table is None:
+        without, advice = not (out or resume), "name it or leave them out"
+        require(without, "--out and --resume", "go with --table", "no table", advice)
+        return _point(point, output)
+    require(out, "--out", "be given with --table", "nothing", "name the output file")
+    require(not output.plot, "--plot", "go with one point", "a table", "leave one of them out")
+    assert out is not None
+    return _table(table, out, point, resume, output)
 
 
-def _point(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
-    from asperity.cli.report import require_picture, response_record, to_json, write_picture
+def _point(point: Point, output: Output) -> int:
     from asperity.laws import get_law
     from asperity.operating_point import point_numbers, respond
+    from asperity.parameters import OUTPUTS
 
-    require_picture(plot)
+    output.require_picture()
     numbers = point_numbers(point, "command line")
     values = {name: number.value for name, number in numbers.items()}
     result = respond(get_law(point.law), values)
-    if as_json:
-        click.echo(to_json(response_record(result, numbers), names, point.law))
-    elif result.converged:
-        click.echo(_text(point.law, result, numbers, names))
-    if result.converged:
-        write_picture(result, plot, names)
     if not result.converged:
-        click.echo(f"asperity: {result.result[()]}", err=True)
-    return 0 if result.converged else 1
+        if output.as_json:
+            output.answer(lambda: _record(result, numbers), list, point.law)
+        say(result.result[()])
+        return 1
+    about = {name: (OUTPUTS[name].unit, OUTPUTS[name].meaning) for name in _SHOWN}
+    rows = [(name, getattr(result, name)[()], *about[name]) for name in _SHOWN]
+    output.answer(
+        lambda: _record(result, numbers),
+        lambda: _sections(point.law, numbers, "response", rows, output),
+        point.law,
+    )
+    output.draw(result)
+    return 0
 
 
-def _stick_slip(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
+def _record(response: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> dict[str, Any]:
+    """Everything about the response at one point; numbers are None without a converged response."""
+    import numpy as np
+
+    from asperity.materials import cited_works
+    from asperity.parameters import OUTPUTS, point_parameters
+
+    record: dict[str, Any] = {}
+    for name in _JSON:
+        value = np.asarray(getattr(response, name))
+        if np.iscomplexobj(value):
+            value = np.stack([value.real, value.imag], axis=-1)
+        if value.dtype.kind not in "bOU":
+            value = value.astype(float) if response.converged else np.full(value.shape, None)
+        record |= dict.fromkeys((name, *OUTPUTS[name].former), value.tolist())
+    units = point_parameters(type(response.slider.law))
+    provenance = response.provenance
+    record["provenance"] = {
+        "version": provenance.pop("asperity_version"),
+        **provenance,
+        "parameters": {
+            name: {"value": number.value, "unit": units[name].unit, "from": number.origin}
+            for name, number in numbers.items()
+        },
+        "citation": cited_works(provenance["source"]),
+    }
+    return record
+
+
+def _stick_slip(point: Point, output: Output) -> int:
     from asperity._version import __version__
-    from asperity.cli.report import require_picture, to_json, write_picture
     from asperity.experiment import stick_slip_response
-    from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, offered_numbers
+    from asperity.laws import Law, get_law
+    from asperity.operating_point import point_numbers
     from asperity.parameters import MODULATION, point_parameters
     from asperity.slider.named import slider_from
 
-    require_picture(plot)
-    offered = offered_numbers(point, "command line")
+    output.require_picture()
     for name in ("epsilon", "frequency"):
-        if name in point.parameters:
-            raise InputError(
-                "--stick-slip",
-                "come without a modulation",
-                f"{name} = {point.parameters[name]}",
-                "leave it out, or leave --stick-slip out",
-            )
-    law, modulation = get_law(point.law), ("epsilon", "frequency", *MODULATION)
+        got = f"{name} = {point.parameters.get(name)}"
+        advice = "leave it out, or leave --stick-slip out"
+        without = name not in point.parameters
+        require(without, "--stick-slip", "come without a modulation", got, advice)
+    modulation = ("epsilon", "frequency", *MODULATION)
+    law: type[Law] = get_law(point.law) if point.law else Law
     among = {n: p for n, p in point_parameters(law).items() if n not in modulation}
-    numbers = numbers_for(law.name, offered, among)
+    numbers = point_numbers(point, "command line", among)
     values = {name: number.value for name, number in numbers.items()}
     result = stick_slip_response(
         slider_from(law, values), velocity=values["V"],
         inertia=bool(values.get("inertia", 0.0)), radiation_damping=values.get("eta"),
     )  # fmt: skip
     rows = result.values()
-    if as_json:
-        record: dict[str, Any] = {name: value for name, value, _, _ in rows}
-        record |= {"result": str(result.result), "asperity_version": __version__, "law": law.name}
-        click.echo(to_json({**record, "parameters": values}, names, law.name))
-    else:
-        texts = [
-            (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)
-            for name, value, unit, meaning in rows
-            if result.slips or name in ("steady", "stable")
-        ]
-        click.echo(_words(law.name, numbers, str(result.result), texts, names))
+    shown = [row for row in rows if result.slips or row[0] in ("steady", "stable")]
+    about = {"result": str(result.result), "asperity_version": __version__, "law": law.name}
+    output.answer(
+        lambda: {**{name: value for name, value, *_ in rows}, **about, "parameters": values},
+        lambda: _sections(law.name, numbers, str(result.result), shown, output),
+        law.name,
+    )
     if result.slips:
-        write_picture(result, plot, names)
+        output.draw(result)
     return 0 if result.slips or result.steady else 1
 
 
-def _text(
-    law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber], names: Names
-) -> str:
-    from asperity.parameters import OUTPUTS
-
-    outputs = []
-    for name in _SHOWN:
-        value = getattr(result, name)[()]
-        text = ("no", "yes")[int(value)] if name == "stable" else str(value)
-        if isinstance(value, float):
-            text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
-        outputs.append((name, text, OUTPUTS[name].meaning))
-    return _words(law, numbers, "response", outputs, names)
-
-
-def _words(
-    law: str,
-    numbers: dict[str, SourcedNumber],
-    heading: str,
-    outputs: list[tuple[str, str, str]],
-    names: Names,
-) -> str:
+def _sections(
+    law: str, numbers: dict[str, SourcedNumber], heading: str, outputs: list[Any], output: Output
+) -> list[Section]:
+    """Inputs with their sources, and outputs: rows of name, value, unit and meaning."""
     from asperity.laws import get_law
-    from asperity.outputs.tables import aligned
-    from asperity.parameters import display_name, point_parameters
+    from asperity.outputs.tables import Section
+    from asperity.parameters import point_parameters
     from asperity.units import format_si
 
-    chosen = get_law(law)
-    kinds = point_parameters(chosen)
+    kinds = point_parameters(get_law(law))
     inputs = [
-        (
-            display_name(name, names, chosen),
-            format_si(number.value, kinds[name].kind, 6),
-            number.origin,
-        )
+        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
         for name, number in numbers.items()
     ]
-    title = f"{law}, of forces per square metre: N for Pa" if names == "geophysics" else law
-    return f"{title}\n{aligned(inputs, '  ')}\n{heading}\n{aligned(outputs, '  ')}"
+    rows = []
+    for name, value, unit, meaning in outputs:
+        text = f"{value:.9g} {unit}".removesuffix(" 1") if isinstance(value, float) else str(value)
+        yes_or_no = name in ("stable", "steady")
+        rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, meaning))
+    stresses = output.names == "geophysics"
+    title = f"{law}, of forces per square metre: N for Pa" if stresses else law
+    return [Section(title, rows=tuple(inputs)), Section(heading, rows=tuple(rows))]
 
 
-def _table(
-    table: Path,
-    out: Path,
-    point: Point,
-    resume: bool,
-    as_json: bool,
-) -> int:
+def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -> int:
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
     from asperity.laws import get_law
     from asperity.operating_point import material_of, sourced_numbers
     from asperity.study.table import run_table
 
     law = get_law(point.law).name if point.law else None
     filled = sourced_numbers(point.parameters, material_of(point), law=law)
+    values = {name: number.value for name, number in filled.items()}
     with bar("point", "responses") as update:
-        done = run_table(
-            table,
-            out,
-            law=law,
-            filled={name: number.value for name, number in filled.items()},
-            resume=resume,
-            progress=lambda solved, rows: update(solved, rows, ""),
-        )
-    if as_json:
-        click.echo(to_json({"rows": done.rows, "failed": done.failed, "out": str(out)}))
+        done = run_table(table, out, law=law, filled=values, resume=resume, progress=update)
+    if output.as_json:
+        output.answer(lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)}, list)
     if done.failed:
-        click.echo(
-            f"asperity: {done.failed} of {done.rows} rows have no response; the column 'result' of "
-            f"{out} says why",
-            err=True,
+        say(
+            f"{done.failed} of {done.rows} rows have no response; the column 'result' of {out} "
+            "says why"
         )
     return 1 if done.failed else 0

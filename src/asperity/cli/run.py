@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option, law_option, names_option, plot_option
+from asperity.cli.options import law_option, output_options
+from asperity.cli.report import Output, save_figure, say
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.parameters import Names
-    from asperity.protocol import Protocol, RecordingSetup, RunSummary
+    from asperity.protocol import Protocol, RunSummary
 
 _EPILOG = """\b
 Examples:
@@ -49,9 +49,7 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 @click.command(epilog=_EPILOG)
 @click.argument("protocol", type=Path)
 @click.option("--out", type=Path, metavar="NC", required=True, help="Where the motion goes.")
-@plot_option()
-@names_option()
-@json_option()
+@output_options(plot=True)
 @click.option("--csv", "as_csv", is_flag=True, help="Write it as text too, next to --out.")
 @click.option(
     "--record",
@@ -65,19 +63,16 @@ def run(
     protocol: Path,
     out: Path,
     as_csv: bool,
-    plot: Path | None,
-    names: Names,
+    output: Output,
     record: Path | None,
     law: str | None,
     resume: bool,
-    as_json: bool,
 ) -> int:
     """Run a protocol: the motion of a slider under a programme of load and drive.
 
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
-    from asperity.cli.report import require_picture, save_figure
     from asperity.outputs import output_files
     from asperity.protocol import (
         ProtocolError,
@@ -87,48 +82,50 @@ def run(
         run_protocol,
         write_csv,
     )
-    from asperity.recording.writers import write
+    from asperity.recording.writers import check_path, write
 
     text = out.with_suffix(".csv") if as_csv else None
-    require_picture(plot, protocol)
+    output.require_picture(protocol)
     output_files(
-        {"--out": out, "--csv": text, "--plot": plot, "--record": record},
+        {"--out": out, "--csv": text, "--plot": output.plot, "--record": record},
         inputs={"protocol": protocol},
     )
     try:
         wanted = load_protocol(protocol)
-        if law is not None and wanted.law != law:
-            raise InputError(
-                f"--law must be the law of the protocol, got '{law}' and law = '{wanted.law}'; "
-                "change one of them or leave the option out"
-            )
     except ProtocolError as error:
-        return _print_mistakes(protocol, error.mistakes)
-    setup = None if record is None else _setup_for(wanted, record)
+        say(*(f"{protocol}: {' '.join(mistake.split())}" for mistake in error.mistakes))
+        return 2
+    if law is not None and wanted.law != law:
+        got = f"'{law}' and law = '{wanted.law}'"
+        advice = "change one of them or leave the option out"
+        raise InputError("--law", "be the law of the protocol", got, advice)
+    if record is not None:
+        if wanted.setup is None:
+            advice = "describe its sensors or leave the option out"
+            got = f"'{record}' and none"
+            raise InputError("--record", "go with a [tribometer] in the protocol", got, advice)
+        check_path(record)
     _check_room(wanted, out, text, record)
     with bar("ms", "motion") as update:
-
-        def in_milliseconds(time: float, end: float) -> None:
-            update(round(1e3 * time), round(1e3 * end), "")
-
-        done = run_protocol(wanted, out, resume=resume, progress=in_milliseconds)
-    statement = done.unstable_start
+        done = run_protocol(
+            wanted,
+            out,
+            resume=resume,
+            progress=lambda time, end: update(round(1e3 * time), round(1e3 * end)),
+        )
     files = [out]
     with _after_the_motion(files):
         if text is not None:
             files.append(write_csv(out, text))
-        if plot is not None:
+        if output.plot is not None:
             from asperity.figures.trajectory import draw_run
 
-            save_figure(lambda: draw_run(outline(out)), plot, names)
-            files.append(plot)
-        if record is not None and setup is not None:
-            files.append(write(record_run(setup, out), record))
-    _report(wanted, done, files, as_json, statement)
-    if statement:
-        click.echo(f"asperity: {statement}", err=True)
-    if done.stopped:
-        click.echo(f"asperity: {done.stopped}", err=True)
+            save_figure(lambda: draw_run(outline(out)), output.plot, output.names)
+            files.append(output.plot)
+        if record is not None and wanted.setup is not None:
+            files.append(write(record_run(wanted.setup, out), record))
+    _report(wanted, done, files, output)
+    say(done.unstable_start, done.stopped)
     return 1 if done.stopped else 0
 
 
@@ -157,7 +154,7 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
     from asperity.outputs import require_disk, require_memory, size_text
 
     if wanted.rows is None:
-        click.echo(f"asperity: writing the integrator's steps to {out}", err=True)
+        say(f"writing the integrator's steps to {out}")
         return
     way_out = "lower solver.sampling, shorten the steps or leave the option out"
     rows, size = f"{wanted.rows:.6g} rows", wanted.rows * wanted.row_bytes
@@ -169,54 +166,27 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
         require_memory(2 * wanted.rows * wanted.row_bytes, "--record", rows, way_out)
     require_disk(size, out.resolve().parent, "solver.sampling", rows,
                  "lower the rate, shorten the steps or write to another disk")  # fmt: skip
-    click.echo(f"asperity: writing {rows}, about {size_text(size)}, to {out}", err=True)
+    say(f"writing {rows}, about {size_text(size)}, to {out}")
 
 
-def _print_mistakes(protocol: Path, mistakes: tuple[str, ...]) -> int:
-    """A line for each mistake."""
-    for mistake in mistakes:
-        click.echo(f"asperity: {protocol}: {' '.join(mistake.split())}", err=True)
-    return 2
+def _report(wanted: Protocol, done: RunSummary, files: list[Path], output: Output) -> None:
+    from asperity.outputs.tables import Section
 
-
-def _setup_for(wanted: Protocol, record: Path) -> RecordingSetup:
-    """The protocol's tribometer, before anything is computed."""
-    from asperity.recording.writers import check_path
-
-    if wanted.setup is None:
-        raise InputError(
-            f"--record must go with a [tribometer] in the protocol, got '{record}' and none; "
-            "describe its sensors or leave the option out"
-        )
-    check_path(record)
-    return wanted.setup
-
-
-def _report(
-    wanted: Protocol, done: RunSummary, files: list[Path], as_json: bool, statement: str
-) -> None:
-    from asperity.cli.report import to_json
-    from asperity.outputs.tables import aligned
-
-    if as_json:
-        click.echo(
-            to_json(
-                {
-                    "rows": done.rows,
-                    "events": done.events,
-                    "time": done.time,
-                    "duration": wanted.programme.duration,
-                    "stopped": done.stopped,
-                    "stability": statement or None,
-                    "files": [str(file) for file in files],
-                }
-            )
-        )
-        return
-    rows = [
-        ("time", f"{done.time:.9g} s", f"of {wanted.programme.duration:.9g} s"),
+    duration = wanted.programme.duration
+    rows = (
+        ("time", f"{done.time:.9g} s", f"of {duration:.9g} s"),
         ("rows", str(done.rows), ""),
         ("events", str(done.events), ""),
         ("files", ", ".join(map(str, files)), ""),
-    ]
-    click.echo(f"{wanted.law}\n{aligned(rows, '  ')}")
+    )
+    output.answer(
+        lambda: {
+            **{name: getattr(done, name) for name in ("rows", "events", "time")},
+            "duration": duration,
+            "stopped": done.stopped,
+            "stability": done.unstable_start or None,
+            "files": [str(file) for file in files],
+        },
+        lambda: [Section(wanted.law, rows=rows)],
+        wanted.law,
+    )

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from asperity.cli.options import Count, json_option
+from asperity.cli.options import Count, output_options
+from asperity.cli.report import Output
 
 _EPILOG = """\b
 Examples:
@@ -24,25 +25,24 @@ Examples:
     help="File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
 )
 @click.option("--seed", type=Count(), default=0, show_default=True, help="Of the noise.")
-@json_option()
-def samples(name: str | None, out: Path | None, seed: int, as_json: bool) -> int:
+@output_options()
+def samples(name: str | None, out: Path | None, seed: int, output: Output) -> None:
     """List the sample recordings, or make one of them.
 
     NAME is one of the list. Law and numbers of the simulated slider are printed: what a fit of the
     recording should give back.
     """
     from asperity import samples as known
-    from asperity.cli.report import to_json
     from asperity.operating_point import known_parameters
     from asperity.outputs import output_file
-    from asperity.outputs.tables import aligned
+    from asperity.outputs.tables import Section
     from asperity.recording.writers import check_path, write
     from asperity.units import format_si
 
     if name is None:
         titles = {sample: known.protocol(sample).title for sample in known.names()}
-        click.echo(to_json(titles) if as_json else aligned(titles.items()))
-        return 0
+        output.answer(lambda: titles, lambda: [Section("", rows=tuple(titles.items()))], indent="")
+        return
     known.path(name)
     target = Path(f"{name}.csv") if out is None else out
     check_path(target)
@@ -51,12 +51,11 @@ def samples(name: str | None, out: Path | None, seed: int, as_json: bool) -> int
     trace = known.record(name, seed)
     write(trace, target)
     numbers = {key: number.value for key, number in truth.numbers.items()}
-    if as_json:
-        click.echo(to_json({"file": str(target), "law": truth.law, "numbers": numbers}))
-        return 0
-    click.echo(f"{target}: {len(trace)} samples of {', '.join(trace.channels)}")
-    click.echo(f"{truth.law}, with the numbers")
     kinds = known_parameters(truth.law)
-    rows = [(key, format_si(value, kinds[key].kind)) for key, value in numbers.items()]
-    click.echo(aligned(rows, indent="  "))
-    return 0
+    rows = tuple((key, format_si(value, kinds[key].kind)) for key, value in numbers.items())
+    made = f"{target}: {len(trace)} samples of {', '.join(trace.channels)}"
+    output.answer(
+        lambda: {"file": str(target), "law": truth.law, "numbers": numbers},
+        lambda: [Section(made, (f"{truth.law}, with the numbers",), rows=rows)],
+        truth.law,
+    )

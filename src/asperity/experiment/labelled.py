@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import field, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -22,37 +22,36 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 
-class Shaped:
-    """Arrays in the shape of the arguments."""
+def shaped(array: Any, shape: tuple[int, ...]) -> Any:
+    """An array with the points first, with the points in the shape of the arguments."""
+    array = np.asarray(array)
+    return array.reshape((*shape, *array.shape[1:]))
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._shape = shape
 
-    def __call__(self, array: Any) -> Any:
-        """An array with the points first, in that shape."""
-        array = np.asarray(array)
-        return array.reshape((*self._shape, *array.shape[1:]))
+def measured(unit: str, meaning: str = "") -> Any:
+    """A field of a `Labelled` record, with unit and meaning; the drive has none."""
+    return field(metadata={"unit": unit, "meaning": meaning})
 
 
 class Labelled(Displayed):
-    """A record of arrays of one shape, `result` among them, and its `slider`.
+    """A dataclass of arrays of one shape, `result` among them, and its `slider`.
 
     Class attributes
     ----------------
-    meanings : mapping of str to (str, str)
-        Unit and meaning by the name of an attribute.
-    drive : mapping of str to str
-        Unit by the name of what drives the slider.
     shown : tuple of str
         What the summary has.
     """
 
-    meanings: ClassVar[Mapping[str, tuple[str, str]]]
-    drive: ClassVar[Mapping[str, str]]
     shown: ClassVar[tuple[str, ...]]
 
     result: NDArray[np.object_]
     slider: Slider
+
+    @property
+    def meanings(self) -> dict[str, tuple[str, str]]:
+        """Unit and meaning of each result by its name."""
+        about = {f.name: f.metadata for f in fields(self)}  # type: ignore[arg-type]
+        return {n: (a["unit"], a["meaning"]) for n, a in about.items() if a.get("meaning")}
 
     def outcomes(self) -> str:
         """How many points there are, and what became of them."""
@@ -78,7 +77,11 @@ class Labelled(Displayed):
         import xarray
 
         shape = self.result.shape
-        values = {n: (np.asarray(getattr(self, n)), {"units": u}) for n, u in self.drive.items()}
+        values = {
+            f.name: (np.asarray(getattr(self, f.name)), {"units": f.metadata["unit"]})
+            for f in fields(self)  # type: ignore[arg-type]
+            if f.metadata.get("meaning") == ""
+        }
         law: type[Law] = type(self.slider.law)
         known = {**law_parameters(law), **MACHINE}
         for name, value in slider_values(self.slider).items():

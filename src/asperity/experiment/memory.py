@@ -7,15 +7,15 @@ way back to steady sliding. The extremum is located, not sampled.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.errors import InputError
-from asperity.experiment.labelled import Labelled, Shaped
+from asperity.errors import InputError, require
+from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.laws import Law
 from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
@@ -40,6 +40,7 @@ _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 _LONGEST = 1e20
 #: Numbers of points in a call of the compiled program; a call uses the smallest sufficient one.
 _SHAPES = (64, 1024)
+_WITHIN = f"to within {100 * SETTLED:g} % of steady sliding"
 #: Step of the finite difference in ln(hold time); its error is that of an integration step.
 _STEP = 0.02
 
@@ -60,35 +61,18 @@ _UNSTABLE = (
 )
 
 
-#: Unit and meaning of what both kinds of test have, of holds, and of velocity steps.
-_BOTH: dict[str, tuple[str, str]] = {
-    "distance": ("m", "way of the drive to the extremum"),
-    "slip": ("m", "slip to the extremum"),
-    "settling_distance": ("m", f"way of the drive to within {100 * SETTLED:g} % of steady sliding"),
-    "settling_slip": ("m", f"slip to within {100 * SETTLED:g} % of steady sliding"),
-    "stable": ("1", "whether steady sliding is stable"),
-}
-_OF_HOLDS: dict[str, tuple[str, str]] = {
-    "level": ("1", "F/W0 of steady sliding"),
-    "minimum": ("1", "F/W0 at the end of the hold"),
-    "maximum": ("1", "static friction: F/W0 at the maximum after the hold"),
-    "healing": ("1", "static friction less the level of sliding"),
-    "healing_rate": ("1", "healing per decade of hold time"),
-    "relaxation": ("1", "fall of F/W0 in the hold"),
-    "hold_slip": ("m", "slip in the hold"),
-    "end_velocity": ("m/s", "plastic velocity at the end of the hold"),
-}
-_OF_STEPS: dict[str, tuple[str, str]] = {
-    "before": ("1", "F/W0 of steady sliding before the step"),
-    "extremum": ("1", "F/W0 at the first extremum after the step"),
-    "after": ("1", "F/W0 of steady sliding after the step"),
-    "direct": ("1", "extremum less F/W0 before the step"),
-    "evolution": ("1", "extremum less F/W0 in steady sliding after the step"),
-}
-
-
+@dataclass(frozen=True, repr=False, kw_only=True)
 class _Memory(Labelled):
     """Outcomes of tests of the memory of friction."""
+
+    distance: Float = measured("m", "way of the drive to the extremum")
+    slip: Float = measured("m", "slip to the extremum")
+    settling_distance: Float = measured("m", f"way of the drive {_WITHIN}")
+    settling_slip: Float = measured("m", f"slip {_WITHIN}")
+    stable: NDArray[np.bool_] = measured("1", "whether steady sliding is stable")
+    result: NDArray[np.object_]
+    slider: Slider
+    velocity: Float = measured("m/s")
 
     def outcomes(self) -> str:
         """How many points there are, and how many do not settle."""
@@ -96,7 +80,7 @@ class _Memory(Labelled):
         return f"{self.result.size} points" + (f", {lost} of which do not settle" if lost else "")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, kw_only=True)
 class Holds(_Memory):
     """Slide-hold-slide tests: static friction, healing and relaxation; arrays of one shape.
 
@@ -135,42 +119,24 @@ class Holds(_Memory):
     slider : Slider
     """
 
-    meanings = _OF_HOLDS | _BOTH
-    drive: ClassVar[dict[str, str]] = {"hold_time": "s", "velocity": "m/s"}
     shown = ("healing", "healing_rate", "relaxation", "hold_slip", "settling_slip")
 
-    hold_time: Float
-    velocity: Float
-    level: Float
-    minimum: Float
-    maximum: Float
-    healing_rate: Float
-    hold_slip: Float
-    end_velocity: Float
+    hold_time: Float = measured("s")
+    level: Float = measured("1", "F/W0 of steady sliding")
+    minimum: Float = measured("1", "F/W0 at the end of the hold")
+    maximum: Float = measured("1", "static friction: F/W0 at the maximum after the hold")
+    healing: Float = measured("1", "static friction less the level of sliding")
+    healing_rate: Float = measured("1", "healing per decade of hold time")
+    relaxation: Float = measured("1", "fall of F/W0 in the hold")
+    hold_slip: Float = measured("m", "slip in the hold")
+    end_velocity: Float = measured("m/s", "plastic velocity at the end of the hold")
     velocity_at_maximum: Float
     states: Float
     states_at_maximum: Float
-    distance: Float
-    slip: Float
-    settling_distance: Float
-    settling_slip: Float
-    stable: NDArray[np.bool_]
     has_maximum: NDArray[np.bool_]
-    result: NDArray[np.object_]
-    slider: Slider
-
-    @property
-    def healing(self) -> Float:
-        """Static friction minus sliding friction before the hold."""
-        return self.maximum - self.level
-
-    @property
-    def relaxation(self) -> Float:
-        """Decrease of the force in the hold, over W0."""
-        return self.level - self.minimum
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, kw_only=True)
 class VelocityStepResponse(_Memory):
     """Steps of the drive's velocity from steady sliding; arrays of one shape.
 
@@ -197,34 +163,16 @@ class VelocityStepResponse(_Memory):
         As for `Holds`.
     """
 
-    meanings = _OF_STEPS | _BOTH
-    drive: ClassVar[dict[str, str]] = {"velocity_before": "m/s", "velocity": "m/s"}
     shown = ("direct", "evolution", "settling_slip")
 
-    velocity_before: Float
-    velocity: Float
-    before: Float
-    extremum: Float
-    after: Float
-    distance: Float
-    slip: Float
-    settling_distance: Float
-    settling_slip: Float
+    velocity_before: Float = measured("m/s")
+    before: Float = measured("1", "F/W0 of steady sliding before the step")
+    extremum: Float = measured("1", "F/W0 at the first extremum after the step")
+    after: Float = measured("1", "F/W0 of steady sliding after the step")
+    direct: Float = measured("1", "extremum less F/W0 before the step")
+    evolution: Float = measured("1", "extremum less F/W0 in steady sliding after the step")
     states_at_extremum: Float
-    stable: NDArray[np.bool_]
     has_extremum: NDArray[np.bool_]
-    result: NDArray[np.object_]
-    slider: Slider
-
-    @property
-    def direct(self) -> Float:
-        """Immediate change of friction (direct effect)."""
-        return self.extremum - self.before
-
-    @property
-    def evolution(self) -> Float:
-        """Change of friction from the extremum to steady sliding (evolution effect)."""
-        return self.extremum - self.after
 
 
 @typed
@@ -268,11 +216,9 @@ def hold_response(
     """
     slider = _slider(slider, stiffness)
     time = obeying(hold_time, "hold_response.hold_time", "time", "positive")
-    if np.any(time > _LONGEST):
-        raise InputError(
-            f"hold_response.hold_time must be at most {_LONGEST:g} s, got {np.max(time):g} s; "
-            "asperity.theory.memory has the limits of long holds"
-        )
+    longest, rule = float(np.max(time, initial=0.0)), f"be at most {_LONGEST:g} s"
+    advice = "asperity.theory.memory has the limits of long holds"
+    require(longest <= _LONGEST, "hold_response.hold_time", rule, f"{longest:g} s", advice)
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
     (flat, V, time), shape = flatten((slider, V, time), "hold_response")
 
@@ -288,28 +234,23 @@ def hold_response(
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
     response, after, rate = _in_shapes(run, flat, V, time, runaway)
     assert isinstance(response, HoldResponse)
-    stable = _stable(flat, V)
-    shaped = Shaped(shape)
     crossing = response.end == End.CROSSING
-    return Holds(
-        hold_time=shaped(time),
-        velocity=shaped(V),
-        level=shaped(response.level),
-        minimum=shaped(response.minimum),
-        maximum=shaped(response.maximum),
-        healing_rate=shaped(rate),
-        hold_slip=shaped(response.hold_slip),
-        end_velocity=shaped(response.velocity * V),
-        velocity_at_maximum=shaped(np.where(crossing, response.velocity_at_maximum * V, np.nan)),
-        states=shaped(response.states),
-        states_at_maximum=shaped(response.states_at_maximum),
-        distance=shaped(np.where(crossing, response.distance, np.nan)),
-        slip=shaped(np.where(crossing, response.slip, np.nan)),
-        **_settling(after, response.end, stable, shaped),
-        stable=shaped(stable),
-        has_maximum=shaped(crossing),
-        slider=slider,
-    )
+    located = {name: getattr(response, name) for name in ("distance", "slip")}
+    located["velocity_at_maximum"] = response.velocity_at_maximum * V
+    columns = {
+        **{n: getattr(response, n) for n in ("level", "minimum", "maximum", "hold_slip")},
+        **{n: getattr(response, n) for n in ("states", "states_at_maximum")},
+        **{name: np.where(crossing, values, np.nan) for name, values in located.items()},
+        "hold_time": time,
+        "velocity": V,
+        "healing": response.maximum - response.level,
+        "healing_rate": rate,
+        "relaxation": response.level - response.minimum,
+        "end_velocity": response.velocity * V,
+        "has_maximum": crossing,
+        **_settling(after, response.end, _stable(flat, V)),
+    }
+    return Holds(slider=slider, **{name: shaped(a, shape) for name, a in columns.items()})
 
 
 @typed
@@ -344,10 +285,8 @@ def step_response(
     V = obeying(velocity, "step_response.velocity", "velocity", "positive")
     (flat, first, V), shape = flatten((slider, first, V), "step_response")
     if np.any(first == V):
-        raise InputError(
-            f"step_response.velocity must differ from the one before, got {V[first == V][0]:g} m/s "
-            "for both; leave such points out"
-        )
+        got, advice = f"{V[first == V][0]:g} m/s for both", "leave such points out"
+        raise InputError("step_response.velocity", "differ from the one before", got, advice)
 
     def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
         response, extremum = step(slider, first, V)
@@ -355,43 +294,37 @@ def step_response(
 
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
     response, after = _in_shapes(run, flat, V, first, runaway)
-    stable = _stable(flat, V)
-    shaped = Shaped(shape)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
+    located = {name: getattr(response, name) for name in ("distance", "slip")}
+    columns = {
+        **{n: getattr(response, n) for n in ("before", "after", "states_at_extremum")},
+        **{name: np.where(crossing, values, np.nan) for name, values in located.items()},
+        "velocity_before": first,
+        "velocity": V,
+        "extremum": over,
+        "direct": over - response.before,
+        "evolution": over - response.after,
+        "has_extremum": crossing,
+        **_settling(after, response.end, _stable(flat, V)),
+    }
     return VelocityStepResponse(
-        velocity_before=shaped(first),
-        velocity=shaped(V),
-        before=shaped(response.before),
-        extremum=shaped(over),
-        after=shaped(response.after),
-        distance=shaped(np.where(crossing, response.distance, np.nan)),
-        slip=shaped(np.where(crossing, response.slip, np.nan)),
-        states_at_extremum=shaped(response.states_at_extremum),
-        **_settling(after, response.end, stable, shaped),
-        stable=shaped(stable),
-        has_extremum=shaped(crossing),
-        slider=slider,
+        slider=slider, **{name: shaped(a, shape) for name, a in columns.items()}
     )
 
 
 def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
     if isinstance(slider, Law):
-        if stiffness is None:
-            raise InputError(
-                "stiffness must be given with a law alone, got none; give K/W0, as "
-                "stiffness='0.01 1/um', or a Slider"
-            )
+        advice = "give K/W0, as stiffness='0.01 1/um', or a Slider"
+        given = stiffness is not None
+        require(given, "stiffness", "be given with a law alone", "none", advice)
         K = obeying(stiffness, "stiffness", "per_length", "positive")
         slider = Slider(slider, spring=K, load=1.0)
     elif stiffness is not None:
-        raise InputError(
-            "stiffness must be left out with a slider, got both; the slider has a spring and a load"
-        )
-    if not slider.law.rate_dependent:
-        raise InputError(
-            f"law must depend on the velocity, got {slider.law.name}; it has no memory to test"
-        )
+        advice = "the slider has a spring and a load"
+        raise InputError("stiffness", "be left out with a slider", "both", advice)
+    law, advice = slider.law, "it has no memory to test"
+    require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
     return slider
 
 
@@ -414,15 +347,17 @@ def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
 
 
 def _settling(
-    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_], shaped: Shaped
+    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_]
 ) -> dict[str, Any]:
+    """Columns of what follows the extremum."""
     none = np.full(len(stable), np.nan)
     ends = end if after is None else after.end
     texts = np.array([_SENTENCES[End(int(e))] for e in ends], dtype=object)
     texts[(ends == End.RUNAWAY) & ~stable] = _UNSTABLE
     texts[(ends == End.TOO_MANY_STEPS) & (end == End.CROSSING)] = _RINGING
     return {
-        "settling_distance": shaped(none if after is None else after.distance),
-        "settling_slip": shaped(none if after is None else after.slip),
-        "result": shaped(texts),
+        "settling_distance": none if after is None else after.distance,
+        "settling_slip": none if after is None else after.slip,
+        "stable": stable,
+        "result": texts,
     }

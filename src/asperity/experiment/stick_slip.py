@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.algebra.small_systems import jacobian_columns
-from asperity.errors import InputError
-from asperity.experiment.labelled import Labelled, Shaped
+from asperity.errors import require
+from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
@@ -23,22 +23,8 @@ from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 Float = NDArray[np.float64]
 
-#: Unit and meaning of what the record holds.
-_MEANINGS: dict[str, tuple[str, str]] = {
-    "period": ("s", "period of stick-slip"),
-    "drop": ("1", "largest less smallest F/W0"),
-    "peak": ("1", "largest F/W0"),
-    "lowest": ("1", "smallest F/W0"),
-    "stick_duration": ("s", "time of a period in which the force rises"),
-    "slip_duration": ("s", "time of a period in which the force falls"),
-    "peak_velocity": ("m/s", "largest velocity of the slider"),
-    "slips": ("1", "slips in a period; 0 without stick-slip"),
-    "steady": ("1", "whether the motion comes to steady sliding"),
-    "stable": ("1", "whether steady sliding is stable"),
-}
 
-
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, kw_only=True)
 class StickSlip(Labelled, Drawn):
     """Limit cycles under a drive of constant velocity; arrays of one shape.
 
@@ -69,22 +55,20 @@ class StickSlip(Labelled, Drawn):
         Of a single point: the force at any time of a period.
     """
 
-    meanings = _MEANINGS
-    drive: ClassVar[dict[str, str]] = {"velocity": "m/s"}
     shown = ("period", "drop", "slip_duration", "peak_velocity")
     _drawn_by = "asperity.figures.response:draw_stick_slip_response"
 
-    velocity: Float
-    period: Float
-    drop: Float
-    peak: Float
-    lowest: Float
-    stick_duration: Float
-    slip_duration: Float
-    peak_velocity: Float
-    slips: NDArray[np.int_]
-    steady: NDArray[np.bool_]
-    stable: NDArray[np.bool_]
+    velocity: Float = measured("m/s")
+    period: Float = measured("s", "period of stick-slip")
+    drop: Float = measured("1", "largest less smallest F/W0")
+    peak: Float = measured("1", "largest F/W0")
+    lowest: Float = measured("1", "smallest F/W0")
+    stick_duration: Float = measured("s", "time of a period in which the force rises")
+    slip_duration: Float = measured("s", "time of a period in which the force falls")
+    peak_velocity: Float = measured("m/s", "largest velocity of the slider")
+    slips: NDArray[np.int_] = measured("1", "slips in a period; 0 without stick-slip")
+    steady: NDArray[np.bool_] = measured("1", "whether the motion comes to steady sliding")
+    stable: NDArray[np.bool_] = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
     slider: Slider
     cycle: LimitCycle | None = None
@@ -139,11 +123,11 @@ def stick_slip_response(
     and `period` are accurate to about 1e-8 relatively. One point after the other takes some
     hundredths of a second each: steps of stiff motions differ too much to be taken together.
     """
-    if not slider.law.rate_dependent:
-        raise InputError(
-            f"law must depend on the velocity, got {slider.law.name}; asperity.theory has the "
-            "cycle of constant static and dynamic friction"
-        )
+    law, advice = (
+        slider.law,
+        "asperity.theory has the cycle of constant static and dynamic friction",
+    )
+    require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
     if spring is not None:
         stiffness: Any = spring
@@ -160,22 +144,21 @@ def stick_slip_response(
         )
         for i, v in enumerate(V)
     ]  # fmt: skip
-    shaped = Shaped(shape)
 
     def of(name: str, kind: Any = float) -> Any:
-        return shaped(np.array([getattr(cycle, name) for cycle in cycles], kind))
+        return np.array([getattr(cycle, name) for cycle in cycles], kind)
 
     numbers = ("period", "drop", "peak", "lowest", "stick_duration", "slip_duration")
-    return StickSlip(
-        velocity=shaped(V),
+    columns = {
+        "velocity": V,
         **{name: of(name) for name in (*numbers, "peak_velocity")},
-        slips=of("slips", int),
-        steady=shaped(np.array([cycle.end is CycleEnd.STEADY for cycle in cycles], bool)),
-        stable=shaped(_stable(motion)),
-        result=of("result", object),
-        slider=slider,
-        cycle=cycles[0] if len(cycles) == 1 else None,
-    )
+        "slips": of("slips", int),
+        "steady": of("end", object) == CycleEnd.STEADY,
+        "stable": _stable(motion),
+        "result": of("result", object),
+    }
+    shown = {name: shaped(a, shape) for name, a in columns.items()}
+    return StickSlip(slider=slider, cycle=cycles[0] if len(cycles) == 1 else None, **shown)
 
 
 def _stable(motion: Motion) -> NDArray[np.bool_]:

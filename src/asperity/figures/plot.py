@@ -154,7 +154,6 @@ class Plot(_Part):
     size: tuple[float, float] = (5.0, 3.5)
     columns: int = 1
     heights: tuple[float, ...] = ()
-    share: bool = True
     panel: tuple[Panel, ...]
     draw: tuple[Item, ...] = ()
     legend: dict[str, Any] = Field(default_factory=dict)
@@ -198,7 +197,7 @@ class _Drawing:
         rows = -(-len(plot.panel) // plot.columns)
         grid = self.figure.subplots(
             rows, plot.columns, squeeze=False,
-            sharex=plot.share and ("col" if plot.columns > 1 else True),
+            sharex="col" if plot.columns > 1 else True,
             sharey="row" if plot.columns > 1 else False, height_ratios=plot.heights or None,
         )  # fmt: skip
         self.panels = list(zip(plot.panel, grid.ravel(), strict=True))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from cmcrameri import cm
-from matplotlib.colors import CenteredNorm
 from matplotlib.figure import Figure
 
 from asperity.errors import InputError, closest
@@ -56,62 +55,37 @@ def plot_slice(
     for name in chosen:
         if name not in dims or name in (x, y):
             raise InputError(f"at must name other axes, got '{name}'; {closest(name, dims)}")
+    numbered = {d: d in part.indexes and part[d].dtype.kind in "if" for d in dims}
     for dim in dims:
-        if dim in (x, y):
-            continue
-        labelled = dim in part.indexes and np.issubdtype(part[dim].dtype, np.number)
-        if labelled and dim in chosen:
+        if dim in chosen and numbered[dim]:
             part = part.sel({dim: float(chosen[dim])}, method="nearest")
-        else:
+        elif dim not in (x, y):
             part = part.isel({dim: int(chosen.get(dim, 0))})
+    for side in (x, y):
+        if side is not None and not numbered[side]:
+            part = part.assign_coords({side: (side, range(part.sizes[side]))})
+            part[side].attrs["long_name"] = f"row of {side}"
+    # Titles name the position on the other axes; a pure number needs no unit.
+    part = part.drop_vars([n for n, c in part.coords.items() if c.ndim == 0 and n not in dims])
+    for array in (part, *part.coords.values()):
+        array.attrs = {n: v for n, v in array.attrs.items() if v != "1"}
+    options: dict[str, Any] = {"xscale": _scale(part[x].values)}
     figure = new_figure(4.4, 3.4)
     axis = figure.subplots()
-    label = f"{part.attrs.get('long_name', show)} ({part.attrs.get('units', '1')})"
-    across = _values(part, x)
     if y is None:
-        axis.plot(across, part.values)
-        axis.set_ylabel(label)
+        part.plot.line(x=x, ax=axis, **options)
     else:
-        values = part.transpose(y, x).values
-        signed = np.nanmin(values) < 0 < np.nanmax(values)
-        mesh = axis.pcolormesh(
-            across,
-            _values(part, y),
-            values,
-            cmap=cm.vik if signed else cm.batlow,
-            norm=CenteredNorm() if signed else None,
-            shading="nearest",
-            rasterized=True,
-        )
-        figure.colorbar(mesh, ax=axis, pad=0.02).set_label(label)
-        axis.set_ylabel(_label(part, y))
-        _scale(axis.set_yscale, _values(part, y))
-    axis.set_xlabel(_label(part, x))
-    _scale(axis.set_xscale, across)
-    fixed = {str(n): part[n] for n in part.coords if n not in (x, y) and part[n].ndim == 0}
-    shown = [n for n in dims if n in fixed]
-    if shown:
-        axis.set_title(", ".join(f"{n} = {fixed[n].values:.4g}" for n in shown), fontsize="small")
+        options |= {"yscale": _scale(part[y].values), "rasterized": True, "cmap": cm.batlow}
+        if part.min() < 0 < part.max():
+            options |= {"cmap": cm.vik, "center": 0.0}
+        part.plot.pcolormesh(x=x, y=y, ax=axis, **options)
     return figure
 
 
-def _values(part: Any, dim: str) -> np.ndarray:
-    """Labels of an axis, or the numbers of its rows."""
-    labelled = dim in part.indexes and np.issubdtype(part[dim].dtype, np.number)
-    return np.asarray(part[dim].values if labelled else np.arange(part.sizes[dim]))
-
-
-def _label(part: Any, dim: str) -> str:
-    if dim not in part.indexes:
-        return f"row of {dim}"
-    about = part[dim].attrs
-    unit = about.get("units", "1")
-    return f"{about.get('long_name', dim)}" + ("" if unit == "1" else f" ({unit})")
-
-
-def _scale(set_scale: Any, values: np.ndarray) -> None:
+def _scale(values: np.ndarray) -> str:
     """Logarithmic where the labels lie at equal ratios."""
     if len(values) > 2 and (values > 0).all():
         steps, ratios = np.diff(values), np.diff(np.log(values))
         if np.ptp(ratios) < 1e-6 * abs(ratios).max() and np.ptp(steps) > 1e-6 * abs(steps).max():
-            set_scale("log")
+            return "log"
+    return "linear"

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import functools
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from asperity.errors import InputError
 from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
 Float = NDArray[np.float64]
 T = TypeVar("T")
-#: Log likelihood of parameters by name, and of arrays.
-Likelihood = Callable[[Mapping[str, Array], Any], Array]
+#: Residuals of parameters by name, and of arrays.
+CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
 #: A coordinate nearer to its bound is there.
 _AT_BOUND = 1e-6
@@ -70,7 +72,7 @@ class Minimum(NamedTuple):
     chi2: float
 
 
-class DataTerm(Protocol):
+class DataTerm(ABC):
     """One set of data in the likelihood.
 
     Attributes
@@ -81,60 +83,42 @@ class DataTerm(Protocol):
         What the data report; the `observable` of each residual is one of them.
     nuisances : tuple of Unknown
         Free parameters of this set of data alone, such as the offset of a gauge.
-    profiled : int
-        Parameters that the term itself fits at given values of the others: they count in AICc,
-        BIC and degrees of freedom.
-    noise : mapping of str to object
-        Model of the noise and `effective_samples`, plain numbers and texts for JSON.
     failure : str
         Why the residuals may not exist, and what to do: the message of a fit that failed.
-    searches : bool or None
-        Whether orbits that the fast method does not find are searched for at every call, which
-        takes long; None for data that are no periodic responses.
-    affordable : int
-        Evaluations that an integral over the parameters may take.
     """
 
-    @property
-    def name(self) -> str:
-        """What messages call the data."""
-        ...
+    name: str
+    observables: tuple[str, ...]
+    nuisances: tuple[Unknown, ...] = ()
+    failure: str
 
     @property
-    def observables(self) -> tuple[str, ...]:
-        """What the data report."""
-        ...
-
-    @property
-    def nuisances(self) -> tuple[Unknown, ...]:
-        """Free parameters of this set of data alone."""
-        ...
+    @abstractmethod
+    def noise(self) -> Mapping[str, Any]:
+        """Model of the noise and `effective_samples`, plain numbers and texts for JSON."""
 
     @property
     def profiled(self) -> int:
-        """Parameters that the term itself fits."""
-        ...
+        """Parameters that the term itself fits at given values of the others.
 
-    @property
-    def noise(self) -> Mapping[str, Any]:
-        """Model of the noise and number of effective samples."""
-        ...
-
-    @property
-    def failure(self) -> str:
-        """Why the residuals may not exist, and what to do."""
-        ...
+        They count in AICc, BIC and degrees of freedom.
+        """
+        return 0
 
     @property
     def searches(self) -> bool | None:
-        """Whether orbits are searched for at every call; None without periodic responses."""
-        ...
+        """Whether orbits that the fast method does not find are searched for at every call.
+
+        None for data that are no periodic responses.
+        """
+        return None
 
     @property
     def affordable(self) -> int:
         """Evaluations that an integral over the parameters may take."""
-        ...
+        return 256
 
+    @abstractmethod
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
@@ -148,24 +132,8 @@ class DataTerm(Protocol):
         search : bool, optional
             Whether a slower method is tried where the fast one finds no solution.
         """
-        ...
 
-    def likelihood(self, names: tuple[str, ...]) -> tuple[Likelihood, Any]:
-        """The logarithm of the likelihood but for a constant, as compiled programs evaluate it.
-
-        Parameters
-        ----------
-        names : tuple of str
-            All free parameters and nuisances of the fit.
-
-        Returns
-        -------
-        callable
-            Of parameters by name and of the arrays; equal ones share a program.
-        pytree of arrays
-        """
-        ...
-
+    @abstractmethod
     def chi2_of_many(
         self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
     ) -> Float:
@@ -181,7 +149,35 @@ class DataTerm(Protocol):
             Share of a table's rows that must have a periodic orbit; with some, the sum is that of
             these rows, scaled to all. Infinite with fewer, and where there is no motion.
         """
-        ...
+
+    @abstractmethod
+    def observed(self) -> Mapping[str, Float]:
+        """Columns of the data, for files of draws."""
+
+    def compiled(self, names: tuple[str, ...]) -> tuple[CompiledResiduals, Any]:
+        """The residuals as compiled programs evaluate and differentiate them.
+
+        Parameters
+        ----------
+        names : tuple of str
+            All free parameters and nuisances of the fit.
+
+        Returns
+        -------
+        callable
+            Of parameters by name and of the arrays; equal ones share a program. The sum of squares
+            is that of `residuals`, and NaN without a solution.
+        pytree of arrays
+
+        Raises
+        ------
+        InputError
+            For data whose prediction has no derivatives within compiled programs.
+        """
+        raise InputError(
+            f"a posterior must be of lock-in readings or recordings of sliding, got {self.name}; "
+            "take intervals by profile likelihood (profile=True, --profile)"
+        )
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
         """The same data with fewer rows and a coarser model, to look for minima with.
@@ -194,9 +190,9 @@ class DataTerm(Protocol):
         Returns
         -------
         DataTerm or None
-            None for data without rows.
+            None for data other than tables of lock-in readings.
         """
-        ...
+        return None
 
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
@@ -215,16 +211,12 @@ class DataTerm(Protocol):
         Returns
         -------
         array, shape (parameters, parameters), and array, shape (parameters,)
+            Zeros where the uncertainties are given.
         """
-        ...
+        return np.zeros_like(covariance), np.zeros(slopes.size)
 
-    def observed(self) -> Mapping[str, Float]:
-        """Columns of the data, for files of draws."""
-        ...
-
-    def use_search(self, always: bool) -> None:
-        """Try the slower method at every call, or no more."""
-        ...
+    def use_search(self, always: bool) -> None:  # noqa: B027
+        """Try the slower method at every call, or no more; of data that have one."""
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
@@ -240,7 +232,7 @@ class DataTerm(Protocol):
         outliers : sequence of int
             Rows of a table without which the law describes it.
         """
-        ...
+        return ()
 
 
 @dataclass

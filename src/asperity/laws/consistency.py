@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.errors import InputError, code_of_others
+from asperity.errors import InputError, code_of_others, require
 from asperity.laws.law import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import shown
@@ -42,32 +42,23 @@ def checked_class(law: type[Law], where: str) -> type[Law]:
     InputError
         If one of them is missing or no text, or a name is in use.
     """
-    for attribute, wanted in (("name", "a text"), ("source", "a text"), ("state_names", "names")):
-        if not hasattr(law, attribute):
-            raise InputError(
-                f"law.{attribute} must be given, got none in {where}; add it to the class"
-            )
+    examples = {"name": '"my-law"', "source": '"kato2001"', "state_names": '("phi",)'}
+    for attribute, example in examples.items():
+        field, like = f"law.{attribute}", f"write it like {attribute} = {example}"
+        given = hasattr(law, attribute)
+        require(given, field, "be given", f"none in {where}", "add it to the class")
         value = getattr(law, attribute)
-        texts = value if isinstance(value, tuple | list) else ("",)
-        names = attribute == "state_names"
-        right = all(isinstance(t, str) for t in texts) if names else isinstance(value, str)
-        if not right or (names and texts == ("",)) or (attribute == "name" and not value):
-            example = '("phi",)' if names else '"my-law"' if attribute == "name" else '"kato2001"'
-            raise InputError(
-                f"law.{attribute} must be {'a tuple of ' if names else ''}{wanted}, got "
-                f"{shown(value)} in {where}; write it like {attribute} = {example}"
-            )
-    if any(c.isspace() or c == ":" for c in law.name):
-        raise InputError(
-            f"law.name must be without blanks and colons, got '{law.name}' in {where}; write it "
-            "like 'my-law'"
-        )
-    missing = sorted(getattr(law, "__abstractmethods__", ()))
-    if missing:
-        raise InputError(
-            f"law must have all its equations, got none for {', '.join(missing)} in {where}; "
-            "write them"
-        )
+        right, rule = isinstance(value, str) and (value or attribute != "name"), "be a text"
+        if attribute == "state_names":
+            several, rule = isinstance(value, tuple | list), "be a tuple of names"
+            right = several and all(isinstance(t, str) and t for t in value)
+        require(right, field, rule, f"{shown(value)} in {where}", like)
+    plain = not any(c.isspace() or c == ":" for c in law.name)
+    rule, got = "be without blanks and colons", f"'{law.name}' in {where}"
+    require(plain, "law.name", rule, got, "write it like 'my-law'")
+    missing = ", ".join(sorted(getattr(law, "__abstractmethods__", ())))
+    rule, got = "have all its equations", f"none for {missing} in {where}"
+    require(not missing, "law", rule, got, "write them")
     law_parameters(law)
     return law
 
@@ -93,9 +84,7 @@ def checked_law(law: Law) -> Law:
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         return law
     one = jax.tree.map(lambda a: jnp.asarray(np.ravel(np.asarray(a, float))[0]), law)
-    fault = _fault(kind, _probe(kind)(one))
-    if fault:
-        raise InputError(f"{fault}; {_PAGE}")
+    _check_numbers(kind, _probe(kind)(one))
     return law
 
 
@@ -122,23 +111,18 @@ def _check_shapes(kind: type[Law], law: Law) -> None:
         if states is None:
             _require_shape(result, v.shape, name, kind)
             continue
-        if not isinstance(result, tuple | list) or len(result) != states:
-            got = f"{len(result)}" if isinstance(result, tuple | list) else "no tuple"
-            raise InputError(
-                f"{name} must return a tuple with an array for each of the {states} state_names, "
-                f"got {got} from '{kind.name}'; {_PAGE}"
-            )
+        got = len(result) if isinstance(result, tuple | list) else "no tuple"
+        rule = f"return a tuple with an array for each of the {states} state_names"
+        require(got == states, name, rule, f"{got} from '{kind.name}'", _PAGE)
         for one_state in result:
             _require_shape(one_state, v.shape, name, kind)
 
 
 def _require_shape(result: Any, shape: tuple[int, ...], name: str, kind: type[Law]) -> None:
-    if getattr(result, "shape", None) != shape or not jnp.issubdtype(result.dtype, jnp.floating):
-        got = getattr(result, "shape", type(result).__name__)
-        raise InputError(
-            f"{name} must return real numbers of the shape of its arguments, got {got} for "
-            f"{shape} from '{kind.name}'; {_PAGE}"
-        )
+    got = getattr(result, "shape", type(result).__name__)
+    real = got == shape and jnp.issubdtype(result.dtype, jnp.floating)
+    rule = "return real numbers of the shape of its arguments"
+    require(real, name, rule, f"{got} for {shape} from '{kind.name}'", _PAGE)
 
 
 @cache
@@ -167,36 +151,28 @@ def _probe(kind: type[Law]) -> Callable[[Law], dict[str, Array]]:
     return jax.jit(probe)
 
 
-def _fault(kind: type[Law], result: dict[str, Array]) -> str:
-    """The fault in the numbers of a law; empty without a fault."""
+def _check_numbers(kind: type[Law], result: dict[str, Array]) -> None:
+    """Raise `InputError` for a fault in the numbers of a law."""
     at = {name: np.asarray(values) for name, values in result.items()}
+    both, name = "law.friction and law.state_rate", f"'{kind.name}'"
     finite = np.isfinite(at["friction"]) & np.isfinite(at["rates"]).all(0)
-    if not finite.any():
-        return (
-            "law.friction and law.state_rate must be finite in steady sliding, got no finite "
-            f"number from 1e-8 to 1e-3 m/s of '{kind.name}' with these parameters"
-        )
-    friction, alone = at["friction"][finite], at["alone"][finite]
-    faster, rates_alone = at["faster_rates"][:, finite], at["rates_alone"][:, finite]
+    got = f"no finite number from 1e-8 to 1e-3 m/s of {name} with these parameters"
+    require(finite.any(), both, "be finite in steady sliding", got, _PAGE)
+    friction, faster, quicker, alone, rates, rates_alone = (
+        at[n][..., finite]
+        for n in ("friction", "faster_rates", "faster", "alone", "rates", "rates_alone")
+    )
     same = np.allclose(friction, alone, rtol=1e-9, atol=1e-12)
-    if not (same and np.allclose(faster, rates_alone, rtol=1e-9, equal_nan=True)):
-        return (
-            "law.friction and law.state_rate must act on each element for itself, got "
-            f"'{kind.name}', whose elements influence each other"
-        )
-    rest = np.abs(at["rates"][:, finite])
-    moving = np.abs(faster)
+    same = same and np.allclose(faster, rates_alone, rtol=1e-9, equal_nan=True)
+    got = f"{name}, whose elements influence each other"
+    require(same, both, "act on each element for itself", got, _PAGE)
+    rest, moving = np.abs(rates), np.abs(faster)
     if np.any(rest > _STEADY * np.where(np.isfinite(moving), moving, np.inf)):
         row, column = np.argwhere(~(rest <= _STEADY * moving))[0]
-        return (
-            "law.steady_state must be the states at which every rate vanishes, got a rate of "
-            f"{kind.state_names[row]} of {rest[row, column]:.3g} 1/s from '{kind.name}' at "
-            f"{np.array(_SPEEDS)[finite][column]:g} m/s"
-        )
-    quicker = at["faster"][finite]
-    if kind.rate_dependent and np.any(quicker < friction - 1e-12 * np.abs(friction)):
-        return (
-            "law.friction must not decrease with the velocity at constant state, got "
-            f"'{kind.name}', where it does"
-        )
-    return ""
+        rate = f"a rate of {kind.state_names[row]} of {rest[row, column]:.3g} 1/s"
+        got = f"{rate} from {name} at {np.array(_SPEEDS)[finite][column]:g} m/s"
+        rule = "be the states at which every rate vanishes"
+        raise InputError("law.steady_state", rule, got, _PAGE)
+    rising = not kind.rate_dependent or np.all(quicker >= friction - 1e-12 * np.abs(friction))
+    rule = "not decrease with the velocity at constant state"
+    require(rising, "law.friction", rule, f"{name}, where it does", _PAGE)

@@ -21,8 +21,9 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
+from typing import TypeGuard
 
-from asperity.errors import InputError, closest, code_of_others
+from asperity.errors import InputError, closest, code_of_others, require
 from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
 from asperity.parameters.arguments import shown, typed
@@ -47,12 +48,8 @@ def register(law: type[Law]) -> type[Law]:
     if known is not law and _same_source(known, law):
         _LAWS[law.name] = law
     elif known is not law:
-        raise InputError(
-            "law.name",
-            "be unique",
-            f"'{law.name}', which {known.__module__} already has",
-            "choose another name",
-        )
+        got = f"'{law.name}', which {known.__module__} already has"
+        raise InputError("law.name", "be unique", got, "choose another name")
     return law
 
 
@@ -133,13 +130,8 @@ def load_installed(point: EntryPoint) -> type[Law]:
     with code_of_others("law", advice="repair or uninstall the package", where=where):
         result = point.load()
     law = _checked(result, where)
-    if law.name != point.name:
-        raise InputError(
-            "law",
-            "have the name of its entry point",
-            f"{where} and the name '{law.name}'",
-            "change one of the two",
-        )
+    rule, got = "have the name of its entry point", f"{where} and the name '{law.name}'"
+    require(law.name == point.name, "law", rule, got, "change one of the two")
     return law
 
 
@@ -157,22 +149,13 @@ def law_at(place: str) -> type[Law]:
         If there is no such module, file or name, its code fails, or it is no law.
     """
     where, _, name = place.rpartition(":")
-    if not where or not name:
-        raise InputError(
-            "law",
-            "be a place like 'module:Name' or 'path/to/file.py:Name'",
-            f"'{place}'",
-            "give both parts",
-        )
+    rule = "be a place like 'module:Name' or 'path/to/file.py:Name'"
+    require(where and name, "law", rule, f"'{place}'", "give both parts")
     module = _module(where, place)
     if not hasattr(module, name):
         laws = [n for n, value in vars(module).items() if _is_law(value)]
-        raise InputError(
-            "law",
-            f"be in '{where}'",
-            f"'{name}', which is not there",
-            closest(name, laws) if laws else "define a subclass of asperity.laws.Law in it",
-        )
+        advice = closest(name, laws) if laws else "define a subclass of asperity.laws.Law in it"
+        raise InputError("law", f"be in '{where}'", f"'{name}', which is not there", advice)
     return _checked(getattr(module, name), f"'{place}'")
 
 
@@ -182,12 +165,8 @@ def _module(where: str, place: str) -> ModuleType:
         try:
             return _from_file(Path(where)) if file else importlib.import_module(where)
         except (FileNotFoundError, ModuleNotFoundError) as error:
-            raise InputError(
-                "law",
-                "be in a module or file that exists",
-                f"'{place}' ({error})",
-                "correct the path, or install the module",
-            ) from None
+            rule, advice = "be in a module or file that exists", "correct the path, or install it"
+            raise InputError("law", rule, f"'{place}' ({error})", advice) from None
 
 
 def _from_file(path: Path) -> ModuleType:
@@ -211,16 +190,12 @@ def _from_file(path: Path) -> ModuleType:
     return module
 
 
-def _is_law(value: object) -> bool:
+def _is_law(value: object) -> TypeGuard[type[Law]]:
     return isinstance(value, type) and issubclass(value, Law) and value is not Law
 
 
 def _checked(result: object, where: str) -> type[Law]:
-    if not (isinstance(result, type) and issubclass(result, Law) and result is not Law):
-        raise InputError(
-            "law",
-            "be a subclass of asperity.laws.Law",
-            f"{where}, a {type(result).__name__}",
-            "see the page 'Write your own law'",
-        )
+    if not _is_law(result):
+        got, advice = f"{where}, a {type(result).__name__}", "see the page 'Write your own law'"
+        raise InputError("law", "be a subclass of asperity.laws.Law", got, advice)
     return checked_class(result, where)

@@ -22,6 +22,7 @@ from asperity.ledger.figures import (
     Observable,
     PaperFigure,
     Section,
+    TabFigure,
     figure_words,
 )
 from asperity.ledger.markup import rich, table
@@ -30,7 +31,6 @@ from asperity.ledger.recipe import RecipeNumber, RecipeResult, read_columns
 from asperity.ledger.report import ReproductionSummary, reproduce
 from asperity.ledger.rules import WORDS, AcceptanceRule
 from asperity.ledger.sentences import fill
-from asperity.ledger.tab import TabFigure
 
 __all__ = [
     "KINDS",

@@ -231,23 +231,17 @@ def _check_names(contents: Contents, file: str) -> None:
         if ids.count(name) > 1:
             raise InputError(f"{file}: claim.id must be unique, got '{name}' twice; rename one")
     quantities = {u.quantity for u in contents.uncertainty}
-    for entry in contents.claim:
-        for quantity in set(entry.depends_on) - quantities:
+    references = [
+        *((f"{e.id}.depends_on", "an uncertainty", e.depends_on, quantities)
+          for e in contents.claim),
+        *(("summary.sentences", "claims", names_in(sentence), ids)
+          for words in contents.summary for sentence in words.sentences),
+        *(("headline.claims", "claims", h.claims, ids) for h in contents.headline),
+        *(("headline.found", "claims", names_in(h.found), ids) for h in contents.headline),
+    ]  # fmt: skip
+    for where, what, names, known in references:
+        for name in (name for name in names if name not in known):
             raise InputError(
-                f"{file}: {entry.id}.depends_on must name an uncertainty of the file, got "
-                f"'{quantity}'; add [[uncertainty]] with that quantity"
+                f"{file}: {where} must name {what} of the file, got '{name}'; "
+                f"{closest(name, known)}"
             )
-    for words in contents.summary:
-        for name in {n for sentence in words.sentences for n in names_in(sentence)} - set(ids):
-            raise InputError(
-                f"{file}: summary.sentences must quote claims of the file, got '{{{name}}}'; "
-                "correct it"
-            )
-    for headline in contents.headline:
-        quoted = set(names_in(headline.found))
-        for field, names in (("claims", set(headline.claims)), ("found", quoted)):
-            for name in sorted(names - set(ids)):
-                raise InputError(
-                    f"{file}: headline.{field} must name claims of the file, got '{name}'; "
-                    "correct it"
-                )

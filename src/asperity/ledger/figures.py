@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,8 @@ from asperity.questions.record import Question, Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from asperity.materials import Material
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,6 @@ class FigureNumbers:
         Of its files, and of its words in figures.toml.
     data : DataFrame
         One operating point, or one instant, a row; ``curve`` names the line that it belongs to.
-    columns : mapping of str to str
-        Unit and meaning of the columns of `data`.
     scalars : mapping of str to float
         Numbers read off the curves, which the head of the table lists.
     quoted : mapping of str to float
@@ -97,7 +97,6 @@ class FigureNumbers:
 
     name: str
     data: pd.DataFrame
-    columns: Mapping[str, str]
     scalars: Mapping[str, float] = field(default_factory=dict)
     quoted: Mapping[str, float] = field(default_factory=dict)
     points: pd.DataFrame | None = None
@@ -202,32 +201,6 @@ class FigureWords(Record):
             )
         return self.plot.figure(numbers.data, numbers.numbers, numbers.points)
 
-    def figure(
-        self,
-        numbers: FigureNumbers,
-        tables: Sequence[FigureTable],
-        draw: Callable[[FigureNumbers], Figure] | None = None,
-    ) -> PaperFigure:
-        """The figure of the report.
-
-        Parameters
-        ----------
-        numbers : FigureNumbers
-        tables : sequence of FigureTable
-            The first table has the curves, with which measured points are compared.
-        draw : function, optional
-            Draws in place of the plot.
-        """
-        caption, alt = (
-            _minus(fill(text, numbers.numbers, f"figures.{numbers.name}"))
-            for text in (self.caption, self.alt)
-        )
-        return PaperFigure(
-            numbers.name, self.place, self.title, caption, alt,
-            draw=lambda: (draw or self.draw)(numbers), tables=tables,
-            points=len(numbers.data), failed=numbers.failed,
-        )  # fmt: skip
-
 
 def _minus(text: str) -> str:
     """A text with typographic minus signs."""
@@ -270,6 +243,8 @@ class FiguresFile(Question):
     Attributes
     ----------
     section : mapping of str to SectionWords
+    column, point_column : mapping of str to str
+        Unit and meaning of the columns of all tables, and of those of points where they differ.
     label : mapping of str to str
         Names of columns on the browser page.
     slider : mapping of str to SliderWords
@@ -281,6 +256,8 @@ class FiguresFile(Question):
     __pydantic_extra__: dict[str, FigureWords] = Field(init=False)
 
     section: dict[str, SectionWords] = Field(default_factory=dict)
+    column: dict[str, str] = Field(default_factory=dict)
+    point_column: dict[str, str] = Field(default_factory=dict)
     label: dict[str, str] = Field(default_factory=dict)
     slider: dict[str, SliderWords] = Field(default_factory=dict)
 
@@ -288,6 +265,38 @@ class FiguresFile(Question):
     def figures(self) -> Mapping[str, FigureWords]:
         """Words of the figures by their names, in the order of the file."""
         return self.__pydantic_extra__
+
+    def figure(
+        self,
+        numbers: FigureNumbers,
+        tables: Mapping[str, tuple[pd.DataFrame, Sequence[str]]],
+        draw: Callable[[FigureNumbers], Figure] | None = None,
+    ) -> PaperFigure:
+        """The figure of the report that `numbers` are of.
+
+        Parameters
+        ----------
+        numbers : FigureNumbers
+        tables : mapping of str to (DataFrame, sequence of str)
+            Data and first lines of each CSV file, by its name without ending. The first table has
+            the curves, with which measured points are compared.
+        draw : function, optional
+            Draws in place of the plot.
+        """
+        words = self.figures[numbers.name]
+        caption, alt = (
+            _minus(fill(text, numbers.numbers, f"figures.{numbers.name}"))
+            for text in (words.caption, words.alt)
+        )
+        made = []
+        for name, (data, header) in tables.items():
+            of_points = self.point_column if data is numbers.points else {}
+            made.append(FigureTable(name, data, header, self.column | of_points))
+        return PaperFigure(
+            numbers.name, words.place, words.title, caption, alt,
+            draw=lambda: (draw or words.draw)(numbers),
+            tables=made, points=len(numbers.data), failed=numbers.failed,
+        )  # fmt: skip
 
 
 def figure_words(package: str) -> FiguresFile:
@@ -324,3 +333,50 @@ class Section:
     observables: Mapping[str, Sequence[Observable]] = field(default_factory=dict)
     before: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
     after: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
+
+
+#: A line of a figure: ``name``, and ``values``, columns by their names.
+Line: TypeAlias = dict[str, Any]
+#: What a text states at one abscissa: ``x``, ``ends``, one number or two, and ``text``.
+Mark: TypeAlias = dict[str, Any]
+Progress: TypeAlias = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class TabFigure:
+    """A figure of the browser page, which is computed for changed numbers of the paper.
+
+    A paper's module ``tab`` has ``FIGURES``, a `TabFigure` by the name of each; figures.toml has
+    the paper's numbers that a figure follows from (``numbers``), and labels of its columns.
+
+    Attributes
+    ----------
+    x : str
+        Column of the abscissa.
+    rows : sequence of str
+        Columns of the ordinates, one panel each.
+    logarithmic : tuple of str
+        Columns with a logarithmic axis.
+    lines : function
+        Maps the paper's numbers to the fast lines (milliseconds).
+    marks : function
+        Maps the paper's numbers to the statements of the text, by the column of the ordinate.
+    python : function
+        From the names and values of the moved numbers to code that computes the same.
+    slow : tuple of str
+        Names of slow lines (seconds).
+    slow_line : function
+        Maps the paper's numbers, a name of `slow` and a progress function to this line.
+    extras : function
+        Maps the paper's numbers to further fields of the answer.
+    """
+
+    x: str
+    rows: Sequence[str]
+    lines: Callable[[Material], list[Line]]
+    python: Callable[[Mapping[str, float]], str]
+    logarithmic: tuple[str, ...] = ()
+    marks: Callable[[Material], Mapping[str, Sequence[Mark]]] = lambda _: {}
+    slow: tuple[str, ...] = ()
+    slow_line: Callable[[Material, str, Progress], Line] | None = None
+    extras: Callable[[Material], Mapping[str, Any]] = lambda _: {}

@@ -12,9 +12,9 @@ NAME = "package". It holds
 - ``figures``, a module or package: ``FIGURES``, functions that return a
   `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of
   `asperity.ledger.Section`;
-- ``tab``, a module, if the paper has figures with sliders on the browser page
-  (`asperity.ledger.tab`), and ``recipe``, a module, if it has a procedure from measurements to
-  numbers (``asperity recipe``).
+- ``tab``, a module, if the paper has figures with sliders on the browser page, a
+  `asperity.ledger.TabFigure` each, and ``recipe``, a module, if it has a procedure from
+  measurements to numbers (``asperity recipe``).
 """
 
 from __future__ import annotations
@@ -40,14 +40,13 @@ from asperity.ledger.claims import (
     printed_numbers,
 )
 from asperity.ledger.contents import Contents, read_contents
-from asperity.ledger.figures import FiguresFile, PaperFigure, Section, figure_words
+from asperity.ledger.figures import FiguresFile, PaperFigure, Section, TabFigure, figure_words
 from asperity.parameters.arguments import of_type, shown
 
 if TYPE_CHECKING:
     from types import ModuleType
 
     from asperity.ledger.rules import AcceptanceRule
-    from asperity.ledger.tab import TabFigure
     from asperity.materials import Material
 
 GROUP = "asperity.papers"

@@ -16,9 +16,7 @@ undecided      chi^2 is not larger, but the errors are so wide that a curve 20 %
 
 from __future__ import annotations
 
-import csv
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -28,6 +26,7 @@ import pandas as pd
 
 from asperity.errors import InputError, closest
 from asperity.ledger.figures import Observable, PaperFigure
+from asperity.ledger.recipe import read_columns
 from asperity.units import to_si
 
 if TYPE_CHECKING:
@@ -46,25 +45,12 @@ RULE = (
     "undecided: the errors are too wide for that; disagrees: chi^2 is larger"
 )
 
-COLUMNS = ("figure", "observable", "series", "x", "y", "y_err", "source")
+#: Columns of a file of points.
+TEXTS, NUMBERS = ("figure", "observable", "series", "x", "source"), ("y", "y_err")
 Agreement: TypeAlias = Literal["agrees", "disagrees", "undecided"]
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _COLOUR = "#B3261E"
-
-
-@dataclass(frozen=True)
-class MeasuredPoint:
-    """A row of a file of points, in SI."""
-
-    line: int
-    figure: str
-    observable: str
-    series: str
-    x: str
-    y: float
-    y_err: float
-    source: str
 
 
 @dataclass(frozen=True)
@@ -103,100 +89,34 @@ class CurveComparison:
             f"{self.points}, p = {self.p_value:.2g}"
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Fields by name, for JSON."""
-        return asdict(self)
 
-
-def read_points(path: Path) -> list[MeasuredPoint]:
-    """Read a CSV with the columns of `COLUMNS`; lines that begin with ``#`` are skipped.
+def read_points(path: Path) -> pd.DataFrame:
+    """A CSV with the columns `TEXTS` and `NUMBERS`; lines that begin with ``#`` are skipped.
 
     Raises
     ------
     InputError
-        If the file cannot be read, a column is missing or unknown, or a cell breaks its rule; the
-        sentence names the line.
+        If the file cannot be read, a column is missing, or a cell breaks its rule; the sentence
+        names the row.
     """
-    name = Path(path).name
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(
-            f"--data must be a CSV that can be read, got '{path}' ({why.lower()}); see "
-            "asperity reproduce --help"
-        ) from None
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if _counts(line)]
-    if not lines:
-        raise InputError(f"{name} must have a heading and a point a line, got nothing; add them")
-    heading = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
-    _check_heading(heading, name)
-    if len(lines) == 1:
-        raise InputError(f"{name} must have a point a line, got the heading alone; add them")
-    return [
-        _point(
-            dict(zip(heading, _cells(text, len(heading), f"{name} line {n}"), strict=True)), n, name
-        )
-        for n, text in lines[1:]
-    ]
-
-
-def _counts(line: str) -> bool:
-    return bool(line.strip()) and not line.lstrip().startswith("#")
-
-
-def _check_heading(heading: Sequence[str], name: str) -> None:
-    for column in COLUMNS:
-        if heading.count(column) != 1:
+    kinds = dict.fromkeys(NUMBERS, "dimensionless")
+    points = pd.DataFrame(read_columns(path, kinds, "a point", texts=TEXTS, label="data"))
+    points.index += 1
+    for row, point in points.iterrows():
+        where = f"{path.name}, row {row}"
+        if not point["y_err"] > 0:
+            what = f"{point['y_err']:g}"
+            raise InputError(f"{where}: y_err", "be positive", what, "give the standard error of y")
+        if not point["source"]:
             raise InputError(
-                f"{name} must have each of the columns {', '.join(COLUMNS)} once, got "
-                f"{heading.count(column)} times '{column}'; correct the heading"
-            )
-    for column in set(heading) - set(COLUMNS):
-        raise InputError(
-            f"{name} must have the columns {', '.join(COLUMNS)} only, got '{column}' as well; "
-            "remove it"
-        )
-
-
-def _cells(line: str, count: int, where: str) -> list[str]:
-    cells = [cell.strip() for cell in next(csv.reader([line]))]
-    if len(cells) != count:
-        raise InputError(
-            f"{where} must have {count} cells as the heading has, got {len(cells)}; correct it"
-        )
-    return cells
-
-
-def _point(row: Mapping[str, str], line: int, name: str) -> MeasuredPoint:
-    where = f"{name} line {line}"
-    y, y_err = (_number(row[key], f"{where}: {key}") for key in ("y", "y_err"))
-    if y_err <= 0:
-        raise InputError(
-            f"{where}: y_err must be positive, got {y_err:g}; give the standard uncertainty of y"
-        )
-    if not row["source"]:
-        raise InputError(
-            f"{where}: source must say where the point comes from, got nothing; name the table, "
-            "the recording or the figure that was digitised"
-        )
-    return MeasuredPoint(
-        line, row["figure"], row["observable"], row["series"], row["x"], y, y_err, row["source"]
-    )
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where} must be a finite number, got '{text}'; correct it")
-    return value
+                f"{where}: source", "say where the point comes from", "nothing",
+                "name the table, the recording or the figure that was digitised",
+            )  # fmt: skip
+    return points
 
 
 def check_names(
-    points: Sequence[MeasuredPoint], observables: Mapping[str, Sequence[Observable]], name: str
+    points: pd.DataFrame, observables: Mapping[str, Sequence[Observable]], name: str
 ) -> None:
     """Refuse points of figures or observables that the paper's report does not have.
 
@@ -204,23 +124,20 @@ def check_names(
     ------
     InputError
     """
-    for point in points:
-        where = f"{name} line {point.line}"
-        if point.figure not in observables:
-            raise InputError(
-                f"{where}: figure must be a figure with curves, got '{point.figure}'; "
-                f"{closest(point.figure, observables)}"
-            )
-        columns = [one.column for one in observables[point.figure]]
-        if point.observable not in columns:
-            raise InputError(
-                f"{where}: observable must be one of {point.figure}, got '{point.observable}'; "
-                f"{closest(point.observable, columns)}"
-            )
+    for row, point in points.iterrows():
+        figure, where = point["figure"], f"{name}, row {row}"
+        columns = [one.column for one in observables.get(figure, ())]
+        for field_, rule, known in (
+            ("figure", "be a figure with curves", list(observables)),
+            ("observable", f"be one of {figure}", columns),
+        ):
+            if point[field_] not in known:
+                got = f"'{point[field_]}'"
+                raise InputError(f"{where}: {field_}", rule, got, closest(point[field_], known))
 
 
 def with_curves(
-    points: Sequence[MeasuredPoint],
+    points: pd.DataFrame,
     table: pd.DataFrame,
     observables: Sequence[Observable],
     name: str,
@@ -229,8 +146,8 @@ def with_curves(
 
     Parameters
     ----------
-    points : sequence of MeasuredPoint
-        Of that figure.
+    points : DataFrame
+        From `read_points`, of that figure.
     table : DataFrame
         The figure's curves, with the columns ``curve`` and ``law``.
     observables : sequence of Observable
@@ -249,7 +166,10 @@ def with_curves(
         If the curve does not exist, or x lies outside of it.
     """
     by_name = {one.column: one for one in observables}
-    rows = [_row(point, table, by_name[point.observable], name) for point in points]
+    rows = [
+        _row(point, table, by_name[point["observable"]], f"{name}, row {row}")
+        for row, point in points.iterrows()
+    ]
     return pd.DataFrame(rows, columns=list(POINT_COLUMNS))
 
 
@@ -269,38 +189,29 @@ POINT_COLUMNS = {
 
 
 def _row(
-    point: MeasuredPoint, table: pd.DataFrame, observable: Observable, name: str
+    point: pd.Series, table: pd.DataFrame, observable: Observable, where: str
 ) -> dict[str, Any]:
+    """A point with the value of its curve; `where` is its row, for messages."""
     from scipy.interpolate import CubicSpline
 
-    where = f"{name} line {point.line}"
-    curve = table[table["curve"] == point.series]
+    curve = table[table["curve"] == point["series"]]
     if curve.empty:
         known = [str(one) for one in table["curve"].unique()]
         raise InputError(
-            f"{where}: series must be a curve of {point.figure}, got '{point.series}'; "
-            f"{closest(point.series, known)}"
-        )
-    x = float(to_si(point.x, observable.kind, f"{where}: x", require_unit=True))
+            f"{where}: series", f"be a curve of {point['figure']}", f"'{point['series']}'",
+            closest(point["series"], known),
+        )  # fmt: skip
+    x = float(to_si(point["x"], observable.kind, f"{where}: x", require_unit=True))
     at = curve[observable.x].to_numpy(float)
     if not at.min() <= x <= at.max():
         raise InputError(
-            f"{where}: x must lie on the curve, from {at.min():g} to {at.max():g} (SI), got {x:g}; "
-            "leave the point out"
-        )
+            f"{where}: x", f"lie on the curve, from {at.min():g} to {at.max():g} (SI)", f"{x:g}",
+            "leave the point out",
+        )  # fmt: skip
     model = float(CubicSpline(at, curve[observable.column].to_numpy(float))(x))
-    return {
-        "figure": point.figure,
-        "observable": point.observable,
-        "series": point.series,
-        "law": str(curve["law"].iloc[0]),
-        "x": x,
-        "y": point.y,
-        "y_err": point.y_err,
-        "model": model,
-        "residual": (point.y - model) / point.y_err,
-        "source": point.source,
-    }
+    residual = (point["y"] - model) / point["y_err"]
+    law = str(curve["law"].iloc[0])
+    return {**point, "x": x, "law": law, "model": model, "residual": residual}
 
 
 def comparisons(rows: pd.DataFrame) -> list[CurveComparison]:
@@ -376,13 +287,14 @@ class MeasuredPoints:
     ----------
     name : str
         Of the file, for messages.
-    points : list of MeasuredPoint
+    points : DataFrame, optional
+        From `read_points`.
     compared : list of DataFrame
         One for each figure that has been given its points.
     """
 
     name: str = ""
-    points: Sequence[MeasuredPoint] = ()
+    points: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*TEXTS, *NUMBERS]))
     compared: list[pd.DataFrame] = field(default_factory=list)
 
     @classmethod
@@ -390,16 +302,12 @@ class MeasuredPoints:
         """Read a file; see `read_points`."""
         return cls(path.name, read_points(path))
 
-    def check(self, observables: Mapping[str, Sequence[Observable]]) -> None:
-        """Refuse points that no figure takes, before anything is computed."""
-        check_names(self.points, observables, self.name)
-
     def add(
         self, figure: PaperFigure, observables: Mapping[str, Sequence[Observable]]
     ) -> PaperFigure:
         """The figure with its points drawn; the points are compared with its curves."""
-        points = [point for point in self.points if point.figure == figure.name]
-        if not points:
+        points = self.points[self.points["figure"] == figure.name]
+        if points.empty:
             return figure
         shown = observables[figure.name]
         rows = with_curves(points, figure.tables[0].data, shown, self.name)
@@ -427,7 +335,7 @@ class MeasuredPoints:
         save_table(rows, folder / "data" / "points.csv", header=head, columns=POINT_COLUMNS)
         compared = comparisons(rows)
         record = {
-            "rule": RULE, "file": self.name, "comparisons": [one.as_dict() for one in compared]
+            "rule": RULE, "file": self.name, "comparisons": [asdict(one) for one in compared]
         }  # fmt: skip
         text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "agreement.json").write_text(text + "\n", encoding="utf-8", newline="\n")

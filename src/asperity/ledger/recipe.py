@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,14 @@ from asperity.units import to_si
 Float = NDArray[np.float64]
 
 
-def read_columns(path: Path, columns: Mapping[str, str], row: str) -> dict[str, Float]:
+def read_columns(
+    path: Path,
+    columns: Mapping[str, str],
+    row: str,
+    *,
+    texts: Sequence[str] = (),
+    label: str = "",
+) -> dict[str, Any]:
     """Columns of a CSV, in SI or with units in their headings; lines with ``#`` are skipped.
 
     Parameters
@@ -29,22 +36,22 @@ def read_columns(path: Path, columns: Mapping[str, str], row: str) -> dict[str, 
         Kind of quantity of each column, a key of `asperity.units.KINDS`.
     row : str
         Meaning of a row, such as ``"a bifurcation"``.
+    texts : sequence of str
+        Columns of texts, which are lists.
+    label : str
+        What messages call the argument; by default the name of the file.
 
     Raises
     ------
     InputError
         If the file cannot be read, a column is missing, or a cell is no number.
     """
-    cells = read_headed_columns(path, columns, label=path.stem, row=row)
-    missing = [column for column in columns if column not in cells]
-    if missing:
-        raise InputError(
-            path.name,
-            f"have the columns {', '.join(columns)}",
-            f"none for {', '.join(missing)}",
-            "add them",
-        )
-    return {
+    cells = read_headed_columns(path, columns, texts=texts, label=label or path.stem, row=row)
+    wanted = [*columns, *texts]
+    if missing := ", ".join(column for column in wanted if column not in cells):
+        rule = f"have the columns {', '.join(wanted)}"
+        raise InputError(path.name, rule, f"none for {missing}", "add them")
+    return {name: cells[name] for name in texts} | {
         name: np.array([to_si(cell, kind, f"{path.name}, {name}") for cell in cells[name]])
         for name, kind in columns.items()
     }

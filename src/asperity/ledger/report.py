@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from asperity._version import __version__
 from asperity.ledger.claims import VERDICTS, Claim
 from asperity.ledger.contents import KINDS
 from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, Plate, PlateGroup, build_page, counts
-from asperity.ledger.points import CurveComparison, MeasuredPoints
+from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import written_folder
 from asperity.parameters.parameter import count_text
@@ -98,21 +99,6 @@ class ReproductionSummary:
         ]
 
 
-class _StepCounter:
-    """Counts the steps of the work and reports them."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress = progress or (lambda *_: None)
-        self._done, self._total = 0, total
-
-    def begin(self, label: str) -> None:
-        self._progress(self._done, self._total, label)
-        self._done += 1
-
-    def end(self) -> None:
-        self._progress(self._total, self._total, "done")
-
-
 def reproduce(
     paper: Paper,
     out: Path,
@@ -149,16 +135,22 @@ def reproduce(
     out = Path(out)
     points = MeasuredPoints() if data is None else MeasuredPoints.read(Path(data))
     with written_folder(out) as folder, paper.sections() as sections:
-        points.check({k: v for section in sections for k, v in section.observables.items()})
-        steps = _StepCounter(progress, sum(2 * len(section.figures) for section in sections) + 2)
+        observables = {k: v for section in sections for k, v in section.observables.items()}
+        check_names(points.points, observables, points.name)
+        total, done = sum(2 * len(section.figures) for section in sections) + 2, count()
+
+        def begin(label: str) -> None:
+            if progress is not None:
+                progress(next(done), total, label)
+
         for name in ("figures", "data"):
             (folder / name).mkdir()
-        shown = [_show(section, folder, steps, points) for section in sections[:1]]
+        shown = [_show(section, folder, begin, points) for section in sections[:1]]
         # Later sections may be computed in another process at the same time.
-        steps.begin("claims")
+        begin("claims")
         claims = paper.ledger(sensitivity=True)
-        shown += [_show(section, folder, steps, points) for section in sections[1:]]
-        steps.begin("page")
+        shown += [_show(section, folder, begin, points) for section in sections[1:]]
+        begin("page")
         _write_json(paper, claims, folder / "claims.json")
         _write_csv(claims, folder / "claims.csv")
         agreement = points.write(folder)
@@ -166,26 +158,26 @@ def reproduce(
             paper, [group for group, _ in shown], claims, paper.headlines(claims), agreement
         )
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
-    steps.end()
+    begin("done")
     figures = [figure for _, drawn in shown for figure in drawn]
     return _summary(paper, out, figures, claims, agreement, time.perf_counter() - start)
 
 
 def _show(
-    section: Section, folder: Path, steps: _StepCounter, points: MeasuredPoints
+    section: Section, folder: Path, begin: Callable[[str], None], points: MeasuredPoints
 ) -> tuple[PlateGroup, list[PaperFigure]]:
     """Compute and draw the figures of a section, and write their tables."""
     from asperity.figures.style import style
 
     figures = []
     for compute in section.figures:
-        steps.begin(f"numbers of {section.title.lower()}")
+        begin(f"numbers of {section.title.lower()}")
         figures.append(points.add(compute(), section.observables))
     plates = []
     # The style also says how pictures are saved.
     with style():
         for figure in figures:
-            steps.begin(figure.place)
+            begin(figure.place)
             plates.append(_draw(figure, folder))
     group = PlateGroup(
         section.key, section.title, section.before(figures), plates, section.after(figures)
@@ -202,9 +194,7 @@ def _draw(figure: PaperFigure, folder: Path) -> Plate:
         save_table(table.data, path, header=list(table.header), columns=table.columns)
     files = [f"figures/{figure.name}.{kind}" for kind in ("png", "pdf")]
     files += [f"data/{table.name}.csv" for table in figure.tables]
-    return Plate(
-        figure.name, figure.place, figure.title, figure.caption, figure.alt, png, tuple(files)
-    )
+    return Plate(figure, png, tuple(files))
 
 
 _FIELDS = (

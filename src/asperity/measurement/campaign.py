@@ -1,6 +1,6 @@
 """Many recordings measured alike: one table, a row for each amplitude, velocity step and hold.
 
-Files are measured in processes of their own. What is finished is kept beside the output as lines of
+Files are measured in separate processes. Finished rows are kept next to the output as lines of
 JSON, so that an interrupted campaign goes on where it stopped; at the end the table is written as
 CSV or NetCDF. A file that cannot be measured is a row with its reason.
 """
@@ -14,7 +14,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,9 @@ from asperity.outputs import UnfinishedText, output_file, written_file
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
+    from asperity.measurement.sliding.holds import HoldReading
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.sliding.velocity_steps import VelocityStep
 
 Row = dict[str, Any]
 
@@ -32,33 +34,8 @@ Row = dict[str, Any]
 _FIRST = ("file", "part", "kind", "start", "end", "verdict", "reason")
 #: What rows without modulation are of.
 _SLIDING_KINDS = ("step", "hold", "level", "stick-slip")
-#: Columns of steps and holds that the table has, besides their uncertainties.
-_STEP = (
-    "velocity_before",
-    "velocity_after",
-    "change",
-    "noise_uncertainty",
-    "choice_uncertainty",
-    "rate_dependence",
-    "rate_uncertainty",
-    "rate_interval_95",
-    "peak",
-    "trend",
-    "settling_slip",
-)
-_HOLD = (
-    "hold_time",
-    "velocity",
-    "level",
-    "level_uncertainty",
-    "relaxation",
-    "relaxation_uncertainty",
-    "peak",
-    "healing",
-    "healing_uncertainty",
-    "interval_95",
-    "reload_slope",
-)
+#: Fields of steps and holds that the table does not have, or has under another name.
+_LEFT_OUT = {"time", "start", "end", "dof", "uncertainty", "slope_before", "slope_after", "choices"}
 
 
 @dataclass(frozen=True)
@@ -103,7 +80,7 @@ def run_campaign(
     out : Path
         ``.csv`` or ``.nc``.
     inputs : mapping
-        All that the rows depend on besides the files, as JSON values.
+        All that the rows depend on except the files, as JSON values.
     resume : bool
         Go on after an interruption.
     jobs : int
@@ -232,11 +209,10 @@ def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
     rows: list[Row] = []
     for step in measurement.steps:
         row = {"kind": "step", "start": step.time, "end": step.time}
-        row |= {name: getattr(step, name) for name in _STEP}
-        rows.append(row | {"change_uncertainty": step.uncertainty})
+        rows.append(row | _columns_of(step) | {"change_uncertainty": step.uncertainty})
     for hold in measurement.holds:
         row = {"kind": "hold", "start": hold.start, "end": hold.end}
-        rows.append(row | {name: getattr(hold, name) for name in _HOLD})
+        rows.append(row | _columns_of(hold))
     rows.sort(key=lambda row: row["start"])
     friction = measurement.friction
     if not rows:
@@ -251,6 +227,10 @@ def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
         "checks": _named(measurement.checks),
     }
     return [common | {"part": k} | row | more for k, row in enumerate(rows, 1)]
+
+
+def _columns_of(reading: VelocityStep | HoldReading) -> Row:
+    return {f.name: getattr(reading, f.name) for f in fields(reading) if f.name not in _LEFT_OUT}
 
 
 def _named(checks: Iterable[Any]) -> str:
@@ -314,9 +294,11 @@ def _unit(name: str) -> str:
         "start": "s",
         "end": "s",
         "hold_time": "s",
+        "peak_time": "s",
         "frequency": "Hz",
         "settling_slip": "m",
         "reload_slope": "1/m",
+        "reload": "1/m",
         "loading_slope": "1/s",
         "K": "N/m",
         "V": "m/s",

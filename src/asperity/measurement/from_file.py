@@ -58,7 +58,7 @@ def measure_recording(
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
-        Of the modulation, to start from (Hz); found by default.
+        Initial guess of the modulation frequency (Hz); by default the strongest line.
     harmonics : int
         Of a modulated recording.
     window : (float, float), optional
@@ -85,25 +85,9 @@ def measure_recording(
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    fields: dict[str, Any] = {
-        "modulated": modulated,
-        "load": load,
-        "force": force,
-        "frequency": frequency,
-        "exact_frequency": not refine,
-        "harmonics": harmonics,
-        "window": window,
-        "whole_periods": only_whole_periods,
-        "detrend": detrend,
-        "steps": steps,
-        "holds": holds,
-        "stick_slip": stick_slip,
-        "stiffness": stiffness,
-        "velocity": velocity,
-        "mass": mass,
-        "normal_load": normal_load,
-    }
-    question = Question(**fields)
+    # Most arguments are the fields of the question.
+    fields = {name: value for name, value in locals().items() if name in Question.model_fields}
+    question = Question(**fields, exact_frequency=not refine, whole_periods=only_whole_periods)
     trace = recording if isinstance(recording, Trace) else read(recording)
     return answer_measurement(trace, question)[0]
 
@@ -118,7 +102,8 @@ def answer_measurement(
     trace : Trace
     question : asperity.questions.recording.Measurement
     plain : bool
-        As of `modulated_or_sliding`.
+        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
+        holds, slip events, or sliding that is steady.
 
     Returns
     -------
@@ -157,111 +142,45 @@ def _either(
     trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
 ) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
     """What `modulated` reads, the sliding or the slip events, as question or recording says."""
+    where: dict[str, Any] = {
+        "load": question.load,
+        "force": question.force,
+        "window": question.window,
+    }
 
     def sliding() -> SlidingMeasurement:
         return measure_sliding(
-            trace,
-            load=question.load,
-            force=question.force,
-            window=question.window,
-            detrend=question.detrend,
-            steps=question.steps,
-            holds=question.holds,
+            trace, **where, detrend=question.detrend, steps=question.steps, holds=question.holds
         )
 
-    def events() -> StickSlipMeasurement:
-        machine = Machine(
-            question.stiffness, question.velocity, question.mass, question.normal_load
-        )
-        return measure_stick_slip(
-            trace,
-            load=question.load,
-            force=question.force,
-            window=question.window,
-            machine=machine,
-        )
+    def slips() -> StickSlipMeasurement:
+        numbers = question.stiffness, question.velocity, question.mass, question.normal_load
+        return measure_stick_slip(trace, **where, machine=Machine(*numbers))
 
     if question.stick_slip:
-        return events(), ""
+        return slips(), ""
     if question.modulated is False:
         return sliding(), ""
-    if question.modulated or question.frequency is not None:
-        return modulated(), ""
-    return modulated_or_sliding(
-        trace,
-        modulated,
-        sliding,
-        events if question.stick_slip is None else None,
-        load=question.load,
-        plain=plain,
-    )
-
-
-def _lock_in(question: Question) -> dict[str, Any]:
-    return {
-        "load": question.load,
-        "force": question.force,
-        "frequency": question.frequency,
-        "harmonics": question.harmonics,
-        "detrend": question.detrend,
-        "only_whole_periods": question.whole_periods,
-        "refine": not question.exact_frequency,
-    }
-
-
-def modulated_or_sliding(
-    trace: Trace,
-    modulated: Callable[[], Read],
-    sliding: Callable[[], SlidingMeasurement],
-    stick_slip: Callable[[], StickSlipMeasurement] | None = None,
-    *,
-    load: str = "W",
-    plain: bool = False,
-) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
-    """Measure a recording as what it is.
-
-    Parameters
-    ----------
-    trace : Trace
-    modulated : callable
-        Measures a modulated recording.
-    sliding : callable
-        Measures one of which the load is constant, or not recorded.
-    stick_slip : callable, optional
-        Measures the slip events of one; None where these are not asked for.
-    load : str
-        Channel, by name or role.
-    plain : bool
-        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
-        holds, slip events, or sliding that is steady.
-
-    Returns
-    -------
-    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
-        Or what else `modulated` returns.
-    reason : str
-        What the recording is, where it was not read as modulated; else empty.
-
-    Raises
-    ------
-    InputError
-        If it is none of these.
-    """
     try:
         return modulated(), ""
     except InputError as error:
         constant = isinstance(error, ConstantLoadError)
-        if not constant and _recorded(trace, load):
+        known = question.modulated or question.frequency is not None
+        if known or (not constant and _recorded(trace, question.load)):
             raise
         reason = error
     what = "The normal load is constant" if constant else "No channel is the normal load"
-    events, unread = _events(stick_slip)
+    events, unread = None, None
+    try:
+        events = slips() if question.stick_slip is None else None
+    except InputError as error:
+        unread = error
     try:
         measurement = sliding()
     except InputError as error:
         if not constant and len(trace.channels) == 1:
             raise _which_force(trace) from None
-        raise (error if constant and plain else reason) from None
+        raise error from None
     changes = len(measurement.steps) + len(measurement.holds)
     if events is not None and _rather_events(events, changes):
         return events, f"{what}: {events.kind} is read, not a modulation."
@@ -275,14 +194,16 @@ def modulated_or_sliding(
     return measurement, f"{what}: steady sliding is read, not a modulation."
 
 
-def _events(
-    read: Callable[[], StickSlipMeasurement] | None,
-) -> tuple[StickSlipMeasurement | None, InputError | None]:
-    """Slip events, or why they cannot be read."""
-    try:
-        return (None if read is None else read()), None
-    except InputError as error:
-        return None, error
+def _lock_in(question: Question) -> dict[str, Any]:
+    return {
+        "load": question.load,
+        "force": question.force,
+        "frequency": question.frequency,
+        "harmonics": question.harmonics,
+        "detrend": question.detrend,
+        "only_whole_periods": question.whole_periods,
+        "refine": not question.exact_frequency,
+    }
 
 
 def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:

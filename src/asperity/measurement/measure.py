@@ -268,7 +268,7 @@ def _measured(
         first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
     else:
         first, stop = _given(samples.time, window)
-        # F(0) is that beside the stretch that is read, and not beside a longer one.
+        # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
     if only_whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
@@ -295,16 +295,30 @@ def _measured(
     pauses = [rates[0]] if rates[0] else []
     if before and after:
         pauses.append(rate_between(before[0], after[0]))
+    load_values = samples.load[cut]
+    steady_force = reading.without_settling(time, force_values)
+    sides = [side[0] if side else None for side in (before, after)]
     answers = (
-        *_asked(
-            reading,
-            time,
-            samples.load[cut],
-            reading.without_settling(time, force_values),
-            checks.transient(reading, chosen_by, pauses),
-        ),
-        *_about_the_instrument(reading, samples, parts, cut),
-        checks.drift(reading, *(b[0] if b else None for b in (before, after))),
+        checks.modulation(reading),
+        checks.periods(reading),
+        checks.signal(reading),
+        checks.contact(reading),
+        checks.friction(reading),
+        steadiness.leakage(reading),
+        steadiness.steady_load(reading, time, load_values),
+        steadiness.steady_response(reading),
+        checks.transient(reading, chosen_by, pauses),
+        checks.stick_slip(reading, time, steady_force),
+        checks.load_harmonics(reading),
+        checks.resolution(reading, load_values, steady_force),
+        *instrument.made_force(reading, samples, time, load_values, force_values),
+        instrument.held_samples(reading, load_values, force_values),
+        instrument.flat_top(reading, time, load_values, force_values),
+        instrument.mains(reading, samples, parts),
+        *instrument.lines_in_the_pauses(reading, samples, parts),
+        instrument.hum(reading, time, force_values),
+        steadiness.shifting_response(reading, time, force_values),
+        checks.drift(reading, *sides),
         *checks.findings(
             about_window(samples, float(time[0]), float(time[-1])),
             time.size,
@@ -331,46 +345,6 @@ def _measured(
     )
 
 
-def _asked(
-    reading: LockInReading, time: Array, load: Array, force: Array, transient: Check
-) -> tuple[Check, ...]:
-    """What is asked of every window; the force is that without its settling."""
-    rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
-    return (
-        checks.modulation(reading),
-        checks.periods(reading),
-        checks.signal(reading),
-        checks.contact(reading),
-        checks.friction(reading),
-        checks.response(reading),
-        checks.aliasing(reading, rate),
-        steadiness.leakage(reading),
-        steadiness.steady_load(reading, time, load),
-        steadiness.steady_force(reading, time, force),
-        steadiness.steady_response(reading),
-        transient,
-        checks.stick_slip(reading, time, force),
-        checks.load_harmonics(reading),
-        checks.resolution(reading, load, force),
-    )
-
-
-def _about_the_instrument(
-    reading: LockInReading, samples: Samples, parts: list[LoadInterval], cut: slice
-) -> tuple[Check, ...]:
-    time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
-    return (
-        *instrument.made_force(reading, samples, time, load, force),
-        instrument.held_samples(reading, load, force),
-        instrument.dropouts(load, force),
-        instrument.flat_top(reading, time, load, force),
-        instrument.mains(reading, samples, parts),
-        *instrument.lines_in_the_pauses(reading, samples, parts),
-        instrument.hum(reading, time, force),
-        steadiness.shifting_response(reading, time, force),
-    )
-
-
 def modulation_line(time: Array, load: Array, near: float | None = None) -> SpectralLine:
     """The modulation of a load, be it in only a part of the recording.
 
@@ -385,7 +359,7 @@ def modulation_line(time: Array, load: Array, near: float | None = None) -> Spec
         for at in np.linspace(0, time.size - _PIECE, _PIECES).astype(int):
             piece = slice(at, at + _PIECE)
             span = float(time[at + _PIECE - 1] - time[at])
-            # A slow modulation that fits no piece is found in the whole.
+            # A slow modulation that fits no piece is searched for in the whole.
             if near is None or near * span > _FEWEST_PERIODS:
                 line = strongest_line(time[piece], load[piece], between=around(near))
                 if line.frequency * span > _FEWEST_PERIODS:
@@ -460,7 +434,7 @@ def _no_modulation(time: Array) -> float:
 
 
 def _settled_level(time: Array, force: Array) -> MeanLevel | None:
-    """The level that the force of a pause settles to; None if that cannot be told."""
+    """The level that the force of a pause settles to; None if it is not determined."""
     settling = settling_from(time, force, _no_modulation(time), 1)
     if settling is None or not settling.possible:
         return mean_level(time, force)

@@ -6,6 +6,7 @@ window avoids.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
-from asperity.recording.defects.check import check
+from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.rows import rows_to_avoid, usable_rows
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 #: other. Corrections for jackets, seals and changing areas are some percent; a wrong unit, column
 #: or zero is more.
 _CONTRADICTS = 0.1
+
+#: Samples that a lock-in needs.
+_FEWEST = 16
 
 _NONE: NDArray[np.intp] = np.empty(0, dtype=np.intp)
 
@@ -289,18 +292,40 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     if names_found & {"nan", "infinite", "backward time", "repeated time"}:
         keep = usable_rows(time, values)
         time, values = time[keep], (values[0][keep], values[1][keep])
-    if time.size < 16:
-        raise InputError(
-            "measure.trace",
-            "hold at least 16 usable samples",
-            time.size,
-            "give a longer recording or window",
-        )
+    if time.size < _FEWEST:
+        recorded = {names[0]: W.values, names[1]: F.values}
+        raise too_few(_FEWEST, time.size, trace.time, recorded)
     require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
     seen = {"gap", "spike", "saturation"} & names_found
     defects = rows_to_avoid(time, values, keep) if seen or keep is not None else _NONE
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
+
+
+def too_few(fewest: int, usable: int, time: Array, columns: Mapping[str, Array]) -> InputError:
+    """The error of a recording with too few usable samples: the columns without numbers, if any.
+
+    Parameters
+    ----------
+    fewest, usable : int
+    time : array, (n,)
+    columns : mapping of str to array, (n,)
+        By the names of the channels.
+    """
+    known = {name: int(np.isfinite(values).sum()) for name, values in columns.items()}
+    known = {"time": int(np.isfinite(time).sum()), **known}
+    lacking = [
+        f"'{name}' holds {f'a number in {k} rows' if k else 'no number'}"
+        for name, k in known.items()
+        if k < time.size
+    ]
+    advice = "choose another column" if lacking else "give a longer recording"
+    return InputError(
+        "measure.trace",
+        f"hold at least {fewest} usable samples",
+        f"{usable} of {time.size}" + (f": {', '.join(lacking)}" if lacking else ""),
+        f"{advice} or window",
+    )
 
 
 def require_computable(**channels: Array) -> None:

@@ -11,8 +11,8 @@ from asperity._lazy import lazy_names
 
 if TYPE_CHECKING:
     from asperity.orbit.differentiable import ResponseFunction, response_function
-    from asperity.orbit.gradient.known import KnownOrbits
     from asperity.orbit.gradient.parametrised import ResponseValues
+    from asperity.orbit.gradient.search import KnownOrbits
     from asperity.orbit.outcome import Outcome
     from asperity.orbit.period import Period, over_a_period
     from asperity.orbit.periodic import averaged_response, periodic_response
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Module of each public name.
 _HOMES = {
-    "KnownOrbits": "gradient.known",
+    "KnownOrbits": "gradient.search",
     "Outcome": "outcome",
     "Period": "period",
     "PeriodicResponse": "response",

@@ -25,7 +25,7 @@ from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.known import KnownOrbits, SearchedOrbits
+from asperity.orbit.gradient.mesh_derivatives import derivatives_of, searched_values, values_of
 from asperity.orbit.gradient.parametrised import (
     Parameters,
     ParametrisedProblem,
@@ -36,8 +36,7 @@ from asperity.orbit.gradient.parametrised import (
     coefficients_of,
     load_values,
 )
-from asperity.orbit.gradient.search import search_orbits
-from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
+from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, search_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
@@ -431,7 +430,7 @@ def _add_searched_derivatives(
 ) -> None:
     """Write derivatives at the orbits of the search into the result of `_differentiate`."""
     values = {n: np.asarray(v) for n, v in parameters.items()}
-    for index, orbits in searched.by_mesh() if searched else []:
+    for index, orbits in searched.parts if searched else []:
         part = {n: v[index] for n, v in values.items()}
         table[:, index] = derivatives_of(
             program.equations, part, orbits, multipliers=program.multipliers, names=names

@@ -13,6 +13,9 @@ from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 
+#: Shares of the first harmonic and of the mean whose round-off a harmonic may have.
+_SMALL_HARMONIC, _SMALL_MEAN = 5e-8, 5e-11
+
 
 class Observables(NamedTuple):
     """Mean, harmonics and monodromy matrix of orbits; F/W0 = mean + sum Re(c_n e^{i n theta}).
@@ -48,6 +51,11 @@ class Observables(NamedTuple):
     start: Array
 
     @property
+    def numbers(self) -> NDArray[np.complex128]:
+        """Mean, then harmonics, shape (1 + count, points)."""
+        return np.concatenate([np.asarray(self.mean_friction)[None], self.harmonics])
+
+    @property
     def log_multipliers(self) -> NDArray[np.complex128]:
         """Logarithms of the Floquet multipliers by falling modulus, shape (size, points)."""
         monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
@@ -58,6 +66,28 @@ class Observables(NamedTuple):
         others = monodromy[..., ~known], log_scale[~known], log_determinant[~known]
         logs[:, ~known] = log_multipliers(*others)
         return logs
+
+
+def response_gap(
+    before: NDArray[np.complex128], now: NDArray[np.complex128], *, each: int = 2
+) -> NDArray[np.float64]:
+    """Largest relative difference of mean and harmonics, shape (points,); inf where not finite.
+
+    Parameters
+    ----------
+    before, now : complex array, shape (1 + count, points)
+        Mean, then harmonics.
+    each : int
+        Number of harmonics that are compared relative to themselves; higher ones relative to the
+        first. Those that vanish relative to the first, or to the mean, are compared up to
+        round-off.
+    """
+    with np.errstate(all="ignore"):
+        mean, first = np.abs(now[0]), np.abs(now[1])
+        scale = np.abs(now) + _SMALL_HARMONIC * first + _SMALL_MEAN * mean
+        scale[0], scale[1 + each :] = mean, scale[1]
+        gap = (np.abs(now - before) / scale).max(0)
+    return np.where(np.isfinite(gap), gap, np.inf)
 
 
 class PeriodicOrbit(Protocol):

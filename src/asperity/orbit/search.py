@@ -23,13 +23,11 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.orbit.batches import run_chunks, take
-from asperity.orbit.methods.branch_following.from_steady_sliding import BranchFollowing
-from asperity.orbit.methods.collocation.frequency_path import FrequencyPath
-from asperity.orbit.methods.collocation.method import Collocation
-from asperity.orbit.methods.fourier.method import Fourier
-from asperity.orbit.methods.method import Method
+from asperity.orbit.methods.branch_following import BranchFollowing
+from asperity.orbit.methods.collocation import Collocation
+from asperity.orbit.methods.fourier import Fourier
 from asperity.orbit.methods.series import FourierSeries
-from asperity.orbit.methods.shooting.method import Shooting
+from asperity.orbit.methods.shooting import Shooting
 from asperity.orbit.outcome import (
     LARGEST_GROWTH,
     LARGEST_RATE,
@@ -37,7 +35,7 @@ from asperity.orbit.outcome import (
     SMALLEST_RATE,
     Outcome,
 )
-from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.parameters.arguments import one_of
 from asperity.slider.problem import Problem
@@ -79,7 +77,6 @@ METHODS: tuple[Method, ...] = (
     FourierSeries(),
     Collocation(),
     BranchFollowing(),
-    FrequencyPath(),
 )
 
 #: Names that a user may choose.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,11 @@ class Solution(NamedTuple):
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
     @property
+    def numbers(self) -> NDArray[np.complex128]:
+        """Mean, then harmonics, shape (1 + count, points)."""
+        return np.concatenate([self.mean_friction[None], self.harmonics])
+
+    @property
     def informed(self) -> NDArray[np.bool_]:
         """Points with an outcome of a method, an orbit or the reason of a failure."""
         return (self.outcome != Outcome.NO_ORBIT) | (self.detail > 0)
@@ -130,3 +136,53 @@ class SearchOptions(NamedTuple):
     phases: int
     progress: Callable[[int], None]
     intervals: int = 0
+
+
+class Method(ABC):
+    """A method that finds periodic orbits.
+
+    A search goes through a list of methods; each method gets the points that earlier methods left
+    unsolved and that it may solve. To add a method, implement this class and put an instance into
+    `asperity.orbit.search`.
+
+    Class attributes
+    ----------------
+    name : str
+        Name in results.
+    choice : str
+        Name in the argument `methods` of `periodic_response`; methods may share a name.
+    block : int
+        Largest number of points in a call of `solve`, which bounds the memory.
+    on_mesh : bool
+        Whether its orbits lie on meshes, so that they can be kept.
+    """
+
+    name: ClassVar[str]
+    choice: ClassVar[str]
+    block: ClassVar[int] = 2048
+    on_mesh: ClassVar[bool] = True
+
+    @abstractmethod
+    def suits(self, problem: Problem) -> bool:
+        """Whether the method can solve these equations under this load."""
+
+    def candidates(self, solution: Solution) -> Indices:
+        """Points that the method may solve, by their outcome so far; by default all unsolved."""
+        return np.flatnonzero(~solution.converged)
+
+    @abstractmethod
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """Look for the orbits of all points of `problem`.
+
+        Parameters
+        ----------
+        problem : Problem
+            NumPy arrays with the points along the last axis.
+        options : SearchOptions
+
+        Returns
+        -------
+        Solution
+            Converged points have passed the checks of the method; for the others `outcome` and
+            `detail` say what was learnt.
+        """

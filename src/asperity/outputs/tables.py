@@ -56,14 +56,16 @@ def aligned(rows: Iterable[Row], indent: str = "") -> str:
     )
 
 
-def as_text(sections: Iterable[Section]) -> str:
-    """Sections as lines of a terminal."""
+def as_text(sections: Iterable[Section], indent: str = "  ") -> str:
+    """Sections as lines of a terminal, with `indent` before the rows of tables."""
     lines: list[str] = []
     for section in sections:
         lines += [section.title] if section.title else []
         lines += section.sentences
         if section.rows:
-            lines.append(aligned([*([section.head] if section.head else []), *section.rows], "  "))
+            lines.append(
+                aligned([*([section.head] if section.head else []), *section.rows], indent)
+            )
         lines += [f"warning: {warning}" for warning in section.warnings]
     return "\n".join(lines)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from asperity.errors import Argument, InputError
@@ -45,13 +46,8 @@ def read_headed_columns(
     InputError
         If the file cannot be read, has no rows, a column twice, or a cell that is no number.
     """
-    try:
+    with readable(path, label):
         text = file_content(path).decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = (getattr(error, "strerror", None) or "not UTF-8 text").lower()
-        raise InputError(
-            Argument(label), "be a CSV that can be read", f"'{path}': {why}", "check the path"
-        ) from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
     rows = [[cell.strip() for cell in cells] for cells in csv.reader(lines, delimiter=separator)]
@@ -75,6 +71,21 @@ def read_headed_columns(
             for n, cell in enumerate(cells, 1)
         ]
     return columns
+
+
+@contextmanager
+def readable(path: Path, label: str) -> Iterator[None]:
+    """Raise an `InputError` about the argument `label` where a CSV cannot be read."""
+    try:
+        yield
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        why = (getattr(error, "strerror", None) or "").lower() or "not UTF-8 text"
+        if isinstance(error, csv.Error):
+            why = f"{error}, check the quotation marks"
+        raise InputError(
+            Argument(label), "be a CSV that can be read", f"'{path}': {why}",
+            "correct the path or the file",
+        ) from None  # fmt: skip
 
 
 def _number(cell: str, name: str, unit: str, where: str) -> float | str:

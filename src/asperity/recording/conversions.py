@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from asperity.errors import InputError
+from asperity.parameters.arguments import number
 from asperity.recording.trace import Channel, Trace
 from asperity.units import to_si
 
@@ -41,11 +42,7 @@ def stress_to_force(
     InputError
         If the area is not positive, or a channel is no pressure.
     """
-    size = to_si(area, "area", "stress_to_force.area")
-    if size <= 0:
-        raise InputError(
-            "stress_to_force.area", "be positive", f"{size:g} m^2", "give the contact area"
-        )
+    size = number(area, "stress_to_force.area", "area", "positive")
     wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
     if channels is not None:
         wanted = [_pressure(trace, name) for name in channels]

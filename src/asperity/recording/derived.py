@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.errors import Argument, InputError
 from asperity.recording.defects.check import CHECKED, check
-from asperity.recording.expressions import Evaluated, Names, Quantity, evaluate
+from asperity.recording.expressions import Names, Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import ROLES, role_of
 from asperity.recording.trace import Channel, Trace
@@ -57,14 +57,21 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
             )
         if not target.strip():
             raise InputError("channels", "have names", "an empty one", "write 'load = ...'")
-        trace = _with(trace, target, evaluate(str(text), _names(trace, field), field), field, text)
+        quantity, sources = evaluate(str(text), _names(trace, field), field)
+        trace = _with(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def _with(trace: Trace, target: str, evaluated: Evaluated, field: Argument, text: str) -> Trace:
+def _with(
+    trace: Trace,
+    target: str,
+    quantity: Quantity,
+    sources: tuple[str, ...],
+    field: Argument,
+    text: str,
+) -> Trace:
     role = role_of(target)
-    quantity = evaluated.quantity
     kind = kind_of_dimension(quantity.dimension)
     _check_kind(role, kind, quantity, field)
     shape = trace.time.shape
@@ -79,15 +86,13 @@ def _with(trace: Trace, target: str, evaluated: Evaluated, field: Argument, text
         channels = {kept if name == target else name: c for name, c in channels.items()}
         findings = tuple(_moved(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
-        evaluated = replace(
-            evaluated, sources=tuple(kept if s == target else s for s in evaluated.sources)
-        )
+        sources = tuple(kept if source == target else source for source in sources)
     channels[target] = channel
     if role is not None:
         roles[role] = target
     alone = check(Trace(trace.time, {target: channel}))
     direct = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
-    inherited = _inherited(findings, evaluated.sources, target, {f.name for f in direct})
+    inherited = _inherited(findings, sources, target, {f.name for f in direct})
     return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 

@@ -1,8 +1,8 @@
 """Arithmetic of channels with units: ``Conf.Press - (Up.Pore.Press + Dwn.Pore.Press)/2``.
 
 Names, numbers and units of a text are looked up first; what stands between them is parsed by `ast`,
-and only sums, products, powers and the functions of `FUNCTIONS` are evaluated, on arrays in SI.
-Nothing is ever run as Python.
+and only sums, products, powers and the functions of `_FUNCTIONS` and `_STATISTICS` are evaluated,
+on arrays in SI. Nothing is ever run as Python.
 
 A unit stands behind its number (``36 mm``), or in brackets (``[N/V]``); behind a number it may hold
 a quotient if it is written without blanks (``2.4 N/V``). A name is that of a channel, or the role
@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -25,8 +24,8 @@ from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
 Array = NDArray[np.float64]
 
-#: Characters and levels of brackets that a text may have.
-_LONGEST, _DEEPEST = 2000, 40
+#: Characters that a text may have.
+_LONGEST = 2000
 #: Larger powers are treated as misprints.
 _HIGHEST_POWER = 16.0
 
@@ -44,6 +43,7 @@ _TOKEN = re.compile(
     re.X,
 )
 _PYTHON = {"^": "**", "·": "*", "×": "*", "−": "-"}
+_SECONDS: Dimension = (("second", 1.0),)
 
 
 class Quantity(NamedTuple):
@@ -71,23 +71,36 @@ class Names(NamedTuple):
     time: Array
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """Value of an expression.
-
-    Attributes
-    ----------
-    quantity : Quantity
-    sources : tuple of str
-        Channels in the expression.
-    """
-
-    quantity: Quantity
-    sources: tuple[str, ...]
+def _trapezoids(values: Array, time: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2)])
 
 
-def evaluate(text: str, names: Names, field: str | Argument) -> Evaluated:
-    """Value of an expression.
+#: Functions of a quantity: of its values and the times, and the powers of the quantity's dimension
+#: and of seconds in the dimension of the result.
+_FUNCTIONS: dict[str, tuple[Callable[[Any, Array], Any], float, float]] = {
+    "abs": (lambda x, t: np.abs(x), 1, 0),
+    "sqrt": (lambda x, t: np.sqrt(x), 0.5, 0),
+    "cumulative": (lambda x, t: np.cumsum(np.broadcast_to(x, t.shape)), 1, 0),
+    "integral": (lambda x, t: _trapezoids(np.broadcast_to(x, t.shape), t), 1, 1),
+    "derivative": (lambda x, t: np.gradient(np.broadcast_to(x, t.shape), t), 1, -1),
+}
+#: Functions of the values in a stretch of time, or in all of it.
+_STATISTICS: dict[str, Callable[[Any], Any]] = {
+    "mean": np.nanmean,
+    "median": np.nanmedian,
+    "zero": np.nanmean,
+}
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+}
+
+
+def evaluate(text: str, names: Names, field: str | Argument) -> tuple[Quantity, tuple[str, ...]]:
+    """Value of an expression, and the channels in it.
 
     Parameters
     ----------
@@ -105,7 +118,7 @@ def evaluate(text: str, names: Names, field: str | Argument) -> Evaluated:
     # Overflow gives infinity, which the check of the channel reports.
     with np.errstate(all="ignore"):
         quantity = expression.value()
-    return Evaluated(quantity, tuple(dict.fromkeys(expression.sources)))
+    return quantity, tuple(dict.fromkeys(expression.sources))
 
 
 class _Expression:
@@ -116,13 +129,13 @@ class _Expression:
         self.operands: list[Quantity] = []
         self.sources: list[str] = []
         if len(text) > _LONGEST:
-            self.fail(f"have at most {_LONGEST} characters", f"{len(text)}", "split it")
+            self._fail(f"have at most {_LONGEST} characters", f"{len(text)}", "split it")
 
-    def fail(self, rule: str, got: str, advice: str) -> NoReturn:
+    def _fail(self, rule: str, got: str, advice: str) -> NoReturn:
         raise InputError(self.field, rule, got, advice)
 
     def _misplaced(self, what: str) -> NoReturn:
-        self.fail(
+        self._fail(
             "be an expression of channels, numbers and units",
             what,
             "write it like 'Force * 1 kN / (20 mm * 36 mm)', names with blanks in quotes",
@@ -135,12 +148,12 @@ class _Expression:
         except SyntaxError:
             self._misplaced(f"'{self.text}'")
         except RecursionError:
-            self.fail("be short", f"{len(self.text)} characters", "split it")
+            self._fail("be short", f"{len(self.text)} characters", "split it")
 
     def _source(self) -> str:
         """The text as Python, each operand a name: ``_0 - (_1 + _2)/_3``."""
         parts: list[str] = []
-        at = level = signs = 0
+        at = 0
         while at < len(self.text):
             token = _TOKEN.match(self.text, at)
             if token is None:
@@ -149,15 +162,10 @@ class _Expression:
             if token["blank"]:
                 continue
             if token["sign"]:
-                sign = _PYTHON.get(token["sign"], token["sign"])
-                parts.append(sign)
-                level += {"(": 1, ")": -1}.get(sign, 0)
-                signs = signs + 1 if sign in "+-" else 0
-                if max(level, signs) > _DEEPEST:
-                    self.fail(f"have at most {_DEEPEST} levels of brackets", "more", "simplify it")
+                parts.append(_PYTHON.get(token["sign"], token["sign"]))
                 continue
-            signs = 0
-            if token["name"] in FUNCTIONS and self.text[at:].lstrip().startswith("("):
+            is_function = token["name"] in _FUNCTIONS or token["name"] in _STATISTICS
+            if is_function and self.text[at:].lstrip().startswith("("):
                 parts.append(token["name"])
                 continue
             parts.append(f"_{len(self.operands)}")
@@ -170,10 +178,6 @@ class _Expression:
             else:
                 quantity = self._channel(token["name"], only_channels=False)
             self.operands.append(quantity)
-        if level > 0:
-            self.fail("have a ')'", f"'{self.text}'", "check the brackets")
-        if not parts or parts[-1] in ("+", "-", "*", "/", "**"):
-            self.fail("be complete", f"'{self.text}'", "add what is missing at its end")
         return " ".join(parts)
 
     def _number(self, token: re.Match[str]) -> tuple[Quantity, int]:
@@ -197,7 +201,7 @@ class _Expression:
         try:
             factor, dimension = base_units(text)
         except InputError:
-            self.fail(
+            self._fail(
                 "have units that are known",
                 f"'{text}' in '{self.text}'",
                 "write them like 'kN', 'cm^2' or 'N/V'",
@@ -216,16 +220,17 @@ class _Expression:
                 raise InputError
             factor, dimension = base_units(name)
         except InputError:
-            self.fail(
+            others = [] if only_channels else [*_FUNCTIONS, *_STATISTICS]
+            self._fail(
                 "be made of channels that are there",
                 f"'{name}' in '{self.text}'",
-                closest(name, [*self.names.known, *([] if only_channels else FUNCTIONS)]),
+                closest(name, [*self.names.known, *others]),
             )
         return Quantity(np.float64(factor), dimension)
 
     def _evaluated(self, node: ast.expr) -> Quantity:
         match node:
-            case ast.Name(id=name) if name not in FUNCTIONS:
+            case ast.Name(id=name) if name.startswith("_"):
                 value = self.operands[int(name[1:])]
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
                 value = self._evaluated(inner)
@@ -234,8 +239,13 @@ class _Expression:
                 value = Quantity(-value.values, value.dimension)
             case ast.BinOp(left=left, op=op, right=right):
                 value = self._combined(self._evaluated(left), op, self._evaluated(right))
-            case ast.Call(func=ast.Name(id=name), args=arguments) if name in FUNCTIONS:
-                value = self._function(name, [self._evaluated(each) for each in arguments])
+            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
+                apply, power, seconds = _FUNCTIONS[name]
+                value = self._evaluated(inner)
+                dimension = _product((value.dimension, power), (_SECONDS, seconds))
+                value = Quantity(apply(value.values, self.names.time), dimension)
+            case ast.Call(func=ast.Name(id=name), args=[inner, *limits]) if name in _STATISTICS:
+                value = self._statistic(name, self._evaluated(inner), limits)
             case _:
                 self._misplaced(f"'{self.text}'")
         return value
@@ -243,145 +253,61 @@ class _Expression:
     def _combined(self, one: Quantity, op: ast.operator, other: Quantity) -> Quantity:
         match op:
             case ast.Add() | ast.Sub():
-                sign = "+" if isinstance(op, ast.Add) else "-"
                 if one.dimension != other.dimension:
-                    self.fail(
+                    sign = "+" if isinstance(op, ast.Add) else "-"
+                    self._fail(
                         "add like to like",
                         f"{_described(one)} {sign} {_described(other)} in '{self.text}'",
                         "check the units of the channels",
                     )
-                total = one.values + other.values if sign == "+" else one.values - other.values
-                return Quantity(total, one.dimension)
-            case ast.Mult():
-                dimension = _product(one.dimension, other.dimension, 1.0)
-                return Quantity(one.values * other.values, dimension)
-            case ast.Div():
-                dimension = _product(one.dimension, other.dimension, -1.0)
-                return Quantity(np.divide(one.values, other.values), dimension)
-        return self._power(one, other)
+                dimension = one.dimension
+            case ast.Mult() | ast.Div():
+                power = 1.0 if isinstance(op, ast.Mult) else -1.0
+                dimension = _product((one.dimension, 1.0), (other.dimension, power))
+            case _:
+                if other.dimension or np.ndim(other.values):
+                    self._fail(
+                        "have plain numbers as exponents", _described(other), "write it like x^2"
+                    )
+                n = float(other.values)
+                if not abs(n) <= _HIGHEST_POWER:
+                    self._fail(f"have exponents up to {_HIGHEST_POWER:g}", f"{n:g}", "correct it")
+                dimension = _product((one.dimension, n))
+        return Quantity(_OPERATORS[type(op)](one.values, other.values), dimension)
 
-    def _power(self, value: Quantity, exponent: Quantity) -> Quantity:
-        if exponent.dimension or np.ndim(exponent.values):
-            self.fail("have plain numbers as exponents", _described(exponent), "write it like x^2")
-        n = float(exponent.values)
-        if not abs(n) <= _HIGHEST_POWER:
-            self.fail(f"have exponents up to {_HIGHEST_POWER:g}", f"{n:g}", "correct it")
-        dimension = dimension_of({name: n * m for name, m in value.dimension})
-        return Quantity(np.power(value.values, n), dimension)
-
-    def _function(self, name: str, arguments: list[Quantity]) -> Quantity:
-        rule = FUNCTIONS[name]
-        if len(arguments) not in rule.arguments:
-            counts = " or ".join(map(str, rule.arguments))
-            self.fail(
-                f"give {name} {counts} values", f"{len(arguments)}", f"write it like {rule.example}"
-            )
-        return rule.apply(self, arguments)
-
-    def stretch(self, arguments: list[Quantity]) -> slice | NDArray[np.bool_]:
-        """Samples from the second argument to the third; all without them."""
-        if len(arguments) == 1:
-            return slice(None)
-        start, end = arguments[1:]
-        for limit in (start, end):
-            if limit.dimension != base_units("s")[1] or np.ndim(limit.values):
-                self.fail(
-                    "have stretches in time", _described(limit), "write it like zero(x, 0 s, 5 s)"
-                )
+    def _statistic(self, name: str, value: Quantity, limits: list[ast.expr]) -> Quantity:
+        """A statistic of all samples, or of those from the first limit to the second."""
         time = self.names.time
-        inside = (time >= start.values) & (time <= end.values)
-        if not inside.any():
-            self.fail(
-                "have stretches that hold samples",
-                f"{float(start.values):g} s to {float(end.values):g} s",
-                f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s",
-            )
-        return inside
-
-    def column(self, value: Quantity) -> Array:
-        """Values as one a sample."""
-        return np.broadcast_to(np.asarray(value.values, dtype=np.float64), self.names.time.shape)
-
-
-@dataclass(frozen=True)
-class Function:
-    """A function of expressions: its number of arguments, and its implementation."""
-
-    arguments: tuple[int, ...]
-    example: str
-    apply: Callable[[_Expression, list[Quantity]], Quantity]
-
-
-def _mean(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    values = expression.column(arguments[0])[expression.stretch(arguments)]
-    return Quantity(
-        np.float64(np.nanmean(values)) if _any(values) else _NAN, arguments[0].dimension
-    )
+        values = np.broadcast_to(np.asarray(value.values, dtype=np.float64), time.shape)
+        inside = np.ones(time.size, bool)
+        example = f"write it like {name}(x, 0 s, 5 s)"
+        if len(limits) not in (0, 2):
+            self._fail(f"give {name} 1 or 3 values", f"{1 + len(limits)}", example)
+        if limits:
+            start, end = edges = [self._evaluated(limit) for limit in limits]
+            for edge in edges:
+                if edge.dimension != _SECONDS or np.ndim(edge.values):
+                    self._fail("have stretches in time", _described(edge), example)
+            inside = (time >= start.values) & (time <= end.values)
+            if not inside.any():
+                self._fail(
+                    "have stretches that hold samples",
+                    f"{float(start.values):g} s to {float(end.values):g} s",
+                    f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s",
+                )
+        part = values[inside]
+        level = np.float64(_STATISTICS[name](part) if np.isfinite(part).any() else np.nan)
+        return Quantity(value.values - level if name == "zero" else level, value.dimension)
 
 
-def _median(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    values = expression.column(arguments[0])[expression.stretch(arguments)]
-    return Quantity(
-        np.float64(np.nanmedian(values)) if _any(values) else _NAN, arguments[0].dimension
-    )
-
-
-def _zero(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    return Quantity(
-        arguments[0].values - _mean(expression, arguments).values, arguments[0].dimension
-    )
-
-
-def _cumulative(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    return Quantity(np.cumsum(expression.column(arguments[0])), arguments[0].dimension)
-
-
-def _integral(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    values, time = expression.column(arguments[0]), expression.names.time
-    parts = np.diff(time) * (values[1:] + values[:-1]) / 2
-    whole = np.concatenate([[0.0], np.cumsum(parts)])
-    return Quantity(whole, _product(arguments[0].dimension, base_units("s")[1], 1.0))
-
-
-def _derivative(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    values = np.gradient(expression.column(arguments[0]), expression.names.time)
-    return Quantity(values, _product(arguments[0].dimension, base_units("s")[1], -1.0))
-
-
-def _absolute(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    return Quantity(np.abs(arguments[0].values), arguments[0].dimension)
-
-
-def _root(expression: _Expression, arguments: list[Quantity]) -> Quantity:
-    half = dimension_of({name: n / 2 for name, n in arguments[0].dimension})
-    return Quantity(np.sqrt(arguments[0].values), half)
-
-
-_NAN = np.float64(np.nan)
-
-#: Functions by name.
-FUNCTIONS: Mapping[str, Function] = {
-    "abs": Function((1,), "abs(x)", _absolute),
-    "sqrt": Function((1,), "sqrt(x)", _root),
-    "mean": Function((1, 3), "mean(x, 0 s, 5 s)", _mean),
-    "median": Function((1, 3), "median(x, 0 s, 5 s)", _median),
-    "zero": Function((1, 3), "zero(x, 0 s, 5 s)", _zero),
-    "cumulative": Function((1,), "cumulative(x)", _cumulative),
-    "integral": Function((1,), "integral(x)", _integral),
-    "derivative": Function((1,), "derivative(x)", _derivative),
-}
-
-
-def _any(values: Array) -> bool:
-    return bool(np.isfinite(values).any())
-
-
-def _product(one: Dimension, other: Dimension, power: float) -> Dimension:
-    exponents = dict(one)
-    for name, n in other:
-        exponents[name] = exponents.get(name, 0.0) + power * n
+def _product(*powers: tuple[Dimension, float]) -> Dimension:
+    """Dimension of a product of powers."""
+    exponents: dict[str, float] = {}
+    for dimension, power in powers:
+        for name, n in dimension:
+            exponents[name] = exponents.get(name, 0.0) + power * n
     return dimension_of(exponents)
 
 
-def _described(value: Quantity | Any) -> str:
+def _described(value: Quantity) -> str:
     return f"a quantity in {unit_text(value.dimension)}" if value.dimension else "a pure number"

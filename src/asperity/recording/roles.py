@@ -199,7 +199,8 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
         Argument("Trace.channel", role or name),
         "name a channel",
         f"none like '{name}'",
-        _second(role, kinds) or (closest(name, kinds) if kinds else "the recording has none"),
+        _second(role, kinds)
+        or (closest(name, kinds) if kinds else "the recording has no column besides time"),
     )
 
 

@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING
 from asperity._lazy import lazy_names
 
 if TYPE_CHECKING:
+    from asperity.study.engine import SweepProgress
     from asperity.study.estimate import dry_run
     from asperity.study.export import export_store
     from asperity.study.outcome import reasons
     from asperity.study.plan import SweepPlan, load_plan
     from asperity.study.results import SweepStatus, open_store, store_status, summary_statistics
-    from asperity.study.run import SweepSummary, run_sweep
+    from asperity.study.run import run_sweep
 
 #: Module of each public name.
 _HOMES = {
     "SweepPlan": "plan",
     "SweepStatus": "results",
-    "SweepSummary": "run",
+    "SweepProgress": "engine",
     "dry_run": "estimate",
     "export_store": "export",
     "load_plan": "plan",
@@ -34,8 +35,8 @@ _HOMES = {
 
 __all__ = [
     "SweepPlan",
+    "SweepProgress",
     "SweepStatus",
-    "SweepSummary",
     "dry_run",
     "export_store",
     "load_plan",

@@ -12,6 +12,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from asperity.study.workers import Workers
@@ -60,10 +61,12 @@ class Task(Protocol):
 
 @dataclass
 class SweepProgress:
-    """Progress of a sweep.
+    """Progress of a sweep; at its end, its summary.
 
     Attributes
     ----------
+    out : Path
+        Folder of the store.
     points, total : int
         Points processed by this run and earlier runs, and all points.
     failed : int
@@ -86,6 +89,7 @@ class SweepProgress:
         Estimate of the remaining time (s); NaN before a point is solved.
     """
 
+    out: Path
     points: int = 0
     total: int = 0
     failed: int = 0

@@ -14,6 +14,8 @@ from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
 from asperity.study.axes import TEXTS
 from asperity.study.outcome import words
+from asperity.study.plan import OF_CHUNKS
+from asperity.study.results import dataset_of
 from asperity.study.store.store import SweepStore
 
 if TYPE_CHECKING:
@@ -27,9 +29,9 @@ _FORMATS = (".nc", ".csv", ".parquet")
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
     """Write a store to one file; the suffix of the file chooses the format.
 
-    NetCDF keeps the grid; points that are not computed have fill values. CSV and Parquet have a row
-    for each point of the chunks that are done: the columns of the axes, the outputs, ``outcome``
-    as a word, and ``detail``.
+    NetCDF keeps the grid; points that are not computed are NaN, their outcome -1. CSV and Parquet
+    have a row for each point of the chunks that are done: the columns of the axes, the outputs,
+    ``outcome`` as a word, and ``detail``.
 
     Parameters
     ----------
@@ -64,52 +66,17 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
 
 
 def _netcdf(store: SweepStore, file: Path) -> int:
-    import h5netcdf
-
-    written = 0
-    with h5netcdf.File(file, "w") as out:
-        for axis in store.grid.axes:
-            out.dimensions[axis.name] = axis.length
-        for name, array in store.labels.items():
-            dims = tuple(array.metadata.dimension_names or ())
-            if name in TEXTS:
-                texts = np.asarray(array[...], dtype=object)
-                variable = out.create_variable(name, dims, dtype=_text_type())
-                variable[...] = texts
-            else:
-                variable = out.create_variable(name, dims, data=np.asarray(array[...]))
-            _attributes(variable, dict(array.attrs))
-        dims = tuple(axis.name for axis in store.grid.axes)
-        variables = {}
-        for name, array in store.arrays.items():
-            fill: Any = np.nan if array.dtype.kind == "f" else array.fill_value
-            variables[name] = out.create_variable(
-                name, dims, dtype=array.dtype, fillvalue=fill, chunks=store.grid.chunks
-            )
-            _attributes(variables[name], dict(array.attrs))
-            # CF names auxiliary coordinates in each variable, not once for the file.
-            variables[name].attrs["coordinates"] = store.attributes.get("coordinates", "")
-        for chunk in store.done():
-            slices = store.grid.slices(chunk)
-            for name, values in store.read(chunk).items():
-                variables[name][slices] = values
-            written += store.grid.size(chunk)
-        for name in ("title", "source", "convention", "plan", "plan_text"):
-            out.attrs[name] = str(store.attributes.get(name, ""))
+    written = sum(store.grid.size(chunk) for chunk in store.done())
+    dataset = dataset_of(store).drop_vars(OF_CHUNKS)
+    texts = ("title", "source", "convention", "plan", "plan_text")
+    dataset.attrs = {name: str(store.attributes.get(name, "")) for name in texts}
+    # CF: flags have the type of their variable.
+    flags = dataset["outcome"].attrs
+    flags["flag_values"] = np.array(flags["flag_values"], dtype=dataset["outcome"].dtype)
+    chunks = {name: {"chunksizes": store.grid.chunks} for name in store.arrays}
+    # One variable at a time is in memory.
+    dataset.to_netcdf(file, engine="h5netcdf", encoding=chunks)
     return written
-
-
-def _text_type() -> Any:
-    import h5py
-
-    return h5py.string_dtype()
-
-
-def _attributes(variable: Any, attributes: dict[str, Any]) -> None:
-    for name, value in attributes.items():
-        if isinstance(value, list):
-            value = np.array(value, dtype=variable.dtype if variable.dtype.kind in "if" else None)
-        variable.attrs[name] = value
 
 
 def _frames(store: SweepStore) -> Iterator[pandas.DataFrame]:

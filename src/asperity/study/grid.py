@@ -16,8 +16,8 @@ from asperity.parameters import Parameter, all_parameters
 from asperity.parameters.arguments import shown
 from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import Column, SweepAxis
+from asperity.study.plan import plan_record
 from asperity.study.points import RATIOS, Points
-from asperity.study.record import plan_record
 from asperity.study.solve import SOLVES
 
 Slices = tuple[slice, ...]
@@ -36,7 +36,7 @@ class SweepGrid:
     Parameters
     ----------
     record : mapping
-        From `asperity.study.record.plan_record`.
+        From `asperity.study.plan.plan_record`.
     chunks : tuple of int, optional
         Chunk length along each axis; chosen from the record by default.
 

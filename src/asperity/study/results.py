@@ -73,10 +73,14 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     InputError
         If there is no store of a sweep, or it is damaged.
     """
+    return dataset_of(SweepStore(file_path(store, "store"), mode="r"))
+
+
+def dataset_of(store: SweepStore) -> xarray.Dataset:
+    """The dataset of a store that has been checked."""
     import xarray
 
-    whole = SweepStore(file_path(store, "store"), mode="r")
-    return xarray.open_zarr(whole.path, consolidated=False, chunks=None)
+    return xarray.open_zarr(store.path, consolidated=False, chunks=None)
 
 
 def store_status(store: str | os.PathLike[str]) -> SweepStatus:
@@ -98,10 +102,6 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         codes, counts = np.unique(opened.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    holder = running_driver(opened.path)
-    running = ""
-    if holder:
-        running = f"process {holder['process']} on {holder['host']} since {holder['since']}"
     return SweepStatus(
         store=opened.path,
         title=str(opened.attributes.get("title", "")),
@@ -112,7 +112,7 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         chunks_done=chunks,
         chunks_damaged=damaged,
         outcomes={names.get(code, str(code)): n for code, n in sorted(outcomes.items())},
-        running=running,
+        running=running_driver(opened.path),
         runs=opened.root.runs,
         bytes=_bytes_in(opened.path),
     )

@@ -11,7 +11,6 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,10 +25,9 @@ from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid
 from asperity.study.job import Job, numerics, package_version
-from asperity.study.plan import SweepPlan, load_plan
-from asperity.study.record import is_extension, law_places
+from asperity.study.plan import SweepPlan, is_extension, law_places, load_plan
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out
-from asperity.study.store.lock import StoreLock, lock_file
+from asperity.study.store.lock import StoreLock, lock_file, store_lock
 from asperity.study.store.root import read_root
 from asperity.study.store.store import SweepStore
 from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
@@ -40,33 +38,6 @@ _REFRESH = 5.0
 _TIME = "%Y-%m-%dT%H:%M:%S%z"
 #: Packages whose versions a run records, besides those of `numerics`.
 _PACKAGES = ("zarr", "loky", "distributed")
-
-
-@dataclass(frozen=True)
-class SweepSummary:
-    """Counts of a finished run.
-
-    Attributes
-    ----------
-    out : Path
-    points, failed : int
-        All points of the store, and the points without a converged answer.
-    solved : int
-        Points that this run solved.
-    seconds : float
-    memory : float
-        Largest resident memory of a worker (bytes).
-    lost : int
-        Number of worker processes that died.
-    """
-
-    out: Path
-    points: int
-    failed: int
-    solved: int
-    seconds: float
-    memory: float
-    lost: int
 
 
 @typed
@@ -81,7 +52,7 @@ def run_sweep(
     retry_failed: bool = False,
     progress: Callable[[SweepProgress], None] | None = None,
     log: Callable[[str], None] | None = None,
-) -> SweepSummary:
+) -> SweepProgress:
     """Solve every point of a plan and write it to a Zarr store.
 
     The same call continues after an interruption of any kind: chunks that are done and undamaged
@@ -108,6 +79,11 @@ def run_sweep(
     log : callable, optional
         Called with a line of text for every error and repair.
 
+    Returns
+    -------
+    SweepProgress
+        Counts of the finished run.
+
     Raises
     ------
     InputError
@@ -123,7 +99,7 @@ def run_sweep(
         text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
-    with StoreLock(path) as lock, ExitStack() as stack:
+    with store_lock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
         _require_coordinates(grid, path.parent)
         with _writing(path):
@@ -191,11 +167,6 @@ def _opened(
             f"{differences(made, numerics())}, so that last digits may differ; finish it with "
             "those versions, or choose another store"
         )
-    pending = root.attributes.get("extending")
-    if pending:
-        longer = SweepGrid(pending["record"], root.grid.chunks)
-        extend(path, root, longer, pending["attributes"])
-        root = read_root(path)
     old = root.grid.record
     if old == grid.record:
         written = [root.damage] if root.damage else []
@@ -250,9 +221,9 @@ def _run(
     job: Job,
     progress: Callable[[SweepProgress], None] | None,
     log: Callable[[str], None],
-) -> SweepSummary:
+) -> SweepProgress:
     grid = store.grid
-    counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
+    counts = SweepProgress(store.path, total=grid.points, chunk_total=grid.chunk_count)
     if not job.retry:
         counts.stored = round(store.share_done() * grid.points)
     runs = [*store.root.runs, _started(workers)]
@@ -290,15 +261,7 @@ def _run(
                 "workers_lost": counts.lost,
             }
             store.update_attributes(runs=runs)
-    return SweepSummary(
-        out=store.path,
-        points=counts.points,
-        failed=counts.failed,
-        solved=counts.solved,
-        seconds=counts.seconds,
-        memory=counts.memory,
-        lost=counts.lost,
-    )
+    return counts
 
 
 @contextmanager

@@ -31,6 +31,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
+from asperity.parameters.columns import readable
 from asperity.study.engine import solve_here
 from asperity.study.outcome import Answers
 from asperity.study.points import Points
@@ -267,28 +268,9 @@ class TableSource:
 def _opened(path: Path) -> Iterator[TextIO]:
     """The table as text; errors of reading are raised as `InputError`."""
     require_rereadable(path, "table")
-    try:
-        # utf-8-sig: spreadsheets put a byte-order mark in front.
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            yield stream
-    except FileNotFoundError:
-        raise InputError(
-            f"table must be a file, got '{path}'; there is none, correct the path"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path} must be UTF-8 text, got the byte 0x{error.object[error.start]:02x}; "
-            "save the table as CSV in UTF-8"
-        ) from None
-    except csv.Error as error:
-        raise InputError(
-            f"{path} must be valid CSV, got a fault ({error}); check the quotation marks"
-        ) from None
-    except OSError as error:
-        raise InputError(
-            f"table must be a readable file, got '{path}' ({error.strerror or error}); "
-            "give a CSV file"
-        ) from None
+    # utf-8-sig: spreadsheets put a byte-order mark in front.
+    with readable(path, "table"), path.open(encoding="utf-8-sig", newline="") as stream:
+        yield stream
 
 
 def _rows(stream: TextIO, delimiter: str) -> Iterator[Row]:

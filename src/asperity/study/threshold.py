@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +24,9 @@ from asperity.study.crossings import STABILITY, find_crossings
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.points import POINT_BYTES, Float
 from asperity.study.responses import answers_of_law, bifurcation_kinds
-from asperity.units import format_si
 
+#: What happens at a threshold.
+BIFURCATIONS = ("fold", "period doubling", "Neimark-Sacker")
 #: Limits of the search, over K_c.
 _BETWEEN = (0.3, 4.0)
 
@@ -156,12 +157,17 @@ def stiffness_threshold(
         np.full(count, high),
         scan,
     )
+    K, turn = (searched[name].reshape(eps.shape) for name in ("K", "turn"))
+    code = np.nan_to_num(searched["bifurcation"], nan=-1).astype(int)
+    kinds = np.array([*BIFURCATIONS, ""], dtype=object)[code]
+    # Stiffnesses are in N/m here, and in K_c in a sweep.
+    texts = [text.replace(" K_c", " N/m").replace("threshold.", "") for text in searched.result]
     return StiffnessThreshold(
-        K=searched.K.reshape(eps.shape),
-        ratio=searched.K.reshape(eps.shape) / critical,
-        kind=searched.kind.reshape(eps.shape),
-        mode_frequency=searched.turn.reshape(eps.shape) * f,
-        result=searched.result.reshape(eps.shape),
+        K=K,
+        ratio=K / critical,
+        kind=kinds.reshape(eps.shape),
+        mode_frequency=turn * f,
+        result=np.array(texts, dtype=object).reshape(eps.shape),
     )
 
 
@@ -179,37 +185,9 @@ def require_scan(points: int, scan: int, name: str) -> None:
     )  # fmt: skip
 
 
-class SearchedThresholds(NamedTuple):
-    """Thresholds of many operating points.
-
-    Attributes
-    ----------
-    K : array, shape (points,)
-        Threshold (N/m); NaN without one.
-    turn : array, shape (points,)
-        |arg m| / (2 pi) of the leading multiplier at the threshold.
-    kind : object array, shape (points,)
-        Bifurcation; "" without a threshold.
-    result : object array, shape (points,)
-        "converged", or why there is no threshold.
-    outcome : int16 array, shape (points,)
-        A `SweepOutcome`.
-    where : array, shape (points,)
-        Stiffness (N/m) of the threshold, or of the point that `outcome` describes: a failed point,
-        or an end of the scan.
-    """
-
-    K: Float
-    turn: Float
-    kind: NDArray[np.object_]
-    result: NDArray[np.object_]
-    outcome: NDArray[np.int16]
-    where: Float
-
-
 def search_thresholds(
     law: type[Law], values: Mapping[str, Float], low: Float, high: Float, scan: int
-) -> SearchedThresholds:
+) -> Answers:
     """The highest stiffness at which each operating point loses stability.
 
     Parameters
@@ -221,6 +199,13 @@ def search_thresholds(
         Softest and stiffest spring of the search (N/m).
     scan : int
         Number of stiffnesses solved before the search, at equal ratios.
+
+    Returns
+    -------
+    Answers
+        ``K`` (N/m), ``turn``, |arg m|/(2 pi) of the leading multiplier, and ``bifurcation``, its
+        number in `BIFURCATIONS`. The detail of a point without a threshold is the stiffness (N/m)
+        of its outcome: of a failed point, or of an end of the scan.
     """
     count = len(low)
 
@@ -237,7 +222,7 @@ def search_thresholds(
     grid = np.stack([a.ravel() for a in np.meshgrid(steps, np.arange(count, dtype=float))], -1)
     scanned = solve(grid)
     g = scanned["log_multiplier"].reshape(count, scan)
-    reasons = np.where(scanned.converged, "", scanned.result).reshape(count, scan)
+    failed = ~scanned.converged.reshape(count, scan)
     with np.errstate(invalid="ignore"):
         crossed = (g[:, :-1] > 0) & (g[:, 1:] < 0)
     # All stiffer springs of the scan must have a stable response.
@@ -253,27 +238,25 @@ def search_thresholds(
         g[line, k],
         g[line, k + 1],
     )
-    K, turn, where = np.full((3, count), np.nan)
-    kind, result = (np.full(count, "", dtype=object) for _ in range(2))
-    outcome = np.zeros(count, dtype=np.int16)
-    at = stiffness(crossings.where)
-    K[line] = np.where(crossings.located, at, np.nan)
-    where[line] = at
-    outcome[line] = np.where(crossings.located, SweepOutcome.CONVERGED, SweepOutcome.NO_CROSSING)
-    turn[line] = np.abs(crossings.points["multiplier_argument"]) / (2 * np.pi)
-    kind[line], result[line] = bifurcation_kinds(crossings.points), crossings.reason
+    answers = Answers.empty(("K", "turn", "bifurcation"), count)
+    at, located = stiffness(crossings.where), crossings.located
+    answers.fail(line, SweepOutcome.NO_CROSSING, at)
+    points = crossings.points.take(located)
+    kinds = [
+        BIFURCATIONS.index(k) if k in BIFURCATIONS else np.nan for k in bifurcation_kinds(points)
+    ]
+    turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
+    numbers = {"K": at[located], "turn": turn, "bifurcation": np.array(kinds, dtype=float)}
+    answers.put(line[located], Answers(numbers, points.outcome, points.detail))
     for i in np.flatnonzero(~usable):
-        failed = np.flatnonzero(reasons[i] != "")
-        if len(failed):
-            outcome[i], result[i] = SweepOutcome.NO_RESPONSE, reasons[i][failed[-1]]
-            where[i] = low[i] * (high[i] / low[i]) ** steps[failed[0]]
+        if failed[i].any():
+            first = low[i] * (high[i] / low[i]) ** steps[np.argmax(failed[i])]
+            answers.fail(i, SweepOutcome.NO_RESPONSE, first)
         elif g[i, -1] > 0:
-            outcome[i], where[i] = SweepOutcome.UNSTABLE_THROUGHOUT, high[i]
-            result[i] = f"no threshold: unstable up to {format_si(float(high[i]), 'stiffness')}"
+            answers.fail(i, SweepOutcome.UNSTABLE_THROUGHOUT, high[i])
         else:
-            outcome[i], where[i] = SweepOutcome.STABLE_THROUGHOUT, low[i]
-            result[i] = f"no threshold: stable from {format_si(float(low[i]), 'stiffness')}"
-    return SearchedThresholds(K, turn, kind, result, outcome, where)
+            answers.fail(i, SweepOutcome.STABLE_THROUGHOUT, low[i])
+    return answers
 
 
 def _numbers(slider: Slider) -> dict[str, float]:

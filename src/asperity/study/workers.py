@@ -159,7 +159,8 @@ class DaskWorkers(Workers):
 @contextmanager
 def local_processes(count: int) -> Iterator[Workers]:
     """Processes of this machine, which are killed if the block ends with an exception."""
-    yield from _using(LocalProcesses(count))
+    with _closing(LocalProcesses(count)) as workers:
+        yield workers
 
 
 @contextmanager
@@ -175,23 +176,18 @@ def local_cluster(count: int) -> Iterator[Workers]:
     import dask
 
     with ExitStack() as stack:
-        stack.enter_context(
-            dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)})
-        )
+        spawned = {"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)}
+        stack.enter_context(dask.config.set(spawned))
         try:
             # No memory limit: near a limit Dask pauses a worker, and a pause does not free the
             # memory of compiled programs.
-            cluster = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                    memory_limit=0,
-                )
-            )
-            client = stack.enter_context(distributed.Client(cluster))
-            workers = DaskWorkers(client, f"Dask cluster on one machine with {count} workers")
+            cluster = distributed.LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None,
+                memory_limit=0,
+            )  # fmt: skip
+            client = distributed.Client(stack.enter_context(cluster))
+            about = f"Dask cluster on one machine with {count} workers"
+            workers = DaskWorkers(stack.enter_context(client), about)
         # Dask raises one of these when a starting process ends or does not answer.
         except (RuntimeError, OSError, TimeoutError, CancelledError) as error:
             raise InputError(
@@ -199,7 +195,7 @@ def local_cluster(count: int) -> Iterator[Workers]:
                 f"some ended while they started ({printable(str(error), 200)}); repeat the "
                 "command, or take fewer"
             ) from None
-        yield from _using(workers)
+        yield stack.enter_context(_closing(workers))
 
 
 @contextmanager
@@ -227,10 +223,13 @@ def scheduler(address: str) -> Iterator[Workers]:
                 f"--scheduler must have workers, got none at '{address}' within a minute; start "
                 "some with dask worker"
             ) from None
-        yield from _using(DaskWorkers(client, f"Dask scheduler at {address}"))
+        with _closing(DaskWorkers(client, f"Dask scheduler at {address}")) as workers:
+            yield workers
 
 
-def _using(workers: Workers) -> Iterator[Workers]:
+@contextmanager
+def _closing(workers: Workers) -> Iterator[Workers]:
+    """Release workers at the end of the block; after an exception their tasks are killed."""
     kill = True
     try:
         yield workers

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.small_systems import jacobian_columns, solve_points
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law, State
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
@@ -49,23 +49,15 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     """
     require_contact(programme, float(motion.slider.W0))
     if isinstance(initial, str):
-        if initial != "steady":
-            raise InputError(
-                "initial",
-                "be 'steady' or an array of states",
-                f"'{initial}'",
-                "leave it out to begin in steady sliding",
-            )
+        rule, advice = "be 'steady' or an array of states", "leave it out to begin steadily"
+        require(initial == "steady", "initial", rule, f"'{initial}'", advice)
         return Checkpoint(0, 0.0, steady_start(motion, programme))
     states = np.asarray(initial, float)
-    if states.shape != (motion.size,) or not np.all(np.isfinite(states)):
-        names = ", ".join((*motion.mechanical, *motion.slider.law.state_names))
-        raise InputError(
-            "initial",
-            f"be {motion.size} finite states ({names})",
-            states.tolist(),
-            "take them from a trajectory or begin in steady sliding",
-        )
+    names = ", ".join((*motion.mechanical, *motion.slider.law.state_names))
+    holds = states.shape == (motion.size,) and bool(np.all(np.isfinite(states)))
+    advice = "take them from a trajectory or begin in steady sliding"
+    rule = f"be {motion.size} finite states ({names})"
+    require(holds, "initial", rule, states.tolist(), advice)
     _require_motion(motion, programme, states)
     return Checkpoint(0, 0.0, np.append(states, 0.0))
 
@@ -75,28 +67,18 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
     first = SegmentEquations(motion, programme.segments[0])
     rates, friction = (np.asarray(a) for a in _rates_and_friction(first, np.append(states, 0.0)))
     names = (*motion.mechanical, *motion.slider.law.state_names, "displacement")
+    listed = f"[{', '.join(f'{s:.4g}' for s in states)}]"
     lost = [name for name, rate in zip(names, rates, strict=True) if not np.isfinite(rate)]
     if lost:
         steady = ", ".join(f"{s + 0.0:.4g}" for s in np.asarray(motion.steady()))
-        raise InputError(
-            "initial",
-            "be states whose rates are numbers",
-            f"{_listed(states)}, of which that of {lost[0]} is not finite",
-            f"begin nearer to steady sliding, at {steady}",
-        )
+        got = f"{listed}, of which that of {lost[0]} is not finite"
+        advice = f"begin nearer to steady sliding, at {steady}"
+        raise InputError("initial", "be states whose rates are numbers", got, advice)
     # With ln v as a state the slider always moves forwards, even at the smallest velocity.
-    if friction < 0 and not (motion.signed or "log_velocity" in motion.mechanical):
-        raise InputError(
-            "initial",
-            "leave an interface force that is not negative",
-            f"{_listed(states)} and F_i/W = {friction:.4g}, for which "
-            f"'{motion.slider.law.name}' is not defined",
-            "take a law that is, such as 'regularised'",
-        )
-
-
-def _listed(states: np.ndarray) -> str:
-    return f"[{', '.join(f'{s:.4g}' for s in states)}]"
+    defined = friction >= 0 or motion.signed or "log_velocity" in motion.mechanical
+    law, advice = motion.slider.law.name, "take a law that is, such as 'regularised'"
+    got = f"{listed} and F_i/W = {friction:.4g}, for which '{law}' is not defined"
+    require(defined, "initial", "leave an interface force that is not negative", got, advice)
 
 
 @jax.jit
@@ -122,13 +104,9 @@ def require_contact(programme: Programme, W0: float) -> None:
     """
     first = float(programme.load(0.0))
     for moment, load in (("before the first step", programme.level.load), ("at t = 0", first)):
-        if not load > NO_LOAD * W0:
-            raise InputError(
-                "programme.load",
-                f"press the slider on, at more than {NO_LOAD:g} of W0 = {W0:g} N",
-                f"{load:g} N {moment}",
-                "begin with the interface in contact",
-            )
+        rule = f"press the slider on, at more than {NO_LOAD:g} of W0 = {W0:g} N"
+        got, advice = f"{load:g} N {moment}", "begin with the interface in contact"
+        require(load > NO_LOAD * W0, "programme.load", rule, got, advice)
 
 
 def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
@@ -137,13 +115,9 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     With x K / W0 as the last; a step of the load at the very beginning is included.
     """
     level = programme.level
-    if not level.velocity > 0:
-        raise InputError(
-            "programme.velocity",
-            "be positive for a start in steady sliding",
-            f"{level.velocity:g} m/s",
-            "give it, or the states at rest as initial",
-        )
+    rule, got = "be positive for a start in steady sliding", f"{level.velocity:g} m/s"
+    advice = "give it, or the states at rest as initial"
+    require(level.velocity > 0, "programme.velocity", rule, got, advice)
     first = SegmentEquations(motion, programme.segments[0])
     w = level.load / np.asarray(motion.slider.W0)
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))
@@ -214,59 +188,38 @@ def checked_integration(
     InputError
         If a value breaks its rule.
     """
-    eta = None
-    if radiation_damping is not None:
-        eta = _positive(radiation_damping, "damping", "radiation_damping")
-    rtol = _positive(rtol, "dimensionless", "rtol")
-    if not 1e-13 <= rtol <= 1e-2:
-        raise InputError("rtol", "lie between 1e-13 and 0.01", f"{rtol:g}", "give one such as 1e-8")
-    atol = rtol / 100 if atol is None else _positive(atol, "dimensionless", "atol")
-    if not slider.law.rate_dependent:
-        raise InputError(
-            "law",
-            "depend on velocity for a transient",
-            f"'{slider.law.name}', whose force follows the load without dynamics",
-            "take a rate-and-state law",
-        )
-    scalar = jax.tree.map(_scalar, slider)
     fastest = programme.fastest_pull
     V = abs(programme.level.velocity) or fastest or 1e-6
+    fastest = fastest or V
+
+    def positive(name: str, value: Any, default: Any, kind: str = "dimensionless") -> Any:
+        return default if value is None else number(value, name, kind, "positive")
+
+    eta = positive("radiation_damping", radiation_damping, None, "damping")
+    rtol = positive("rtol", rtol, None)
+    rule, advice = "lie between 1e-13 and 0.01", "give one such as 1e-8"
+    require(1e-13 <= rtol <= 1e-2, "rtol", rule, f"{rtol:g}", advice)
+    law, advice = slider.law, "take a rate-and-state law"
+    got = f"'{law.name}', whose force follows the load without dynamics"
+    require(law.rate_dependent, "law", "depend on velocity for a transient", got, advice)
+    scalar = jax.tree.map(_scalar, slider)
     motion = equation_of_motion(
         scalar, jnp.asarray(V), jnp.asarray(1.0), inertia=inertia,
         eta=None if eta is None else jnp.asarray(eta),
     )  # fmt: skip
     motion = reversing(motion)
-    fastest = fastest or V
-    slips, runs = _SLIPS * fastest, max(_RUNAWAY, _RUNAWAY_RATIO * fastest)
-    if slip_velocity is not None:
-        slips = _positive(slip_velocity, "velocity", "slip_velocity")
-    if runaway_velocity is not None:
-        runs = _positive(runaway_velocity, "velocity", "runaway_velocity")
-    most_steps = _positive(most_steps, "dimensionless", "most_steps")
-    steady = _positive(steady_tolerance, "dimensionless", "steady_tolerance")
-    nowhere = Checkpoint(0, 0.0, np.empty(0))
-    return Integration(
-        motion,
-        programme,
-        nowhere,
-        Tolerances(rtol, atol),
-        EventThresholds(slips, runs, steady),
-        method,
-        most_steps,
+    runs = max(_RUNAWAY, _RUNAWAY_RATIO * fastest)
+    thresholds = EventThresholds(
+        positive("slip_velocity", slip_velocity, _SLIPS * fastest, "velocity"),
+        positive("runaway_velocity", runaway_velocity, runs, "velocity"),
+        positive("steady_tolerance", steady_tolerance, None),
     )
+    tolerances = Tolerances(rtol, positive("atol", atol, rtol / 100))
+    most, nowhere = positive("most_steps", most_steps, None), Checkpoint(0, 0.0, np.empty(0))
+    return Integration(motion, programme, nowhere, tolerances, thresholds, method, most)
 
 
 def _scalar(value: Any) -> jnp.ndarray:
-    if np.size(value) != 1:
-        raise InputError(
-            "slider",
-            "be a single one for a transient",
-            f"parameters of shape {np.shape(value)}",
-            "call it once for each",
-        )
-    number = jnp.asarray(value, float)
-    return number if number.ndim == 0 else number.reshape(())
-
-
-def _positive(value: Any, kind: str, name: str) -> float:
-    return number(value, name, kind, "positive")
+    got, advice = f"parameters of shape {np.shape(value)}", "call it once for each"
+    require(np.size(value) == 1, "slider", "be a single one for a transient", got, advice)
+    return jnp.asarray(value, float).reshape(())

@@ -49,13 +49,6 @@ _GAIN = 50.0
 _HOPELESS_CHUNKS = 20
 
 
-def ringing_velocity(motion: Motion) -> float:
-    """Velocity (over V) at which the slider rings while F_i/W swings by 1; 0 without ringing."""
-    if not isinstance(motion, Inertial):
-        return 0.0
-    return float(np.sqrt(motion.mobility / motion.strain))
-
-
 @dataclass
 class Pace:
     """Judges the steps of one segment by their number.
@@ -320,7 +313,10 @@ class Integration:
     def __post_init__(self) -> None:
         self._choice = MethodChoice(self.motion, self.method)
         self._detector = EventDetector(self.motion, self.thresholds)
-        self._ringing = 0.0 if self.method == "explicit" else ringing_velocity(self.motion)
+        # Velocity (over V) at which the slider rings while F_i/W swings by 1.
+        self._ringing = 0.0
+        if isinstance(self.motion, Inertial) and self.method != "explicit":
+            self._ringing = float(np.sqrt(self.motion.mobility / self.motion.strain))
         self._pace = Pace(self._ringing > 0, self.most_steps)
 
     def segment_parts(self) -> Iterator[SegmentPart]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import LinkerDieterich, RiceRuina
 from asperity.loads.programme.programme import BREAK
+from asperity.parameters.arguments import number
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
 from asperity.slider.named import values_as_text
@@ -26,14 +26,28 @@ from asperity.units import to_si
 if TYPE_CHECKING:
     import xarray
 
+Float = NDArray[np.float64]
+
 #: Rows that doubles can count.
 _MOST_ROWS = 2.0**53
 
 
-class SampleTimes(ABC):
-    """Sampling times in rising order, consumed part by part."""
+class SampleTimes:
+    """Sampling times in rising order, consumed part by part.
 
-    @abstractmethod
+    Parameters
+    ----------
+    rate : float, optional
+        Multiples of 1/rate (s), the first at t = 0.
+    times : array, optional
+        Times (s) that the user chose. Without both, the steps of the integrator, which are short
+        where the motion is fast.
+    """
+
+    def __init__(self, rate: float | None = None, times: Float | None = None) -> None:
+        self._rate, self._times = rate or 0.0, times
+        self._next, self._after = 0, -np.inf
+
     def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
         """The next times (s) before `end`, at most `most` of them.
 
@@ -47,73 +61,29 @@ class SampleTimes(ABC):
         closing : bool
             Whether the trajectory ends there; then `end` itself is included.
         """
+        if not self._rate and self._times is None:
+            times = np.append(steps, end) if closing else steps
+            times = times[(times > self._after) & (times <= end)][:most]
+            self._after = float(times[-1]) if times.size else self._after
+            return times
+        index = np.arange(self._next, min(self._count(end, closing), self._next + most))
+        self._next += len(index)
+        return index / self._rate if self._times is None else self._times[index]
 
-    @abstractmethod
     def skip(self, t: float) -> None:
         """Skip the times up to `t`, inclusive."""
-
-
-class StepTimes(SampleTimes):
-    """The steps of the integrator, which are short where the motion is fast."""
-
-    def __init__(self) -> None:
-        self._after = -np.inf
-
-    def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """Beginnings of steps, and the end of the last."""
-        times = np.append(steps, end) if closing else steps
-        times = times[(times > self._after) & (times <= end)][:most]
-        if times.size:
-            self._after = float(times[-1])
-        return times
-
-    def skip(self, t: float) -> None:
-        """As in `SampleTimes`."""
         self._after = t
-
-
-class EvenTimes(SampleTimes):
-    """Multiples of 1/rate, the first at t = 0."""
-
-    def __init__(self, rate: float) -> None:
-        self._rate, self._next = rate, 0
-
-    def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """As in `SampleTimes`."""
-        count = _limit(end, closing) * self._rate
-        last = int(np.floor(count)) if closing else int(np.ceil(count)) - 1
-        index = np.arange(self._next, min(last + 1, self._next + most))
-        self._next += len(index)
-        return index / self._rate
-
-    def skip(self, t: float) -> None:
-        """As in `SampleTimes`."""
         if t >= 0:
-            self._next = int(np.floor(_limit(t, True) * self._rate)) + 1
+            self._next = self._count(t, True)
 
-
-class GivenTimes(SampleTimes):
-    """Times that the user chose."""
-
-    def __init__(self, times: np.ndarray) -> None:
-        self._times, self._next = times, 0
-
-    def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """As in `SampleTimes`."""
-        limit = _limit(end, closing)
-        last = int(np.searchsorted(self._times, limit, side="right" if closing else "left"))
-        part = self._times[self._next : min(last, self._next + most)]
-        self._next += len(part)
-        return part
-
-    def skip(self, t: float) -> None:
-        """As in `SampleTimes`."""
-        self._next = int(np.searchsorted(self._times, t, side="right"))
-
-
-def _limit(end: float, closing: bool) -> float:
-    """A time that coincides with a break point belongs to the segment after it."""
-    return end * (1 + BREAK) if closing else end * (1 - BREAK)
+    def _count(self, end: float, closing: bool) -> int:
+        """How many times lie before `end`, which is one of them where the trajectory closes."""
+        # A time that coincides with a break point belongs to the segment after it.
+        limit = end * (1 + BREAK if closing else 1 - BREAK)
+        if self._times is not None:
+            return int(np.searchsorted(self._times, limit, side="right" if closing else "left"))
+        count = limit * self._rate
+        return int(np.floor(count)) + 1 if closing else int(np.ceil(count))
 
 
 def planned_rows(sampling: Any, duration: float) -> float | None:
@@ -147,31 +117,25 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
         If the rate is not positive, or the times do not rise or lie outside the programme.
     """
     if sampling is None:
-        return StepTimes()
+        return SampleTimes()
     if isinstance(sampling, str) or np.ndim(sampling) == 0:
-        rate = to_si(sampling, "frequency", "sampling")
-        if not rate > 0:
-            raise InputError(
-                f"sampling must be positive, got {rate:g} Hz; give a rate such as '10 kHz'"
-            )
-        if rate * duration > _MOST_ROWS:
-            raise InputError(
-                f"sampling must give at most {_MOST_ROWS:g} rows, got {rate:g} Hz for "
-                f"{duration:g} s; lower the rate or shorten the programme"
-            )
-        return EvenTimes(rate)
+        rate = number(sampling, "sampling", "frequency", "positive")
+        rule, advice = (
+            f"give at most {_MOST_ROWS:g} rows",
+            "lower the rate or shorten the programme",
+        )
+        got = f"{rate:g} Hz for {duration:g} s"
+        require(rate * duration <= _MOST_ROWS, "sampling", rule, got, advice)
+        return SampleTimes(rate=rate)
     times = np.asarray(to_si(sampling, "time", "sampling"), float)
-    if times.ndim != 1 or np.any(np.diff(times) < 0):
-        raise InputError(
-            "sampling must be times in rising order, got an array that falls or has more than "
-            "one axis; sort them"
-        )
+    rising = times.ndim == 1 and bool(np.all(np.diff(times) >= 0))
+    got = "an array that falls or has more than one axis"
+    require(rising, "sampling", "be times in rising order", got, "sort them")
     if times.size and (times[0] < 0 or times[-1] > duration * (1 + BREAK)):
-        raise InputError(
-            f"sampling must lie within the programme, 0 to {duration:g} s, got {times[0]:g} to "
-            f"{times[-1]:g} s; leave the times outside out"
-        )
-    return GivenTimes(times)
+        rule = f"lie within the programme, 0 to {duration:g} s"
+        got = f"{times[0]:g} to {times[-1]:g} s"
+        raise InputError("sampling", rule, got, "leave the times outside out")
+    return SampleTimes(times=times)
 
 
 def provenance(integration: Integration) -> dict[str, Any]:
@@ -193,9 +157,6 @@ def provenance(integration: Integration) -> dict[str, Any]:
         "steps": integration.steps,
         "rejected_steps": integration.rejected,
     }
-
-
-Float = NDArray[np.float64]
 
 
 def row_bytes(law_states: int) -> int:
@@ -329,6 +290,10 @@ class Trajectory(Drawn):
             return "time", values, {"units": units, "long_name": name, **recorded}
 
         about = {"long_name": "state of the equation of motion", "units": "1"}
+        times, kinds = [e.time for e in self.events], [e.kind for e in self.events]
+        far = self.displacement + self.force / float(self.motion.slider.K)
+        end = "displacement of the far end of the spring"
+        event = {"long_name": "instant and kind of what happens"}
         age = self.age
         aged = {} if age is None else {"age": channel(age, "s", "age of the contacts")}
         data = {
@@ -339,23 +304,10 @@ class Trajectory(Drawn):
             "velocity": channel(self.velocity, "m/s", "velocity of the slider"),
             "slip_velocity": channel(self.slip_velocity, "m/s", "plastic velocity"),
             "displacement": channel(self.displacement, "m", "displacement of the slider"),
-            "load_point_displacement": channel(
-                self.displacement + self.force / float(self.motion.slider.K),
-                "m",
-                "displacement of the far end of the spring",
-                "displacement",
-            ),
+            "load_point_displacement": channel(far, "m", end, "displacement"),
             "states": (("time", "state"), self.states, about),
-            "event_time": (
-                "event",
-                np.array([e.time for e in self.events], float),
-                {"units": "s", "long_name": "time of the event"},
-            ),
-            "event_kind": (
-                "event",
-                np.array([e.kind for e in self.events], dtype=str),
-                {"units": "1", "long_name": "kind of the event"},
-            ),
+            "event_time": ("event", np.array(times, float), event | {"units": "s"}),
+            "event_kind": ("event", np.array(kinds, dtype=str), event | {"units": "1"}),
         }
         coords = {
             "time": channel(self.time, "s", "time", "time"),

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.errors import InputError
+from asperity.parameters.arguments import number
 from asperity.tribometer.sensors import Given
-from asperity.units import KINDS, to_radians, to_si
+from asperity.units import to_radians
 
 Array = NDArray[np.float64]
-
-
-def _to_si(geometry: Any, kinds: dict[str, str]) -> None:
-    """Make the fields of a geometry positive floats in SI."""
-    for field in fields(geometry):
-        name = f"{type(geometry).__name__}.{field.name}"
-        kind = kinds[field.name]
-        stated = getattr(geometry, field.name)
-        value = to_radians(stated, name) if field.name == "angle" else stated
-        value = to_si(value, kind, name)
-        if not value > 0:
-            raise InputError(
-                f"{name} must be positive, got {value:g} {KINDS[kind].si}; correct the value"
-            )
-        object.__setattr__(geometry, field.name, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +28,8 @@ class DirectShear:
     surfaces = 1
 
     def __post_init__(self) -> None:
-        _to_si(self, {"area": "area"})
+        area = number(self.area, f"{type(self).__name__}.area", "area", "positive")
+        object.__setattr__(self, "area", area)
 
     def stresses(self, shear_force: ArrayLike, normal_force: ArrayLike) -> tuple[Array, Array]:
         """Shear and normal stress (Pa) of the machine's forces (N)."""
@@ -86,12 +71,12 @@ class Triaxial:
     angle: Given
 
     def __post_init__(self) -> None:
-        _to_si(self, {"diameter": "length", "angle": "dimensionless"})
-        if not self.angle < np.pi / 2:
-            raise InputError(
-                f"Triaxial.angle must be below pi/2, got {self.angle:g} rad; give the angle "
-                "between the cut and the axis, like '30 deg'"
-            )
+        diameter = number(self.diameter, "Triaxial.diameter", "length", "positive")
+        angle = to_radians(self.angle, "Triaxial.angle")
+        for rule in ("positive", "below a right angle"):
+            angle = number(angle, "Triaxial.angle", "dimensionless", rule)
+        object.__setattr__(self, "diameter", diameter)
+        object.__setattr__(self, "angle", angle)
 
     @property
     def area(self) -> float:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.parameters.arguments import number
-from asperity.units import KINDS
 
 Array = NDArray[np.float64]
 
@@ -146,7 +145,8 @@ _KINDS = {
     "impulses": "dimensionless",
     "stiffness": "stiffness",
 }
-_POSITIVE = ("bandwidth", "stiffness")
+#: Rules of the fields that may not be zero, or that may be negative.
+_RULES = {"bandwidth": "positive", "stiffness": "positive", "offset": "finite", "drift": "finite"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,13 +204,8 @@ class Sensor:
             kind = _KINDS.get(field.name, self.kind)
             name = f"{type(self).__name__}.{field.name}"
             stated = getattr(self, field.name)
-            value = number(stated, name, "dimensionless" if field.name == "drift" else kind)
-            low = field.name not in ("offset", "drift")
-            if low and (value < 0 or (value == 0 and field.name in _POSITIVE)):
-                rule = "positive" if field.name in _POSITIVE else "not negative"
-                raise InputError(
-                    f"{name} must be {rule}, got {value:g} {KINDS[kind].si}; correct the value"
-                )
+            rule = _RULES.get(field.name, "not negative")
+            value = number(stated, name, "dimensionless" if field.name == "drift" else kind, rule)
             object.__setattr__(self, field.name, value)
         for name in ("damping", "impulses"):
             if not getattr(self, name) < 1:

@@ -66,24 +66,18 @@ class Recorder:
 
     def __post_init__(self) -> None:
         for name, kind in (("rate", "frequency"), ("cut_off", "frequency"), ("jitter", "time")):
-            stated = getattr(self, name)
-            if stated is None:
-                continue
-            value = number(stated, f"Recorder.{name}", kind)
-            if value < 0 or (value == 0 and name != "jitter"):
+            stated, rule = getattr(self, name), "not negative" if name == "jitter" else "positive"
+            if stated is not None:
+                value = number(stated, f"Recorder.{name}", kind, rule)
+                object.__setattr__(self, name, value)
+        for name, low, high in (("order", 1, 8), ("bits", 0, 32)):
+            if not low <= getattr(self, name) <= high:
                 raise InputError(
-                    f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "
-                    "correct the value"
+                    f"Recorder.{name}",
+                    f"lie between {low} and {high}",
+                    getattr(self, name),
+                    f"give one such as {high // 2}",
                 )
-            object.__setattr__(self, name, value)
-        if not 1 <= self.order <= 8:
-            raise InputError(
-                f"Recorder.order must lie between 1 and 8, got {self.order}; give one such as 4"
-            )
-        if not 0 <= self.bits <= 32:
-            raise InputError(
-                f"Recorder.bits must lie between 0 and 32, got {self.bits}; give one such as 16"
-            )
 
     def step(self, channel: str, kind: str) -> tuple[float, float, float] | None:
         """Lowest value, highest value and step of the converter for a channel, in SI."""

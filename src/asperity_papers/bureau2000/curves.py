@@ -23,28 +23,6 @@ from asperity_papers.bureau2000.machine import (
 #: Words and pictures of figures and sections.
 WORDS = figure_words(PAPER.package)
 
-#: Columns of every table, with their units and meaning; "1" is a pure number.
-COLUMNS: Mapping[str, str] = {
-    "curve": "name of the curve",
-    "law": "friction law",
-    "alpha": "1; Linker-Dieterich coefficient",
-    "lambda": "m; shear elastic length",
-    "inertia": "whether the mass of the slider counts",
-    "damping": "N s/m; force per velocity of a damper between slider and track",
-    "V": "m/s; pulling velocity",
-    "frequency": "Hz; of the load modulation",
-    "epsilon_applied": "1; relative amplitude of the load",
-    "epsilon_eff": "1; part of it that the contacts bear, which the model receives",
-    "mean_friction": "1; mean of F/W0",
-    "delta_mu": "1; its change by the modulation",
-    "mu1": "1; amplitude of the first harmonic of F/W0",
-    "mu2": "1; amplitude of the second harmonic of F/W0",
-    "phase1": "rad; phase of the first harmonic against the load",
-    "phase2": "rad; phase of the second harmonic against the load",
-    "floquet_max": "1; largest modulus of the Floquet multipliers of one period",
-    "stable": "whether sliding is stable",
-    "converged": "whether the point was solved",
-}
 _SOLVED = (
     "mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", "floquet_max", "stable",
     "converged",
@@ -102,7 +80,8 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
     Returns
     -------
     DataFrame
-        With the columns of `COLUMNS`. A point that failed has ``converged`` False and NaN.
+        With the columns ``column`` of figures.toml. A point that failed has ``converged`` False
+        and NaN.
     """
     return pd.concat([_solve(machine, curve, options) for curve in curves], ignore_index=True)
 
@@ -212,7 +191,7 @@ class CurveFigure:
     def __call__(self, machine: Machine) -> FigureNumbers:
         """Solve the curves, and read the numbers off them."""
         data = solve_curves(machine, self.curves(machine))
-        scalars, quoted = self.read(machine, FigureNumbers(self.name, data, COLUMNS))
+        scalars, quoted = self.read(machine, FigureNumbers(self.name, data))
         return figure_numbers(machine, self.name, data, scalars, quoted=quoted)
 
 
@@ -229,7 +208,6 @@ def figure_numbers(
     data: pd.DataFrame,
     scalars: Mapping[str, float],
     *,
-    columns: Mapping[str, str] = COLUMNS,
     quoted: Mapping[str, float] | None = None,
     points: pd.DataFrame | None = None,
 ) -> FigureNumbers:
@@ -244,7 +222,7 @@ def figure_numbers(
     pairs = {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2, "ratio": seen.ratio}
     for quantity, pair in pairs.items():
         stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
-    return FigureNumbers(name, data, columns, scalars, stated | dict(quoted or {}), points)
+    return FigureNumbers(name, data, scalars, stated | dict(quoted or {}), points)
 
 
 # --- How far the published uncertainties of A, B and lambda move a curve --------------------------

@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 import asperity as asp
-from asperity.ledger import FigureNumbers, FigureTable, PaperFigure, Section
+from asperity.ledger import FigureNumbers, PaperFigure, Section
 from asperity_papers.bureau2000 import harmonics, mean, motion, schematics, stability
-from asperity_papers.bureau2000.curves import COLUMNS, WORDS
+from asperity_papers.bureau2000.curves import WORDS
 from asperity_papers.bureau2000.machine import PAPER, Machine
+from asperity_papers.bureau2000.recordings import SimulatedPoints, experiment_in_background
 from asperity_papers.bureau2000.virtual import (
-    POINT_COLUMNS,
     VIRTUAL,
-    SimulatedPoints,
     VirtualFigure,
-    experiment_in_background,
+    introduction,
+    provenance,
+    recovered_table,
 )
-from asperity_papers.bureau2000.virtual.figures import introduction, provenance, recovered_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,8 +73,7 @@ def _of_the_paper() -> Section:
 
 
 def _schematic(name: str) -> PaperFigure:
-    nothing = FigureNumbers(name, pd.DataFrame(), {})
-    return WORDS.figures[name].figure(nothing, (), lambda _: SCHEMATICS[name]())
+    return WORDS.figure(FigureNumbers(name, pd.DataFrame()), {}, lambda _: SCHEMATICS[name]())
 
 
 def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
@@ -92,8 +91,7 @@ def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
         "read off the curves:",
         *(f"  {name} = {value:.12g}" for name, value in numbers.scalars.items()),
     ]
-    table = FigureTable(numbers.name, numbers.data, head, numbers.columns)
-    return words.figure(numbers, (table,), draw)
+    return WORDS.figure(numbers, {numbers.name: (numbers.data, head)}, draw)
 
 
 def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
@@ -114,16 +112,11 @@ def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
 
 
 def _simulated(figure: VirtualFigure) -> PaperFigure:
-    numbers, words = figure.numbers, WORDS.figures[figure.numbers.name]
-
-    def table(name: str, what: str, data: Any, columns: Mapping[str, str]) -> FigureTable:
-        head = provenance(figure, words.place, what, PAPER.parameter_lines())
-        return FigureTable(name, data, head, columns)
-
-    return words.figure(
-        numbers,
-        (
-            table(numbers.name, "points", numbers.points, POINT_COLUMNS),
-            table(f"{numbers.name}-model", "the model's lines", numbers.data, COLUMNS),
-        ),
-    )
+    numbers, parameters = figure.numbers, PAPER.parameter_lines()
+    parts = (("", "points", figure.points), ("-model", "the model's lines", numbers.data))
+    place = WORDS.figures[numbers.name].place
+    tables = {
+        f"{numbers.name}{suffix}": (data, provenance(figure, place, what, parameters))
+        for suffix, what, data in parts
+    }
+    return WORDS.figure(numbers, tables)

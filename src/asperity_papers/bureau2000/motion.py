@@ -23,18 +23,6 @@ from asperity_papers.bureau2000.machine import EXT, EXT_AGE, Float, Machine
 #: Instants of the period: pulses of slip are a third of a radian wide and less.
 _SAMPLES = 512
 
-#: Columns of the table, with their units and meaning.
-PERIOD_COLUMNS = {
-    "curve": "name of the curve",
-    "law": "friction law",
-    "inertia": "whether the mass of the slider counts",
-    "phase": "1; time over the period, 0 at the largest load",
-    "load": "1; W/W0",
-    "force": "1; F/W0, the force of the pulling spring",
-    "velocity": "1; velocity of the slider over the pulling velocity",
-    "plastic_velocity": "1; plastic velocity of the joint over the pulling velocity",
-    "age": "1; V Phi/D0",
-}
 #: Curves: name to law, and whether the mass counts.
 PERIODS = {
     "age on the slider's velocity": (EXT, False),
@@ -68,7 +56,7 @@ def one_period(
     Returns
     -------
     DataFrame
-        With the columns of `PERIOD_COLUMNS` but "curve".
+        With the columns of figure 13 but "curve".
     """
     response = periodic_response(
         machine.slider(law), velocity=V, epsilon=epsilon, frequency=machine.numbers.frequency,
@@ -81,10 +69,10 @@ def period_figure(machine: Machine) -> FigureNumbers:
     """One period at 0.5 of modulation and 1 um/s, with both age laws and with inertia."""
     V, epsilon = machine.velocities[0], machine.stated().epsilon_eff
     tables = [
-        one_period(machine, law, V, epsilon, inertia=inertia).assign(curve=name)
-        for name, (law, inertia) in PERIODS.items()
+        one_period(machine, law, V, epsilon, inertia=inertia) for law, inertia in PERIODS.values()
     ]
-    data = pd.concat(tables, ignore_index=True)[list(PERIOD_COLUMNS)]
+    data = pd.concat(tables, keys=list(PERIODS), names=["curve"]).reset_index("curve")
+    data = data.reset_index(drop=True)
     drops = [float(rows["force"].mean()) - machine.mu_ss(V) for rows in tables]
     scalars = {
         "velocity_min": float(tables[0]["velocity"].min()),
@@ -95,7 +83,7 @@ def period_figure(machine: Machine) -> FigureNumbers:
         "drop_inertia": drops[2],
         "plastic_age_smaller_by": 1 - drops[1] / drops[0],
     }
-    return figure_numbers(machine, "figure-13", data, scalars, columns=PERIOD_COLUMNS)
+    return figure_numbers(machine, "figure-13", data, scalars)
 
 
 # --- The resonance of the slider on its asperities -----------------------------------------------

@@ -2,36 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from asperity import Slider, materials, transient
-from asperity.ledger import FigureNumbers, FigureTable, PaperFigure, figure_words
+from asperity.ledger import FigureNumbers, PaperFigure, figure_words
 from asperity.loads import Programme, Slide
 from asperity.materials import Material
 from asperity_papers.marone1998.checks.summaries import afterslip_relation
 from asperity_papers.marone1998.laboratory import AGEING, DECADE, LAWS, Laboratory, scans
-
-#: Columns of the tables; "1" is a pure number.
-COLUMNS: Mapping[str, str] = {
-    "curve": "name of the curve",
-    "load": "1; load displacement since the first step over Dc",
-    "friction": "1; friction coefficient less that before the first step",
-    "hold_time": "s; duration of the hold",
-    "healing": "1; static friction less the level of sliding before the hold",
-    "ageing": "1; healing of law D at the same hold time, spring and velocity",
-    "ageing_equal": "1; the same at 1 um/s",
-    "series": "which spring, or how read",
-    "healing_uncertainty": "1; error of the reading",
-    "over": "1; t0/th with t0 = 1 s, or V/V0 with V0 = 1 um/s",
-    "days": "d; time since the earthquake",
-    "slip": "mm; slip at h = 1.9 km",
-    "slip_uncertainty": "mm; a pixel",
-    "relation": "mm; the printed relation",
-}
 
 #: Friction of a law is drawn this much above the next one.
 OFFSET = 0.04
@@ -62,7 +44,7 @@ def figure_2(laboratory: Laboratory) -> FigureNumbers:
         shift = OFFSET * (len(LAWS) - 1 - n)
         rows.append(pd.DataFrame({"curve": letter, "load": load, "friction": friction + shift}))
     quoted = {"a": p.A_2 * DECADE, "b": p.B_2 * DECADE, "offset": OFFSET}
-    return FigureNumbers("figure-02", pd.concat(rows, ignore_index=True), COLUMNS, peaks, quoted)
+    return FigureNumbers("figure-02", pd.concat(rows, ignore_index=True), peaks, quoted)
 
 
 #: Curves of Figure 3: law, spring, and how they are called.
@@ -110,7 +92,7 @@ def figure_3(laboratory: Laboratory, times: np.ndarray | None = None) -> FigureN
         for name, column in (("actual", "ageing"), ("equal", "ageing_equal"))
     }
     data = pd.concat(rows, ignore_index=True)
-    return FigureNumbers("figure-03", data, COLUMNS, scalars, points=table)
+    return FigureNumbers("figure-03", data, scalars, points=table)
 
 
 def figure_5(laboratory: Laboratory) -> FigureNumbers:
@@ -127,7 +109,7 @@ def figure_5(laboratory: Laboratory) -> FigureNumbers:
         ignore_index=True,
     )
     slopes = {"static slope": -p.B_5 * DECADE, "dynamic slope": -p.B_less_A_5 * DECADE}
-    return FigureNumbers("figure-05", data, COLUMNS, slopes)
+    return FigureNumbers("figure-05", data, slopes)
 
 
 def figure_16(laboratory: Laboratory) -> FigureNumbers:
@@ -150,7 +132,7 @@ def figure_16(laboratory: Laboratory) -> FigureNumbers:
         }
     )
     scalars = {name: fit[name] for name in ("alpha", "beta", "rate", "worst")}
-    return FigureNumbers("figure-16", data, COLUMNS, scalars, points=points)
+    return FigureNumbers("figure-16", data, scalars, points=points)
 
 
 NUMBERS: Mapping[str, Callable[[Laboratory], FigureNumbers]] = {
@@ -163,16 +145,12 @@ NUMBERS: Mapping[str, Callable[[Laboratory], FigureNumbers]] = {
 
 def _figure(name: str) -> PaperFigure:
     numbers = NUMBERS[name](Laboratory(materials.load("marone1998")))
-    words = figure_words(__package__).figures[name]
-    head = ("Marone (1998), " + words.place, "computed from the numbers that are printed with it")
-    tables = [_table(name, numbers.data, head)]
+    words = figure_words(__package__)
+    paper = "Marone (1998), " + words.figures[name].place
+    tables = {name: (numbers.data, (paper, "computed from the numbers that are printed with it"))}
     if numbers.points is not None:
-        tables.append(_table(f"{name}-points", numbers.points, (head[0], "readings of the figure")))
+        tables[f"{name}-points"] = (numbers.points, (paper, "readings of the figure"))
     return words.figure(numbers, tables)
-
-
-def _table(name: str, data: pd.DataFrame, head: Sequence[str]) -> FigureTable:
-    return FigureTable(name, data, head, {c: COLUMNS[c] for c in data.columns})
 
 
 FIGURES = tuple(partial(_figure, name) for name in NUMBERS)

@@ -147,4 +147,6 @@ def test_even_grid_of_a_line_needs_nine_fifths_of_the_readings():
     np.testing.assert_array_equal(x[grid.rows], [-1, *x[[2, 4]], 1])
     design = np.array([2.0, 0, 0, 0, 0, 0, 2.0])
     # Mean square of -1, -1/3, 1/3, 1 is 5/9.
-    assert times_fewer(criterion, design, grid.readings(cost, 4)) == pytest.approx(9 / 5, rel=1e-5)
+    assert times_fewer(criterion, grid.readings(cost, 4), criterion.value(design)) == pytest.approx(
+        9 / 5, rel=1e-5
+    )

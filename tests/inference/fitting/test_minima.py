@@ -11,7 +11,7 @@ from asperity.inference.fitting.intervals import Profile
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.own_noise import with_noise
 from asperity.inference.objective import Objective, Residuals
-from asperity.inference.runs.term import NoiseState, RunTerm
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
@@ -217,19 +217,14 @@ class TwoNoises(RunTerm):
         self.sizes = self._raw(math.log(values["D0"]))[0]
         return True
 
-    def noise_state(self):
-        return NoiseState(tuple(self.sizes), 1.0, (1.0, 1.0))
-
-    def restore_noise(self, state):
-        self.sizes = np.array(state.models)
-
 
 def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
     term = TwoNoises()
     objective = Objective((term,), LAW, unknowns, {})
     near = [(np.array([SECOND - 0.02]), 1.0), (np.array([FIRST + 0.02]), 2.0)]
-    (best, chi2), (other, above) = with_noise(objective, near)[0]
+    (best, chi2), (other, above) = with_noise(objective, near, objective)[0]
+    (term,) = objective.terms
     # Under the noise of SECOND, FIRST is a maximum of chi-squared; its likelihood is the higher.
     np.testing.assert_allclose([best[0], other[0]], [FIRST, SECOND], atol=1e-3)
     assert above - chi2 == pytest.approx(2 * term.half * math.log(5), rel=1e-3)

@@ -15,7 +15,7 @@ from asperity.recording import Channel, Trace
 pytestmark = pytest.mark.slow
 
 FREE = ["A", "B", "D0"]
-#: The whole of it, and without parts of the first and the last segment.
+#: The whole of it, and without parts of the first or the last segment.
 WINDOWS = [(0.0, 140.0), (13.0, 140.0), (0.0, 120.0)]
 
 
@@ -37,18 +37,19 @@ def run():
 
 def over(run, friction):
     # Where the search begins is no question here.
-    return fit_windows(trace_of(run, friction), "rice-ruina", FREE, WINDOWS, start=TRUE, starts=1)
+    windows = WINDOWS[::2]
+    return fit_windows(trace_of(run, friction), "rice-ruina", FREE, windows, start=TRUE, starts=1)
 
 
 def test_a_disturbance_outside_some_windows_is_their_spread(run):
     calm = over(run, run.friction)
-    assert [f.converged for f in calm.fits] == [True] * 3
+    assert [f.converged for f in calm.fits] == [True] * 2
     for name, truth in TRUE.items():
         p = calm.parameters[name]
         assert p.interval_95[0] < truth < p.interval_95[1]
         assert min(p.values) <= p.value <= max(p.values)
         assert p.se == pytest.approx(np.hypot(p.se_noise, p.se_window))
-    # A hump that no trend describes, after the end of the third window; one of 0.02 hardly moves B.
+    # A hump that no trend describes, after the end of the second window: 0.02 hardly moves B.
     hump = 0.05 * np.clip((run.time - 121.0) / 19.0, 0, 1) ** 2
     bent = over(run, run.friction + hump)
     share = [o.parameters["B"].se_window / o.parameters["B"].se_noise for o in (calm, bent)]

@@ -20,8 +20,6 @@ from asperity.inference.posterior.density import Coordinates
 from asperity.inference.posterior.sampling import next_block, warmed_up, whitened_posterior
 from asperity.outputs import Interrupted
 
-INFINITE = math.inf
-
 
 def half_normal(z, data):
     """x = exp(z_0) half-normal, z_1 normal about x^2 / 4: curved, with its Jacobian."""
@@ -62,21 +60,16 @@ def test_where_the_density_cannot_be_computed_there_are_no_draws():
     assert z.std() == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "bounds", [(-INFINITE, INFINITE), (0.5, INFINITE), (-INFINITE, 0.5), (-1.0, 2.0)]
-)
-def test_coordinates_carry_densities_over(bounds):
-    found = Coordinates.of([bounds])
-    u = np.array([np.clip(0.7, bounds[0], bounds[1])]) - (0.3 if bounds[1] == 0.5 else 0.0)
-    np.testing.assert_allclose(found.to_u(found.to_q(u)), u, rtol=1e-12)
+def test_coordinates_carry_densities_over():
+    found = Coordinates(*(np.array([x]) for x in (-1.0, 2.0, False, 1.0, 0.0, 0.0)))
+    np.testing.assert_allclose(found.to_u(found.to_q(np.array([0.7]))), [0.7], rtol=1e-12)
 
     def carried(q):
         q = np.array([q])
         x = float(found.to_u(q)[0])
         return math.exp(-0.5 * x**2 + float(found.log_slope(q)[0]))
 
-    low, high = (np.clip(b, -12, 12) for b in bounds)
-    expected = quad(lambda x: math.exp(-0.5 * x**2), low, high)[0]
+    expected = quad(lambda x: math.exp(-0.5 * x**2), -1, 2)[0]
     assert quad(carried, -40, 40, limit=400, points=[0.0])[0] == pytest.approx(expected, rel=1e-6)
 
 
@@ -179,12 +172,12 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
     found = fit_of_steps(steps, options)
     (term,) = found.objective.terms
     assert found.observables["friction"][1] == samples
-    likelihood, data = term.likelihood(found.objective.names)
+    residuals, data = term.compiled(found.objective.names)
 
     @jax.jit
     @jax.value_and_grad
     def compiled_of(A):
-        return likelihood({**found.values, "A": A}, data)
+        return -0.5 * jnp.sum(residuals({**found.values, "A": A}, data) ** 2)
 
     def both(factor):
         values = found.values | {"A": factor * found.values["A"]}

@@ -12,6 +12,7 @@ from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
 from asperity.loads import Harmonic
 from asperity.orbit.mesh import equations
+from asperity.orbit.mesh.equations import read_orbit
 from asperity.orbit.mesh.mesh import (
     GAUSS,
     STAGES,
@@ -22,7 +23,6 @@ from asperity.orbit.mesh.mesh import (
     split,
 )
 from asperity.orbit.mesh.newton import ACCEPTED, Plane, solve, solve_in_plane
-from asperity.orbit.mesh.reading import read_orbit
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_problem, flatten
 from asperity.theory.adiabatic import adiabatic_growth

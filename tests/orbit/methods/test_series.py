@@ -9,12 +9,6 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.laws import ElastoPlastic, RiceRuina
-from asperity.orbit import Outcome, multipliers
-from asperity.orbit.floquet import log_multipliers
-from asperity.orbit.methods.series import series_orbits
-from asperity.orbit.multipliers import _monodromy_by_intervals, resolve_multipliers
-from asperity.orbit.solution import SearchOptions, Solution
-from asperity.slider.problem import Problem, flatten
 
 MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0
 Kc = (B - A) * W0 / D0
@@ -128,41 +122,6 @@ def test_pulses_are_left_to_other_methods():
     left = respond(10.0, 0.5, [0.3, 0.6, 0.9])
     assert not left.converged.any()
     assert np.isnan(left.mean_friction).all()
-
-
-def test_multipliers_interval_by_interval_are_those_of_the_whole():
-    """A product of maps is the same in whatever order neighbours are multiplied."""
-    found = respond(40.0, 1.4, 0.4)
-    assert found.converged
-    problem, _ = flatten(Problem(found.motion, found.load))
-    orbit = series_orbits(problem, 1)[0]
-    matrix, log_scale, log_determinant = _monodromy_by_intervals(problem, orbit, parts=9)
-    # The determinant knows nothing of the maps.
-    sign, by_maps = np.linalg.slogdet(matrix[..., 0])
-    assert sign == 1
-    assert by_maps + 2 * log_scale == pytest.approx(log_determinant, rel=1e-9)
-    logs = log_multipliers(matrix, log_scale, log_determinant)
-    # Of multipliers below 1e-12 no more was asked than that they vanish.
-    np.testing.assert_allclose(logs[:, 0], found.log_multipliers, atol=1e-6)
-
-
-def test_what_maps_kept_at_once_leave_unresolved_is_resolved_interval_by_interval(monkeypatch):
-    whole = respond(40.0, 1.4, 0.4)
-    problem, _ = flatten(Problem(whole.motion, whole.load))
-    orbit = series_orbits(problem, 1)[0]
-    intervals = orbit.mesh.shape[0] - 1
-    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)  # too coarse for this orbit
-    only = np.array([0])
-    found = Solution.empty(2, 1, SearchOptions(8, 0, lambda _: None))
-    found.outcome[:] = Outcome.MULTIPLIERS_NOT_RESOLVED
-    monkeypatch.setattr(multipliers, "_MOST_INTERVALS", 0)
-    resolve_multipliers(problem, found, orbit, only)
-    assert found.outcome[0] == Outcome.MULTIPLIERS_NOT_RESOLVED
-    monkeypatch.undo()
-    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)
-    resolve_multipliers(problem, found, orbit, only)
-    assert found.outcome[0] == Outcome.CONVERGED
-    np.testing.assert_allclose(found.log_multipliers[:, 0], whole.log_multipliers, atol=1e-6)
 
 
 def test_harmonics_near_round_off_are_left_to_methods_that_keep_their_digits():

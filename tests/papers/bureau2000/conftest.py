@@ -15,7 +15,7 @@ def figures():
 @pytest.fixture(scope="session")
 def experiment():
     """The virtual experiment, from the process that `asperity reproduce` has compute it."""
-    from asperity_papers.bureau2000.virtual import experiment_in_background
+    from asperity_papers.bureau2000.recordings import experiment_in_background
 
     with experiment_in_background() as readings:
         return readings()

@@ -27,8 +27,7 @@ def test_every_figure_with_curves_is_there(figures):
     numbers = (2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15)
     assert sorted(figures) == [f"figure-{n:02}" for n in numbers]
     for figure in figures.values():
-        assert list(figure.data.columns) == list(figure.columns)
-        words = WORDS.figures[figure.name].figure(figure, ())
+        words = WORDS.figure(figure, {})
         assert words.caption
         assert words.alt
     for figure in over_amplitude(figures):
@@ -270,4 +269,4 @@ def test_what_the_text_states():
 def test_a_point_that_fails_is_counted(figures):
     data = figures["figure-07"].data.copy()
     data.loc[3, "converged"] = False
-    assert FigureNumbers("x", data, {}).failed == 1
+    assert FigureNumbers("x", data).failed == 1

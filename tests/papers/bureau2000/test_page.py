@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from asperity.figures.style import save_picture, style
-from asperity.ledger import Claim, find_paper
+from asperity.ledger import Claim, FigureNumbers, find_paper
 from asperity.ledger.page import Plate, PlateGroup, build_page
 from asperity_papers.bureau2000.figures import SCHEMATICS
 
@@ -32,10 +33,11 @@ def address(tmp_path_factory):
     paper = find_paper("bureau2000")
     with style():
         plates = [
-            Plate(name, s.place, s.title, s.caption, s.alt,
-                  save_picture(draw(), folder / name)[0], (f"{name}.png",))
+            Plate(
+                paper.words.figure(FigureNumbers(name, pd.DataFrame()), {}),
+                save_picture(draw(), folder / name)[0], (f"{name}.png",),
+            )
             for name, draw in SCHEMATICS.items()
-            for s in [paper.words.figures[name]]
         ]  # fmt: skip
     group = PlateGroup("figures", "Figures", "", plates, "")
     found = claims(paper)

@@ -10,7 +10,8 @@ from scipy.stats import chi2
 from asperity.errors import InputError
 from asperity.figures.style import style
 from asperity.ledger.points import (
-    COLUMNS,
+    NUMBERS,
+    TEXTS,
     check_names,
     comparisons,
     draw_points,
@@ -34,6 +35,8 @@ ROW = {
     "source": "artificial",
 }
 
+HEADING = (*TEXTS, *NUMBERS)
+
 
 @pytest.fixture(scope="module")
 def figures(figures):
@@ -43,7 +46,7 @@ def figures(figures):
 
 def compared(points, figures):
     tables = [
-        with_curves([p for p in points if p.figure == name], own.data, OBSERVABLES[name], "p.csv")
+        with_curves(points[points["figure"] == name], own.data, OBSERVABLES[name], "p.csv")
         for name, own in figures.items()
     ]
     return pd.concat([table for table in tables if len(table)], ignore_index=True)
@@ -125,12 +128,11 @@ def write(folder, **changes):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"y": "much"}, "points.csv line 2: y must be a finite number, got 'much'"),
-        ({"y": "nan"}, "points.csv line 2: y must be a finite number, got 'nan'"),
-        ({"y_err": "0"}, "points.csv line 2: y_err must be positive, got 0"),
-        ({"y_err": "-1"}, "points.csv line 2: y_err must be positive, got -1"),
-        ({"source": ""}, "points.csv line 2: source must say where the point comes from"),
-        ({"extra": "1"}, "points.csv must have the columns figure, observable, .* got 'extra'"),
+        ({"y": "much"}, "points.csv, row 1 must have a number in column y, got 'much'"),
+        ({"y": "nan"}, "points.csv, y must be finite, got nan"),
+        ({"y_err": "0"}, "points.csv, row 1: y_err must be positive, got 0"),
+        ({"y_err": "-1"}, "points.csv, row 1: y_err must be positive, got -1"),
+        ({"source": ""}, "points.csv, row 1: source must say where the point comes from"),
     ],
 )
 def test_cells_that_break_a_rule(tmp_path, changes, sentence):
@@ -142,8 +144,8 @@ def test_cells_that_break_a_rule(tmp_path, changes, sentence):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"figure": "figure-2"}, "line 2: figure must be a figure with curves, got 'figure-2'"),
-        ({"observable": "mu3"}, "line 2: observable must be one of figure-02, got 'mu3'"),
+        ({"figure": "figure-2"}, "row 1: figure must be a figure with curves, got 'figure-2'"),
+        ({"observable": "mu3"}, "row 1: observable must be one of figure-02, got 'mu3'"),
     ],
 )
 def test_names_that_no_figure_has(tmp_path, changes, sentence):
@@ -157,14 +159,14 @@ def test_names_that_no_figure_has(tmp_path, changes, sentence):
     [
         ({"series": "2 um/s"}, "series must be a curve of figure-02, got '2 um/s'"),
         ({"x": "0.51"}, "x must lie on the curve, from 0 to 0.5 .*, got 0.51"),
-        ({"x": "wide"}, "line 2: x must be"),
+        ({"x": "wide"}, "row 1: x must be"),
         ({"figure": "figure-03", "observable": "mean_friction", "series": "eps = 0", "x": "10"},
-         "line 2: x must .*unit"),
+         "row 1: x must .*unit"),
     ],
 )  # fmt: skip
 def test_points_that_no_curve_has(figures, tmp_path, changes, sentence):
     points = read_points(write(tmp_path, **changes))
-    name = points[0].figure
+    name = points["figure"].iloc[0]
     with pytest.raises(InputError, match=sentence):
         with_curves(points, figures[name].data, OBSERVABLES[name], "points.csv")
 
@@ -172,11 +174,9 @@ def test_points_that_no_curve_has(figures, tmp_path, changes, sentence):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "points.csv must have a heading and a point a line, got nothing"),
-        ("# only a comment\n", "points.csv must have a heading and a point a line, got nothing"),
-        (",".join(COLUMNS) + "\n", "points.csv must have a point a line, got the heading alone"),
-        ("figure,x,y\n1,2,3\n", "points.csv must have each of the columns .* 0 times 'observable'"),
-        (",".join(COLUMNS) + "\n1,2\n", "points.csv line 2 must have 7 cells .* got 2"),
+        ("# only a comment\n", "points.csv must have a heading and a point a row, got 0 lines"),
+        (",".join(HEADING) + "\n", "points.csv must have a heading and a point a row, got 1 lines"),
+        ("figure,x,y\n1,2,3\n", "points.csv must have the columns .* none for y_err, observable"),
     ],
 )
 def test_files_that_are_no_points(tmp_path, text, sentence):
@@ -189,5 +189,5 @@ def test_files_that_are_no_points(tmp_path, text, sentence):
 def test_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\xd8")
     for path in (tmp_path, tmp_path / "missing.csv", tmp_path / "binary.csv"):
-        with pytest.raises(InputError, match="--data must be a CSV that can be read"):
+        with pytest.raises(InputError, match="data must be a CSV that can be read"):
             read_points(path)

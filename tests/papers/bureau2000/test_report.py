@@ -19,15 +19,20 @@ from asperity.ledger import Claim, Headline, Paper, Sensitivity, find_paper, rep
 from asperity.ledger.contents import SummaryWords
 from asperity.outputs import written_folder
 from asperity_papers.bureau2000 import figures as report_sections
-from asperity_papers.bureau2000 import virtual
-from asperity_papers.bureau2000.curves import COLUMNS
+from asperity_papers.bureau2000.curves import WORDS as FIGURE_WORDS
 from asperity_papers.bureau2000.figures import SCHEMATICS
-from asperity_papers.bureau2000.motion import PERIOD_COLUMNS
+from asperity_papers.bureau2000.recordings import all_series
 
 pytestmark = pytest.mark.slow
 
 FIGURES = [f"figure-{n:02}" for n in range(1, 16)]
 DRAWN = [name for name in FIGURES if name not in ("figure-01", "figure-10")]
+#: Columns of a table of curves.
+COLUMNS = [
+    *("curve", "law", "alpha", "lambda", "inertia", "damping", "V", "frequency"),
+    *("epsilon_applied", "epsilon_eff", "mean_friction", "delta_mu", "mu1", "mu2", "phase1"),
+    *("phase2", "floquet_max", "stable", "converged"),
+]
 VIRTUAL = [f"virtual-{n:02}" for n in (2, 3, 4, 5)]
 
 
@@ -166,20 +171,22 @@ def test_a_table_says_where_its_numbers_come_from(report, name):
     assert any("asperity" in line for line in head)
     assert any("D0 = 0.4 +- 0.04 um (published)" in line for line in head)
     data = pd.read_csv(path, comment="#")
-    assert list(data.columns) == list(PERIOD_COLUMNS if name == "figure-13" else COLUMNS)
+    period = ["curve", "law", "inertia", "phase", "load", "force", "velocity"]
+    period += ["plastic_velocity", "age"]
+    assert list(data.columns) == (period if name == "figure-13" else COLUMNS)
     assert all(any(line.startswith(f"#   {c}: ") for line in head) for c in data.columns)
     assert name == "figure-13" or data["converged"].all()
 
 
 @pytest.mark.parametrize("name", VIRTUAL)
 def test_tables_of_the_virtual_experiment_say_that_it_is_simulated(report, name):
-    for part, columns in (("", virtual.POINT_COLUMNS), ("-model", COLUMNS)):
+    for part, columns in (("", FIGURE_WORDS.point_column), ("-model", COLUMNS)):
         path = report[0] / "data" / f"{name}{part}.csv"
         text = path.read_text(encoding="utf-8")
         assert text.startswith("# SIMULATED")
         assert "no measured points" in text.splitlines()[0]
         head = [line for line in text.splitlines() if line.startswith("#")]
-        for series in virtual.all_series():
+        for series in all_series():
             if series.name in set(pd.read_csv(path, comment="#").get("series", [])):
                 seeds = ", ".join(map(str, series.seeds))
                 assert any(f"{series.name}, " in x and f"seeds {seeds};" in x for x in head)

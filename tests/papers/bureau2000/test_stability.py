@@ -87,9 +87,9 @@ class Equations:
         raise AssertionError("the reference integration found no periodic solution")
 
 
-@pytest.fixture(scope="module")
-def figure():
-    return stability.floquet_figure(Machine())
+@pytest.fixture
+def figure(figures):
+    return figures["figure-12"]
 
 
 def test_rice_ruina_is_stabilised_between_10_and_15_percent(figure):

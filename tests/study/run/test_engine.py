@@ -51,7 +51,7 @@ class Planted(Workers):
 def states_of(chunks: int, workers: Planted, lines: list[str] | None = None) -> list[SweepProgress]:
     """Progress each time that chunks have come back."""
     stored = len(workers.stored) * POINTS
-    progress = SweepProgress(total=chunks * POINTS, chunk_total=chunks, stored=stored)
+    progress = SweepProgress(Path(), total=chunks * POINTS, chunk_total=chunks, stored=stored)
     seen: list[SweepProgress] = []
     log = [].append if lines is None else lines.append
     solve_chunks(

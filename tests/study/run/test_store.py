@@ -22,9 +22,9 @@ from asperity.study import (
     store_status,
     summary_statistics,
 )
-from asperity.study.store import durable
+from asperity.study.store import root, store
 from asperity.study.store.layout import reset
-from asperity.study.store.lock import StoreLock
+from asperity.study.store.lock import store_lock
 from asperity.study.store.store import SweepStore
 from references.closed_form_sweep import ClosedForm, ThisProcess, files_of, plan_of
 
@@ -173,7 +173,8 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(durable, "sync_folder", full)
+        for module in (root, store):
+            patch.setattr(module, "sync_folder", full)
         with pytest.raises(InputError, match=r"the disk is full.*continues from there"):
             run(out)
     assert store_status(out).done < POINTS
@@ -221,8 +222,8 @@ def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -
     # A lock of another process of this machine: locks of one process do not exclude each other
     # on every system.
     script = (
-        "import sys, time, pathlib; from asperity.study.store.lock import StoreLock;"
-        "lock = StoreLock(pathlib.Path(sys.argv[1])); lock.acquire(); print('held', flush=True);"
+        "import sys, time, pathlib; from asperity.study.store.lock import store_lock;"
+        "lock = store_lock(pathlib.Path(sys.argv[1])); lock.__enter__(); print('held', flush=True);"
         "sys.stdin.read()"
     )
     run(out)
@@ -275,7 +276,7 @@ def test_a_worker_of_an_older_driver_writes_nothing(
     run(out)
     digest = json.loads((out / "zarr.json").read_text())["attributes"]["plan_sha256"]
     reset(out, SweepStore(out).grid, 0)
-    with StoreLock(out), pytest.raises(SupersededError):
+    with store_lock(out), pytest.raises(SupersededError):
         Job(str(out), digest, "the token of another driver")(0)
     assert SweepStore(out).failed_in(0) == -1
 
@@ -370,12 +371,12 @@ def test_an_interrupted_extension_is_not_read(tmp_path: Path, closed_form: Close
     out, longer = tmp_path / "s.zarr", plan_of(20, (1.0, 2.0, 3.0, 4.0))
     run(out)
     with pytest.MonkeyPatch.context() as patch:
-        # Behind the six syncs of the attributes, which say first that it is under way.
-        killed_at(9, patch)
+        # Behind the first files of the longer plan, and before its attributes.
+        killed_at(4, patch)
         with pytest.raises(Killed):
             run(out, plan=longer, extend_store=True)
     for answer in (store_status, summary_statistics, open_store):
-        with pytest.raises(InputError, match="must be completely extended"):
+        with pytest.raises(InputError, match=r"must be whole, .*repeat asperity sweep"):
             answer(out)
     run(out, plan=longer, extend_store=True)
     run(tmp_path / "whole.zarr", plan=longer)

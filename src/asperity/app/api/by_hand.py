@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from asperity.app.api.operating_point import law_class
 from asperity.app.endpoints import Answer, Question
 from asperity.errors import InputError
+from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
 from asperity.slider.named import slider_from
 from asperity.transients import transient
@@ -49,7 +49,7 @@ def model(question: Driven) -> dict[str, Any]:
     InputError
         If a number or a segment breaks its rule.
     """
-    law = law_class(question.law)
+    law = get_law(question.law)
     velocity = question.segments[0][1]
     if not velocity > 0:
         raise InputError("segments", "begin with sliding", f"{velocity:g} m/s", "cut the recording")

@@ -27,6 +27,7 @@ from asperity.parameters import (
     required,
     symbol_of,
 )
+from asperity.parameters.arguments import one_of
 from asperity.parameters.parameter import plain_text
 from asperity.units import KINDS, to_si
 
@@ -75,9 +76,9 @@ def as_json() -> str:
 
 
 @cache
-def known_materials() -> dict[str, Material]:
-    """The materials that come with the package: no other file is read for a request."""
-    return {name: materials.load(name) for name in packaged()}
+def package_material(name: str, field: str = "material") -> Material:
+    """A material that comes with the package: no other file is read for a request."""
+    return materials.load(one_of(name, packaged(), field))
 
 
 def mathml(latex: str, *, display: bool = False) -> str:

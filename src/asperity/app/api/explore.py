@@ -19,12 +19,11 @@ from asperity.app.api.operating_point import (
     OperatingPoint,
     borne_share,
     epsilon_on_contacts,
-    law_class,
     solve,
 )
 from asperity.app.endpoints import Answer, Job
 from asperity.app.jobs.threads import Preparation
-from asperity.laws import registered
+from asperity.laws import get_law, registered
 from asperity.orbit import (
     Outcome,
     PeriodicResponse,
@@ -87,7 +86,7 @@ def explore(question: Explored) -> dict[str, Any]:
     epsilon = epsilon_on_contacts(question, values)
     laws = list(dict.fromkeys([question.law, *question.laws]))
     for name in laws:
-        law_class(name)
+        get_law(name)
     answer: dict[str, Any] = {
         "numbers": values,
         "origins": {name: number.origin for name, number in numbers.items()},
@@ -99,7 +98,7 @@ def explore(question: Explored) -> dict[str, Any]:
         answer["preparing"] = waiting[0]
     if question.law in waiting:
         return answer
-    point = solve(law_class(question.law), values, epsilon, methods=_FAST, **_KEPT)
+    point = solve(question.law, values, epsilon, methods=_FAST, **_KEPT)
     answer["point"] = point_record(point, searched=False)
     grid = question.amplitudes()
     answer["amplitudes"] = grid
@@ -108,11 +107,6 @@ def explore(question: Explored) -> dict[str, Any]:
 
 
 _KEPT = {"harmonics": _HARMONICS, "waveform": _INSTANTS}
-
-
-def _moves_by_inertia(values: Mapping[str, float]) -> bool:
-    """Whether mass or damping counts: the fast method solves the quasi-static equations only."""
-    return bool(values.get("inertia", 0.0) or values.get("eta", 0.0))
 
 
 def _fast_curve(question: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
@@ -127,11 +121,12 @@ def _fast_curve(question: Explored, name: str, grid: np.ndarray) -> dict[str, An
 def _curve(
     name: str, others: tuple[tuple[str, float], ...], amplitudes: tuple[float, ...]
 ) -> dict[str, Any]:
-    law, values, grid = law_class(name), dict(others), np.array(amplitudes)
-    if not law.rate_dependent:
-        response = solve(law, {**values, "epsilon": 0.0}, grid)
+    values, grid = dict(others), np.array(amplitudes)
+    if not get_law(name).rate_dependent:
+        response = solve(name, values, grid)
         return {**{n: getattr(response, n) for n in _CURVES}, "left": []}
-    if _moves_by_inertia(values):
+    # The fast method solves the quasi-static equations only.
+    if values.get("inertia") or values.get("eta"):
         empty = np.full(len(grid), np.nan)
         return {**dict.fromkeys(_CURVES, empty), "left": list(range(len(grid)))}
     function = _function(name)
@@ -187,23 +182,19 @@ def stability_sentence(response: PeriodicResponse) -> str:
     if response.log_multipliers.shape[-1] == 0:
         return "no dynamics: the force follows the load"
     rate, turn = float(response.growth_rate), float(response.mode_frequency)
-    swings = f" swings at {_digits(turn)} Hz and" if turn > 0 else ""
+    swings = f" swings at {turn:.3g} Hz and" if turn > 0 else ""
     if bool(response.stable):
         # e^-3 is 5 %.
-        fades = f"fades to 5 % in {_digits(-3 / rate)} s" if rate else "stays"
+        fades = f"fades to 5 % in {-3 / rate:.3g} s" if rate else "stays"
         return f"stable: a small disturbance{swings} {fades}"
     kind = str(response.mode[()])
-    doubles = f"doubles in {_digits(np.log(2) / rate)} s" if rate else "stays"
+    doubles = f"doubles in {np.log(2) / rate:.3g} s" if rate else "stays"
     outcome = {
         "fold": "; the slip runs away or stops (a fold)",
         "period doubling": "; every second period becomes another (a period doubling)",
         "Neimark-Sacker": ": expect stick-slip (a Neimark-Sacker bifurcation)",
     }.get(kind, "")
     return f"unstable: a small disturbance{swings} {doubles}{outcome}"
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3g}"
 
 
 def _air(question: Explored, values: Mapping[str, float]) -> dict[str, Any] | None:
@@ -236,11 +227,8 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     question = Explored.model_validate(argument)
     values = question.values()
     epsilon = epsilon_on_contacts(question, values)
-
-    def on_progress(done: int, points: int) -> None:
-        report()
-
-    point = solve(law_class(question.law), values, epsilon, progress=on_progress, **_KEPT)
+    on_progress = lambda done, points: report()  # noqa: E731
+    point = solve(question.law, values, epsilon, progress=on_progress, **_KEPT)
     report(point=point_record(point, searched=True))
     grid = question.amplitudes()
     for name in dict.fromkeys([question.law, *question.laws]):
@@ -248,7 +236,7 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
         numbers = question.values(name)
         for start in range(0, len(left), _STEP):
             rows = left[start : start + _STEP]
-            result = solve(law_class(name), numbers, grid[rows], progress=on_progress)
+            result = solve(name, numbers, grid[rows], progress=on_progress)
             values_there = {n: getattr(result, n) for n in _CURVES}
             reasons = [str(text) for text in result.result]
             report(
@@ -275,7 +263,7 @@ def _prepare(name: str, amplitudes: tuple[float, ...]) -> None:
     question = Explored.model_validate({"law": name, "numbers": numbers})
     values = question.values()
     for epsilon in amplitudes:
-        solve(law_class(name), values, epsilon, methods=_FAST, **_KEPT)
+        solve(name, values, epsilon, methods=_FAST, **_KEPT)
     _fast_curve(question, name, question.amplitudes())
 
 

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from asperity.app.api.catalogue import known_materials
+from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
-from asperity.errors import InputError, closest, naming
+from asperity.errors import naming, require
 from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
@@ -103,29 +103,21 @@ class Fitted(Question, FitOptions):
 
 def check(question: Fitted) -> None:
     """Raise `InputError` for what cannot be fitted, before a process is started."""
-    from asperity.laws import get_law, registered
+    from asperity.laws import get_law
 
     for law in question.laws:
-        get_law(law) if law in registered() else _refuse_law(law, registered())
+        get_law(law)
     published = [name for name, prior in question.prior.items() if prior is None]
     for field, chosen in (("material", question.material), *(("prior", p) for p in published)):
-        if chosen is not None and chosen not in known_materials():
-            raise InputError(
-                f"{field} must be one of the package's, got '{chosen}'; "
-                f"{closest(chosen, known_materials())}"
-            )
-    if not question.tables and not question.rows and not question.runs:
-        raise InputError(
-            "data must hold readings or a recording, got none; drop a recording or a table"
-        )
+        if chosen is not None:
+            package_material(chosen, field)
+    some, advice = question.tables or question.rows or question.runs, "drop a recording or a table"
+    require(some, "data", "hold readings or a recording", "none", advice)
     if question.posterior:
         from asperity.inference.posterior import require_bayes
 
-        if len(question.laws) > 1:
-            raise InputError(
-                f"posterior must be that of one law, got {len(question.laws)}; "
-                "fit the laws one by one"
-            )
+        count, advice = len(question.laws), "fit the laws one by one"
+        require(count == 1, "posterior", "be that of one law", count, advice)
         require_bayes()
 
 
@@ -134,10 +126,6 @@ def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
     files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
     return {"asked": question.model_dump(mode="json"), "files": places}
-
-
-def _refuse_law(law: str, known: Mapping[str, Any]) -> None:
-    raise InputError(f"law must be a registered one, got '{law}'; {closest(law, known)}")
 
 
 def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
@@ -289,14 +277,13 @@ def _report(result: Any, posterior: Any = None) -> str:
     """The folder of a fit or a comparison, as ``--report`` writes it: a ZIP file in base64."""
     from asperity import fit_report, inference
 
-    one = not isinstance(result, inference.Comparison)
     packed = io.BytesIO()
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
         target = Path(folder) / "report"
-        if one:
-            fit_report.write_report(target, result, posterior)
-        else:
+        if isinstance(result, inference.Comparison):
             fit_report.write_comparison(target, result)
+        else:
+            fit_report.write_report(target, result, posterior)
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(target.iterdir()):
                 archive.write(path, f"report/{path.name}")

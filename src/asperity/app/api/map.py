@@ -11,7 +11,7 @@ from pydantic import Field
 from asperity.app.api import recipes
 from asperity.app.api.operating_point import Name, OperatingPoint, Value
 from asperity.app.endpoints import Answer, Job, Question
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
 from asperity.study.map import SHOWN, Axis, response_map
@@ -64,16 +64,11 @@ class MapQuestion(OperatingPoint):
 
 def check(question: MapQuestion) -> None:
     """Raise `InputError` for what cannot be mapped, before a process is started."""
-    if question.air is not None:
-        raise InputError(
-            "map.air must be left out, got an air layer; a map has epsilon on the contacts"
-        )
+    advice, axes = "a map has epsilon on the contacts", "choose another one for y"
+    require(question.air is None, "map.air", "be left out", "an air layer", advice)
     one_of(question.show, SHOWN, "map.show")
     x, y = question.axes(2)
-    if x.name == y.name:
-        raise InputError(
-            f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
-        )
+    require(x.name != y.name, "axes", "be two numbers", f"'{x.name}' on both", axes)
     refuse_foreign(question.law, {x.name: "", y.name: ""})
     question.fixed()
     for axis in (x, y):
@@ -123,11 +118,8 @@ def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
     numbers = {"V": 1e-6, "frequency": 120.0}
     question = MapQuestion.model_validate({"law": "rice-ruina", "numbers": numbers, **sides})
     x, y = question.axes(_COARSE)
-
-    def on_progress(done: int, points: int) -> None:
-        report()
-
-    response_map(question.law, question.fixed(), x=x, y=y, boundary=False, progress=on_progress)
+    ongoing = lambda done, points: report()  # noqa: E731
+    response_map(question.law, question.fixed(), x=x, y=y, boundary=False, progress=ongoing)
     return {}
 
 

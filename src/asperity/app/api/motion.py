@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts, law_class
+from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Job
 from asperity.errors import InputError
+from asperity.laws import get_law
 from asperity.loads import Modulate, Programme, Slide
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, integrate_blocks
@@ -84,7 +85,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
         If the law follows the load without dynamics.
     """
     question = Motion.model_validate(argument)
-    law, values = law_class(question.law), question.values()
+    law, values = get_law(question.law), question.values()
     if not law.rate_dependent:
         raise InputError("law", "have dynamics", f"'{question.law}'", "its force follows the load")
     epsilon = epsilon_on_contacts(question, values)
@@ -115,7 +116,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     record: dict[str, Any] = {}
     for block in blocks:
         parts.append(block)
-        whole = _joined(parts)
+        whole = Trajectory.joined(parts)
         cycles = stick_slip(whole, V, window) if unstable else None
         record = _record(whole, values, inertia, cycles)
         if block.termination is not None:
@@ -133,28 +134,12 @@ def _duration(values: Mapping[str, float], epsilon: float, rate: float | None) -
     if rate is not None and rate > 0:
         cycle = _DROP * values["W0"] / (values["K"] * values["V"])
         return float(_CYCLES * cycle + _FOLDS / rate)
-    settling = (
-        _FOLDS / -rate if rate else 10 * values["D0"] / values["V"] if "D0" in values else 1.0
-    )
+    way = 10 * values["D0"] / values["V"] if "D0" in values else 1.0
+    settling = _FOLDS / -rate if rate else way
     if epsilon == 0:
         return float(settling)
     period = 1 / values["frequency"]
     return float(np.clip(settling, _FEWEST_PERIODS * period, _MOST_PERIODS * period))
-
-
-class _Whole(NamedTuple):
-    """Columns of the motion so far: time (s), F, W (N), velocity (m/s), displacement (m)."""
-
-    time: Array
-    force: Array
-    load: Array
-    velocity: Array
-    displacement: Array
-
-
-def _joined(parts: list[Trajectory]) -> _Whole:
-    columns = (np.concatenate([getattr(p, n) for p in parts]) for n in _Whole._fields)
-    return _Whole(*columns)
 
 
 def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
@@ -196,7 +181,7 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
 
 
 def _record(
-    whole: _Whole, values: Mapping[str, float], inertia: bool, cycles: Cycles | None
+    whole: Trajectory, values: Mapping[str, float], inertia: bool, cycles: Cycles | None
 ) -> dict[str, Any]:
     """Curves of the motion so far, and what it is."""
     time, W0, V = whole.time, values["W0"], values["V"]

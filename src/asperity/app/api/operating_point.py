@@ -9,16 +9,22 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from asperity.air import AirLayer, effective_modulation, modulation_phase
-from asperity.app.api.catalogue import AIR, around, known_materials, slider
+from asperity.app.api.catalogue import AIR, around, package_material, slider
 from asperity.app.endpoints import Question
-from asperity.errors import InputError, closest
-from asperity.laws import Law, get_law, registered
+from asperity.errors import InputError, require
+from asperity.laws import get_law, registered
 from asperity.materials import Material
-from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
-from asperity.orbit import PeriodicResponse, periodic_response
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    numbers_for,
+    refuse_foreign,
+    respond,
+    sourced_numbers,
+)
+from asperity.orbit import PeriodicResponse
 from asperity.parameters import obeying, point_parameters
-from asperity.questions.point import Point
-from asperity.slider.named import slider_from
+from asperity.parameters.arguments import one_of
 from asperity.units import KINDS
 
 #: A number that is written into a field may lie beyond its slider's ends by this factor, and where
@@ -55,13 +61,7 @@ class OperatingPoint(Question):
 
     def chosen_material(self) -> Material:
         """The material, which must be one of the package."""
-        known = known_materials()
-        if self.material not in known:
-            raise InputError(
-                f"material must be one of the package's, got '{self.material}'; "
-                f"{closest(self.material, known)}"
-            )
-        return known[self.material]
+        return package_material(self.material)
 
     def sourced(self, law: str | None = None) -> dict[str, SourcedNumber]:
         """Numbers of the point with their sources, for its law or for another law."""
@@ -74,8 +74,9 @@ class OperatingPoint(Question):
         known = point_parameters(get_law(law))
         others = {n for result in registered().values() for n in point_parameters(result)}
         given = {n: v for n, v in self.numbers.items() if n in known or n not in others}
-        material = self.chosen_material().name
-        result = point_numbers(Point(law=law, material=material, parameters=given), "page")
+        refuse_foreign(law, given)
+        offered = sourced_numbers(given, self.chosen_material(), "page", law)
+        result = numbers_for(law, offered)
         for name in given:
             if name in result:
                 self.check_reach(name, result[name].value)
@@ -96,8 +97,7 @@ class OperatingPoint(Question):
         material = self.chosen_material()
         numbers = dict(self.air or {})
         for name in numbers:
-            if name not in AIR:
-                raise InputError(f"air must have known numbers, got '{name}'; {closest(name, AIR)}")
+            one_of(name, AIR, "air")
         result = {
             n: float(obeying(numbers.get(n, material[n].si), n, material[n].dimension, "positive"))
             for n in AIR
@@ -113,37 +113,21 @@ def _check_reach(name: str, value: float, range_: Mapping[str, Any], kind: str) 
     low = low or range_["high"] / _BELOW
     if value == 0 or low <= abs(value) <= high:
         return
-    unit = KINDS[kind].si
-    ends = " to ".join(f"{end:.3g} {unit}".strip() for end in (low, high))
-    raise InputError(
-        f"{name} must be from {ends} on the page, got {f'{value:.3g} {unit}'.strip()}; the library "
-        "and the commands take others"
-    )
-
-
-def law_class(name: str) -> type[Law]:
-    """The law of a name."""
-    result: type[Law] = get_law(name)
-    return result
+    low, high, got = (f"{end:.3g} {KINDS[kind].si}".strip() for end in (low, high, value))
+    rule = f"be from {low} to {high} on the page"
+    raise InputError(name, rule, got, "the library and the commands take others")
 
 
 def borne_share(point: OperatingPoint, values: Mapping[str, float], frequency: Any) -> Any:
     """The share of the load's modulation that the contacts bear, and its phase (rad)."""
-    layer, contact = air_arguments(point.air_values(), values)
+    air = point.air_values()
+    layer = AirLayer(P0=air["P0"], h0=air["h0"], eta=air["eta_air"], R=air["R"])
+    contact = {"W0": values["W0"], "M": values.get("M", 0.0), "lambda_z": air["lambda_z"]}
     with np.errstate(all="ignore"):  # numbers at the ends of the range have no share
         return (
             effective_modulation(frequency, layer=layer, **contact),
             modulation_phase(frequency, layer=layer, **contact),
         )
-
-
-def air_arguments(
-    air: Mapping[str, float], values: Mapping[str, float]
-) -> tuple[AirLayer, dict[str, float]]:
-    """The air layer, and the numbers of the contacts that bear the load together with it."""
-    layer = AirLayer(P0=air["P0"], h0=air["h0"], eta=air["eta_air"], R=air["R"])
-    mass = values.get("M", 0.0)
-    return layer, {"W0": values["W0"], "M": mass, "lambda_z": air["lambda_z"]}
 
 
 def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> float:
@@ -158,30 +142,15 @@ def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> f
         return values["epsilon"]
     share, _ = borne_share(point, values, values["frequency"])
     result = float(share) * values["epsilon"]
-    if not np.isfinite(result):
-        raise InputError(
-            "air must have numbers that leave a share of the modulation, got a share out of range; "
-            "bring pressure, gap, radius and viscosity nearer to the material's"
-        )
-    if not result < 1:
-        raise InputError(
-            f"epsilon on the contacts must be below 1, got {result:g}; the air layer and the mass "
-            "resonate: lower epsilon or change the frequency"
-        )
+    rule = "have numbers that leave a share of the modulation"
+    advice = "bring pressure, gap, radius and viscosity nearer to the material's"
+    require(np.isfinite(result), "air", rule, "a share out of range", advice)
+    advice = "the air layer and the mass resonate: lower epsilon or change the frequency"
+    require(result < 1, "epsilon on the contacts", "be below 1", f"{result:g}", advice)
     return result
 
 
-def solve(
-    law: type[Law], values: Mapping[str, float], epsilon: Any, **options: Any
-) -> PeriodicResponse:
+def solve(law: str, values: Mapping[str, float], epsilon: Any, **options: Any) -> PeriodicResponse:
     """Periodic response of one point, or of several amplitudes."""
-    damping = values.get("eta", 0.0)
-    return periodic_response(
-        slider_from(law, values),
-        velocity=values["V"],
-        epsilon=np.asarray(epsilon, dtype=float),
-        frequency=values["frequency"],
-        inertia=bool(values.get("inertia", 0.0)),
-        radiation_damping=damping if damping > 0 else None,
-        **options,
-    )
+    numbers = {**values, "epsilon": np.asarray(epsilon, dtype=float)}
+    return respond(get_law(law), numbers, **options)

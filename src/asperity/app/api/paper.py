@@ -7,15 +7,17 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
 from asperity.app.api.operating_point import Name, Value
 from asperity.app.endpoints import Answer, Job, Question
 from asperity.app.jobs.threads import Preparation
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, require
 from asperity.ledger import Paper, altered, available, find_paper
 from asperity.materials import Material
 from asperity.parameters import obeying
+from asperity.parameters.arguments import one_of
 from asperity.units import KINDS, from_si
 
 #: A slider without stated ends covers this factor on both sides of the printed number.
@@ -145,11 +147,7 @@ def _slider(paper: Paper, name: str) -> dict[str, Any]:
 def check(question: MovedFigure) -> None:
     """Raise `InputError` for what cannot be drawn, before a process is started."""
     known = _paper(question.paper).tab
-    if question.figure not in known:
-        raise InputError(
-            f"figure must be one of the paper's with curves, got '{question.figure}'; "
-            f"{closest(question.figure, known)}"
-        )
+    one_of(question.figure, known, "figure")
     _changes(question)
 
 
@@ -164,19 +162,15 @@ def _changes(question: MovedFigure) -> dict[str, float]:
     known = paper.words.figures[question.figure].numbers
     changes = {}
     for name, value in question.numbers.items():
-        if name not in known:
-            raise InputError(
-                f"numbers must be those of the figure, got '{name}'; {closest(name, known)}"
-            )
+        one_of(name, known, "numbers")
         number, slider = paper.numbers[name], paper.words.slider.get(name)
         si = float(obeying(value, name, number.dimension, "positive"))
-        if slider is not None and not si <= slider.high:
-            raise InputError(f"{name} must be at most {slider.high:g}, got {si:g}; lower it")
-        if not number.si / _BEYOND <= si <= number.si * _BEYOND:
-            raise InputError(
-                f"{name} must be within a factor of {_BEYOND:g} of the printed {number}, got "
-                f"{f'{si:.3g} {KINDS[number.dimension].si}'.strip()}; move it nearer"
-            )
+        high = np.inf if slider is None else slider.high
+        require(si <= high, name, f"be at most {high:g}", f"{si:g}", "lower it")
+        near = number.si / _BEYOND <= si <= number.si * _BEYOND
+        rule = f"be within a factor of {_BEYOND:g} of the printed {number}"
+        got = f"{si:.3g} {KINDS[number.dimension].si}".strip()
+        require(near, name, rule, got, "move it nearer")
         changes[name] = float(from_si(si, number.unit, number.dimension))
     return changes
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import keyword
 from collections.abc import Mapping
 
-from asperity.app.api.operating_point import OperatingPoint, law_class
+from asperity.app.api.operating_point import OperatingPoint
+from asperity.laws import get_law
+from asperity.materials import Material
 from asperity.parameters import law_parameters, point_parameters
 from asperity.study.map import Axis
 from asperity.units import format_si, to_si
@@ -29,7 +31,9 @@ def explore(point: OperatingPoint, values: Mapping[str, float], epsilon: float) 
     epsilon : float
         On the contacts.
     """
-    return {"python": _python(point, values), "command": _command(point, values, epsilon)}
+    options = _command_of_point(point, {**values, "epsilon": epsilon})
+    command = f"asperity response {' '.join(options)}"
+    return {"python": _python(point, values), "command": command}
 
 
 def plane(
@@ -46,14 +50,15 @@ def plane(
     show : str
         Quantity of the picture.
     """
-    law = law_class(point.law)
+    law = get_law(point.law)
     known = point_parameters(law)
     numbers = ", ".join(f'"{n}": {v!r}' for n, v in fixed.items() if v != known[n].default)
-    axes = [
-        f'    {side}=Axis("{a.name}", {float(a.low)!r}, {float(a.high)!r}, {a.count}'
-        + (", log=True" if a.log else "") + "),"
-        for side, a in (("x", x), ("y", y))
-    ]  # fmt: skip
+    axes, parts = [], _command_of_point(point, fixed)
+    for side, a in (("x", x), ("y", y)):
+        low, high, log = float(a.low), float(a.high), ", log=True" if a.log else ""
+        axes.append(f'    {side}=Axis("{a.name}", {low!r}, {high!r}, {a.count}{log}),')
+        ends = f"{low!r}:{high!r}:{a.count} {a.unit}".rstrip()
+        parts.append(f'--{side} "{a.name}={ends}"' + (f" --log-{side}" if a.log else ""))
     python = [
         "import asperity as asp",
         "from asperity.study.map import Axis",
@@ -66,35 +71,21 @@ def plane(
         ")",
         f'print(result["{show}"])',
     ]
-    parts = _command_of_point(point, fixed)
-    for side, a in (("x", x), ("y", y)):
-        ends = f"{float(a.low)!r}:{float(a.high)!r}:{a.count} {a.unit}".rstrip()
-        parts.append(f'--{side} "{a.name}={ends}"' + (f" --log-{side}" if a.log else ""))
     parts += ["--out map.nc", "--plot map.png", f"--show {show}"]
-    return {
-        "python": "\n".join(python) + "\n",
-        "command": "asperity map " + " ".join(parts),
-    }
+    return {"python": "\n".join(python) + "\n", "command": f"asperity map {' '.join(parts)}"}
 
 
 def _python(point: OperatingPoint, values: Mapping[str, float]) -> str:
     material = point.chosen_material()
-    law = law_class(point.law)
-    changed = {
-        name: values[name]
-        for name in law_parameters(law)
-        if name not in material or material[name].value is None or material[name].si != values[name]
-    }
+    law = get_law(point.law)
+    changed = [n for n in law_parameters(law) if _published(material, n) != values[n]]
     known = point_parameters(law)
 
     def text(name: str) -> str:
         value = exact_text(values[name], known[name].kind)
         return f'"{value}"' if known[name].unit else value
 
-    law_numbers = "".join(
-        f", {name}_={text(name)}" if keyword.iskeyword(name) else f", {name}={text(name)}"
-        for name in changed
-    )
+    law_numbers = "".join(f", {n}{'_' * keyword.iskeyword(n)}={text(n)}" for n in changed)
     lines = [
         "import asperity as asp",
         "",
@@ -131,14 +122,15 @@ def _python(point: OperatingPoint, values: Mapping[str, float]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _command(point: OperatingPoint, values: Mapping[str, float], epsilon: float) -> str:
-    return "asperity response " + " ".join(_command_of_point(point, {**values, "epsilon": epsilon}))
+def _published(material: Material, name: str) -> float | None:
+    """The number of a material in SI."""
+    return material[name].si if name in material and material[name].value is not None else None
 
 
 def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> list[str]:
     """Options of the numbers that differ from the material's."""
     material = point.chosen_material()
-    known = point_parameters(law_class(point.law))
+    known = point_parameters(get_law(point.law))
     parts = [f"--law {point.law} --material {material.name}"]
     for name, option in (("V", "-V"), ("epsilon", "-e"), ("frequency", "-f")):
         if name in values:
@@ -148,8 +140,7 @@ def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> lis
     if values.get("eta"):
         parts.append(f'--radiation-damping "{exact_text(values["eta"], "damping")}"')
     for name in (n for n in values if n not in {"V", "epsilon", "frequency", "inertia", "eta"}):
-        published = name in material and material[name].value is not None
-        usual = material[name].si if published else known[name].default
-        if values[name] != usual:
+        published = _published(material, name)
+        if values[name] != (known[name].default if published is None else published):
             parts.append(f'--set "{name}={exact_text(values[name], known[name].kind)}"')
     return parts

@@ -11,14 +11,12 @@ from collections.abc import AsyncGenerator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from asperity.app.jobs.threads import BUSY
+
 #: Longest message of a worker (bytes).
 _LONGEST = 64 * 1024**2
 #: Time (s) within which a cancelled job must stop.
 _PATIENCE = 1.0
-
-
-class Busy(Exception):  # noqa: N818
-    """Too many jobs wait."""
 
 
 class Jobs:
@@ -85,13 +83,11 @@ class Jobs:
         seconds : float
             After which the job is ended.
 
-        Raises
-        ------
-        Busy
-            If too many jobs wait.
+        Where too many jobs wait, the one message says so.
         """
         if self._waiting >= self._most:
-            raise Busy
+            yield {"error": BUSY, "done": True}
+            return
         newer = asyncio.Event()
         earlier = self._current.pop(client, None)
         if earlier is not None:

@@ -10,13 +10,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
+from starlette.exceptions import HTTPException
 
-class Superseded(Exception):  # noqa: N818
-    """A newer request of the same client replaced this request."""
-
-
-class Busy(Exception):  # noqa: N818
-    """Too many clients wait."""
+BUSY = "too many computations wait; try again in a while"
+_SUPERSEDED = "a newer request took the place of this one"
 
 
 class _Waiting(NamedTuple):
@@ -28,7 +25,7 @@ class Lane:
     """Threads for short computations.
 
     A client has at most one request waiting: a newer request replaces it, and the older one is
-    `Superseded`. Clients are served in the order in which they began to wait: a client that sends
+    refused. Clients are served in the order in which they began to wait: a client that sends
     requests without pause gets no more turns than others.
 
     Parameters
@@ -49,17 +46,17 @@ class Lane:
 
         Raises
         ------
-        Superseded, Busy
-            Instead of a result.
+        HTTPException
+            409 where a newer request took the place of this one, 503 where too many clients wait.
         """
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         earlier = self._waiting.get(client)
         if earlier is None and len(self._waiting) >= self._most:
-            raise Busy
+            raise HTTPException(503, BUSY)
         # The place in the queue stays that of the earlier request.
         self._waiting[client] = _Waiting(work, answer)
         if earlier is not None and not earlier.answer.done():
-            earlier.answer.set_exception(Superseded())
+            earlier.answer.set_exception(HTTPException(409, _SUPERSEDED))
         self._start()
         return await answer
 

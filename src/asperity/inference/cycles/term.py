@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
 from asperity.inference.cycles.cycle import AveragedCycle
-from asperity.inference.objective import Likelihood, Residuals
-from asperity.inference.unknowns import Unknown
+from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.slider.named import slider_from
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
@@ -29,7 +27,7 @@ _NO_SHIFT = 1e-4
 _IRREGULAR = 2.0
 
 
-class CycleTerm:
+class CycleTerm(DataTerm):
     """The averaged cycle of a recording as a `DataTerm` of an objective.
 
     A constant friction and a shift in time are fitted within: neither the level of the gauge nor
@@ -43,28 +41,19 @@ class CycleTerm:
         Parameters of law and machine that are not free, in SI.
     """
 
-    nuisances: tuple[Unknown, ...] = ()
-    searches = None
-    affordable = 256
     observables = (CYCLE,)
-    profiled = 0
     failure = (
         "no start has stick-slip that repeats itself; give start values nearer to those of the "
         "interface"
     )
 
     def __init__(self, cycle: AveragedCycle, law: type[Law], fixed: Mapping[str, Any]) -> None:
-        self.cycle, self.law = cycle, law
+        self.cycle, self.law, self.name = cycle, law, cycle.name
         self._fixed = {n: float(v) for n, v in fixed.items() if np.ndim(v) == 0}
         widths = np.diff(cycle.edges)
         shares = (np.arange(_IN_BIN) + 0.5) / _IN_BIN
         self._times = (cycle.edges[:-1, None] + widths[:, None] * shares).ravel()
         self._near: LimitCycle | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the recording."""
-        return self.cycle.name
 
     @property
     def noise(self) -> Mapping[str, Any]:
@@ -160,30 +149,10 @@ class CycleTerm:
                 result.append(np.inf)
         return np.array(result)
 
-    def likelihood(self, names: tuple[str, ...]) -> tuple[Likelihood, Any]:
-        """Not there: compiled samplers take gradients that a limit cycle has not."""
-        raise InputError(
-            f"a posterior must be of lock-in readings or recordings of sliding, got the stick-slip "
-            f"of {self.name}; take intervals by profile likelihood (profile=True, --profile)"
-        )
-
-    def thinned(self, rows: int, data: int = 0) -> None:
-        """Nothing: one cycle is evaluated as a whole."""
-        return
-
-    def uncertainty_of_noise(
-        self, values: Mapping[str, float], slopes: Float, covariance: Float
-    ) -> tuple[Float, Float]:
-        """Nothing: the scatter of the cycles is known without the law."""
-        return np.zeros_like(covariance), np.zeros(len(covariance))
-
     def observed(self) -> Mapping[str, Float]:
         """Bins of the averaged cycle."""
         middles = (self.cycle.edges[1:] + self.cycle.edges[:-1]) / 2
         return {"time": middles, CYCLE: self.cycle.values[:-1]}
-
-    def use_search(self, always: bool) -> None:
-        """There is one method."""
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()

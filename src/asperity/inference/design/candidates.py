@@ -1,4 +1,4 @@
-"""Operating points of a plan at which the slider slides steadily, and why the others are left out.
+"""Operating points of a plan at which the slider slides steadily, and what a law predicts there.
 
 A reading needs a periodic response that is found and stable: an unstable one drifts into stick-slip
 and is never measured.
@@ -6,18 +6,22 @@ and is never measured.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from asperity.inference.design.plan import DesignPlan, Hypothesis
-from asperity.inference.tables.term import on_contacts
-from asperity.orbit import Outcome, periodic_response, response_function
+from asperity.inference.design.plan import DesignPlan, expected_values
+from asperity.inference.objective import Objective
+from asperity.inference.tables.residuals import Prediction, residuals_of, weights_of
+from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.term import Forward, LockInTerm, on_contacts
+from asperity.orbit import Outcome, periodic_response
 from asperity.parameters.parameter import RULES
 from asperity.slider.named import slider_from
 
@@ -25,8 +29,8 @@ Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Progress = Callable[[int, int, str], None]
 
-#: Points per call of the slow search: between two calls progress is reported.
-_BLOCK = 32
+#: Points per call of a solver: between two calls progress is reported.
+_BLOCK = 128
 #: Why a point is no candidate although its response was found.
 UNSTABLE = "its periodic response is unstable: stick-slip"
 _CUT = (":", ";", " epsilon = ")
@@ -42,31 +46,46 @@ class Candidates:
         V, epsilon (as applied), frequency, and other axes of the plan, in SI.
     index : int array, shape (n,)
         Number of each among all combinations of the plan.
-    slow : bool array, shape (n,)
-        Points that the fast method does not solve.
     total : int
         Number of combinations.
     left_out : mapping of str to int
         Reasons, each with its number of combinations.
     draws : tuple of mapping of str to float
-        Values of the free parameters over which the design is averaged; the expected ones alone
-        if there are no draws.
+        Values of the free parameters over which the design is averaged.
     usable : bool array, shape (draws, n)
         Whether each point slides steadily with the values of each draw.
     """
 
     points: Mapping[str, Float]
     index: NDArray[np.intp]
-    slow: Bool
     total: int
     left_out: Mapping[str, int]
     draws: tuple[Mapping[str, float], ...]
     usable: Bool
 
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return self.index.size
+    def without(self, out: Bool, reason: str) -> Candidates:
+        """The candidates without some of them, which are counted under a reason."""
+        if not out.any():
+            return self
+        return replace(
+            self,
+            points=some_of(self.points, ~out),
+            index=self.index[~out],
+            usable=self.usable[:, ~out],
+            left_out={**self.left_out, reason: int(out.sum())},
+        )
+
+
+def some_of(
+    points: Mapping[str, Float], rows: NDArray[np.bool_ | np.intp] | slice
+) -> dict[str, Float]:
+    """Some of the points."""
+    return {name: column[rows] for name, column in points.items()}
+
+
+def labelled(progress: Progress, label: str) -> Callable[[int, int], None]:
+    """Progress of one kind of work."""
+    return lambda done, total: progress(done, total, label)
 
 
 def candidates_of(plan: DesignPlan, progress: Progress) -> Candidates:
@@ -79,47 +98,25 @@ def candidates_of(plan: DesignPlan, progress: Progress) -> Candidates:
         Called with points solved, points in all, and what they are.
     """
     points = plan.candidates()
-    rows = len(points["V"])
-    reasons, slow = _reasons(plan, plan.truth, points, plan.truth.values, progress)
-    for i in np.flatnonzero(points["epsilon"] == 0):
-        # Without modulation there are no harmonics; the mean says mu_ss(V) all the same.
-        reasons[i] = reasons[i] or ("" if _only_mean(plan) else "its load is not modulated")
-    kept = np.array([not r for r in reasons])
-    left_out = Counter(r for r in reasons if r)
-    draws = drawn_values(plan)
-    usable = np.ones((max(len(draws), 1), rows), bool)
-    where = np.flatnonzero(kept)
-    for k, values in enumerate(draws):
-        label = f"draw {k + 1} of {len(draws)}"
-        some = {n: v[where] for n, v in points.items()}
-        result, also_slow = _reasons(
-            plan, plan.truth, some, values, partial(_relabelled, progress, label)
-        )
-        usable[k, where] = [not r for r in result]
-        slow[where] |= also_slow
-    risky = kept & (usable.mean(0) < plan.usable_share)
-    if risky.any():
-        reason = f"unusable in more than {1 - plan.usable_share:.0%} of the draws"
-        left_out[reason] = int(risky.sum())
-        kept &= ~risky
-    index = np.flatnonzero(kept)
-    return Candidates(
-        {n: v[index] for n, v in points.items()},
-        index,
-        slow[index],
-        rows,
-        dict(left_out.most_common()),
-        draws or (plan.truth.values,),
-        usable[:, index],
-    )
-
-
-def _relabelled(progress: Progress, label: str, done: int, total: int, _: str) -> None:
-    progress(done, total, label)
-
-
-def _only_mean(plan: DesignPlan) -> bool:
-    return all(n in ("mean_friction", "delta_mu") for n in plan.noise)
+    reasons = _reasons(plan, points, expected_values(plan.truth), labelled(progress, "points"))
+    # Without modulation there are no harmonics; the mean says mu_ss(V) all the same.
+    means = all(n in ("mean_friction", "delta_mu") for n in plan.noise)
+    still = (points["epsilon"] == 0) & (reasons == "") & (not means)
+    reasons = np.where(still, "its load is not modulated", reasons)
+    index = np.flatnonzero(reasons == "")
+    kept, draws = some_of(points, index), drawn_values(plan)
+    usable = np.array(
+        [
+            _reasons(plan, kept, values, labelled(progress, f"draw {k} of {len(draws)}")) == ""
+            for k, values in enumerate(draws, 1)
+        ]
+    ).reshape(len(draws), index.size)
+    left_out = Counter(str(r) for r in reasons if r)
+    steady = Candidates(kept, index, reasons.size, dict(left_out.most_common()), draws, usable)
+    if not draws:
+        return steady
+    reason = f"unusable in more than {1 - plan.question.usable_share:.0%} of the draws"
+    return steady.without(usable.mean(0) < plan.question.usable_share, reason)
 
 
 def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
@@ -127,72 +124,61 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
 
     Values that break the rule of their parameter are replaced by the next of the sequence.
     """
-    names = [n for n in plan.truth.names if n in plan.uncertainty]
-    if not plan.draws:
+    count, names, expected = (
+        plan.question.draws,
+        list(plan.uncertainty),
+        expected_values(plan.truth),
+    )
+    if not count:
         return ()
     rules = {u.name: RULES[u.parameter.rule] for u in plan.truth.unknowns}
     # Slow to load, and wanted only here.
     from scipy.stats.qmc import Sobol
 
-    sequence = Sobol(len(names), seed=plan.seed)
+    sequence = Sobol(len(names), seed=plan.question.seed)
     result: list[dict[str, float]] = []
-    while len(result) < plan.draws:
-        for row in ndtri(sequence.random(max(8, 1 << (plan.draws - 1).bit_length()))):
+    while len(result) < count:
+        for row in ndtri(sequence.random(max(8, 1 << (count - 1).bit_length()))):
             drawn = {
-                n: plan.truth.values[n] + plan.uncertainty[n] * float(z)
+                n: expected[n] + plan.uncertainty[n] * float(z)
                 for n, z in zip(names, row, strict=True)
             }
             if all(bool(rules[n].holds(x)) for n, x in drawn.items()):
-                result.append({**plan.truth.values, **drawn})
-    return tuple(result[: plan.draws])
+                result.append({**expected, **drawn})
+    return tuple(result[:count])
 
 
 def _reasons(
     plan: DesignPlan,
-    hypothesis: Hypothesis,
     points: Mapping[str, Float],
     values: Mapping[str, float],
-    progress: Progress,
-) -> tuple[list[str], Bool]:
-    """Why each point has no stable response, empty if it has one; and which need the search."""
-    given = on_contacts({**hypothesis.fixed, **points, **values})
-    rows = len(points["V"])
-    reasons = [""] * rows
-    inertial = plan.inertia or plan.radiation_damping
-    slow = np.ones(rows, bool)
-    beyond = np.broadcast_to(given["epsilon"], (rows,)) >= 1
-    for i in np.flatnonzero(beyond):
-        reasons[i] = "contact would be lost"
-    given["epsilon"] = np.where(beyond, 0.5, given["epsilon"])
-    if not inertial:
-        quick = response_function(hypothesis.law, multipliers=True, search=False)
-        result = quick({n: given[n] for n in quick.parameters})
-        slow = np.asarray(result.outcome) != Outcome.CONVERGED
-        growing = np.asarray(result.log_multipliers).real.max(-1) >= 0
-        for i in np.flatnonzero(~slow & growing & ~beyond):
-            reasons[i] = UNSTABLE
-    left = np.flatnonzero(slow & ~beyond)
-    progress(rows - left.size, rows, "points")
+    progress: Callable[[int, int], None],
+) -> NDArray[np.str_]:
+    """Why each point has no stable response, shape (n,); empty where it has one."""
+    given = on_contacts({**plan.truth.fixed, **points, **values})
+    beyond = given["epsilon"] >= 1
+    reasons = np.where(beyond, "contact would be lost", "").astype(object)
+    left = np.flatnonzero(~beyond)
     for start in range(0, left.size, _BLOCK):
         block = left[start : start + _BLOCK]
         some = {n: v[block] if np.ndim(v) else v for n, v in given.items()}
         response = periodic_response(
-            slider_from(hypothesis.law, some),
+            slider_from(plan.truth.law, some),
             velocity=some["V"],
             epsilon=some["epsilon"],
             frequency=some["frequency"],
-            inertia=plan.inertia,
-            radiation_damping=some["eta"] if plan.radiation_damping else None,
+            inertia=plan.question.inertia,
+            radiation_damping=some["eta"] if plan.question.radiation_damping else None,
             harmonics=2,
         )
-        converged, stable = (
-            np.broadcast_to(a, block.shape) for a in (response.converged, response.stable)
+        converged, stable, texts = (
+            np.broadcast_to(a, block.shape)
+            for a in (response.converged, response.stable, response.result)
         )
-        texts = np.broadcast_to(response.result, block.shape)
         for i, ok, steady, text in zip(block, converged, stable, texts, strict=True):
             reasons[i] = _short(str(text)) if not ok else "" if steady else UNSTABLE
-        progress(rows - left.size + min(start + _BLOCK, left.size), rows, "points")
-    return reasons, slow
+        progress(start + block.size, left.size)
+    return reasons
 
 
 def _short(reason: str) -> str:
@@ -202,15 +188,106 @@ def _short(reason: str) -> str:
     return "no response was found: " + reason.removesuffix(" at").removesuffix(" before")
 
 
-def without_rows(result: Candidates, keep: Bool, reason: str) -> Candidates:
-    """The candidates without some of them, which are counted under a reason."""
-    if keep.all():
-        return result
-    return replace(
-        result,
-        points={n: v[keep] for n, v in result.points.items()},
-        index=result.index[keep],
-        slow=result.slow[keep],
-        usable=result.usable[:, keep],
-        left_out={**result.left_out, reason: int((~keep).sum())},
-    )
+class Predicted(NamedTuple):
+    """What a law predicts at some points.
+
+    Attributes
+    ----------
+    whole : Prediction
+        Zero at points without a response.
+    slopes : dict of str to Prediction
+        Derivatives to the free parameters.
+    seen : bool array, shape (n,)
+        Points that have a response with derivatives.
+    """
+
+    whole: Prediction
+    slopes: dict[str, Prediction]
+    seen: Bool
+
+
+def predicted(
+    plan: DesignPlan,
+    hypothesis: Objective,
+    points: Mapping[str, Float],
+    values: Mapping[str, float],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Predicted:
+    """Predictions of a law at operating points, shape (n,), with free parameters in SI."""
+    parts, total = [], len(points["V"])
+    for start in range(0, total, _BLOCK):
+        block = some_of(points, slice(start, start + _BLOCK))
+        table = LockInTable(plan.name, block, {}, {})
+        parts.append(_forward(plan, hypothesis, table)(values, search=True))
+        progress(min(start + _BLOCK, total), total)
+    columns = [
+        [np.concatenate(column) for column in zip(*some, strict=True)]
+        for some in (
+            [whole for whole, _, _ in parts],
+            *([slopes[n] for _, slopes, _ in parts] for n in hypothesis.names),
+        )
+    ]
+    seen = np.concatenate([outcome for *_, outcome in parts]) == Outcome.CONVERGED
+    for column in itertools.chain(*columns):
+        seen &= np.isfinite(column.reshape(total, -1)).all(1)
+    whole, *slopes = (Prediction(*(np.where(seen, c.T, 0).T for c in some)) for some in columns)
+    return Predicted(whole, dict(zip(hypothesis.names, slopes, strict=True)), seen)
+
+
+def _forward(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> Forward:
+    fixed = {**hypothesis.fixed, **table.points}
+    return Forward(hypothesis.law, table, fixed, **plan.motion)
+
+
+def expected_readings(
+    plan: DesignPlan, points: Mapping[str, Float], whole: Prediction
+) -> LockInTable:
+    """Readings without noise at some points, with the uncertainty of a reading there.
+
+    The tangential uncertainty of a harmonic combines that of the phase and the absolute one of the
+    amplitude: noise has no preferred direction in the complex plane.
+    """
+    values: dict[str, Float] = {}
+    errors: dict[str, Float] = {}
+    for name, noise in plan.noise.items():
+        if name == "mean_friction":
+            value = whole.mean_friction
+        elif name == "delta_mu":
+            value = whole.mean_friction - whole.mu_ss
+        else:
+            harmonic = whole.harmonics[:, int(name[-1]) - 1]
+            value = np.abs(harmonic) if name.startswith("mu") else np.angle(harmonic)
+        values[name] = np.asarray(value)
+        if name.startswith("phase"):
+            amplitude = plan.noise["mu" + name[-1]].absolute / np.maximum(np.abs(harmonic), 1e-300)
+            errors[name] = np.hypot(noise.absolute, amplitude)
+        else:
+            errors[name] = np.maximum(noise.at(value), 1e-300)
+    return LockInTable(plan.name, points, values, errors)
+
+
+def differences(
+    hypothesis: Objective, readings: LockInTable, at: Predicted, values: Mapping[str, float]
+) -> tuple[Float, Float]:
+    """Predictions less readings in standard uncertainties, and their derivatives.
+
+    Returns
+    -------
+    array, shape (points, observables)
+    array, shape (points, observables, parameters)
+        To the coordinates of the free parameters.
+    """
+    result = residuals_of(weights_of(readings), at.whole, at.slopes)
+    slopes = np.array([u.slope(values[u.name]) for u in hypothesis.unknowns])
+    jacobian = result.jacobian.reshape(-1, readings.rows, slopes.size).swapaxes(0, 1) * slopes
+    return result.values.reshape(-1, readings.rows).T, jacobian
+
+
+def with_readings(
+    plan: DesignPlan, hypothesis: Objective, readings: LockInTable, counts: Float
+) -> Objective:
+    """The hypothesis with readings to be fitted, each the mean of several, shape (rows,)."""
+    forward = _forward(plan, hypothesis, readings)
+    forward.uses_search = True
+    term = LockInTerm(readings, forward).weighted(np.sqrt(counts))
+    return replace(hypothesis, terms=(term,))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.inference.comparison.scale import EXCLUDED
 from asperity.inference.design.candidates import (
     Candidates,
     Progress,
     candidates_of,
-    without_rows,
+    differences,
+    expected_readings,
+    labelled,
+    predicted,
+    some_of,
+    with_readings,
 )
-from asperity.inference.design.plan import DesignPlan
-from asperity.inference.design.plan_file import plan_of, read_plan
-from asperity.inference.design.predictions import PointModel, prior_terms, rows_of, stacked
-from asperity.inference.design.result import Design, DesignedPoint, ExpectedError
+from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
+from asperity.inference.design.result import Design, DesignedPoint, ExpectedError, Simulated
 from asperity.inference.design.rival import (
     RivalFit,
-    Separation,
+    penalty,
     probability_of_deciding,
     separation,
 )
@@ -35,17 +39,16 @@ from asperity.inference.design.shares import (
     even_grid,
     optimal_shares,
     times_fewer,
-    times_fewer_of,
     whole_readings,
 )
-from asperity.inference.design.simulation import Simulated, simulated
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
-from asperity.inference.tables.table import LockInTable
+from asperity.inference.objective import Minimum, Objective
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
+from asperity.inference.tables.term import LockInTerm
+from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
-#: Points between two reports of progress, of the fast method and of the search.
-_BLOCK, _SLOW_BLOCK = 256, 32
 #: Efficiency below which the shares are not called optimal.
 _TRUSTED = 0.95
 #: Candidates per free parameter below which the ranges decide the design.
@@ -53,6 +56,8 @@ _FEW = 3
 #: A simulated spread surprises if it differs by more of its own standard errors, plus this share
 #: of the expected one.
 _SURPRISING, _LINEAR = 3.0, 0.1
+#: Decrease of chi-squared that is left at the end of a fit that has not converged.
+_LEFT = 0.01
 
 
 def design(
@@ -91,53 +96,36 @@ def design(
     elif isinstance(plan, Mapping):
         plan = plan_of(plan)
     report = progress or (lambda done, total, label: None)
-    result = candidates_of(plan, report)
-    _require_candidates(plan, result)
-    model = PointModel(plan, plan.truth, result.points, result.slow)
-    expected, jacobian = _in_blocks(model, plan.truth.values, report, "derivatives")
-    seen = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)))
-    if not seen.all():
-        result = without_rows(result, seen, "its derivatives were not found")
-        _require_candidates(plan, result)
-        expected, jacobian = expected.without(~seen), jacobian[seen]
-    cost, total = plan.budget.cost(result.points["V"]), plan.budget.total
-    if cost.min() > total:
+    candidates = candidates_of(plan, report)
+    _require_candidates(plan, candidates)
+    values = expected_values(plan.truth)
+    at = predicted(plan, plan.truth, candidates.points, values, labelled(report, "derivatives"))
+    expected = expected_readings(plan, candidates.points, at.whole)
+    jacobian = differences(plan.truth, expected, at, values)[1]
+    unseen = ~at.seen
+    candidates = candidates.without(unseen, "its derivatives were not found")
+    _require_candidates(plan, candidates)
+    cost = plan.cost(candidates.points["V"])
+    if cost.min() > plan.budget:
         raise InputError(
-            f"{plan.name}.time must suffice for one reading, got {total:g} s; the shortest takes "
-            f"{cost.min():g} s"
+            f"{plan.name}.time must suffice for one reading, got {plan.budget:g} s; the shortest "
+            f"takes {cost.min():g} s"
         )
-    grid = even_grid(plan.shape, result.index, cost, total)
-    task = _Task(plan, result, expected, jacobian, cost, total, grid, report)
-    return task.measuring(simulate) if plan.rival is None else task.excluding(simulate)
+    shape = tuple(levels.size for levels in plan.axes.values())
+    grid = even_grid(shape, candidates.index, cost, plan.budget)
+    expected, jacobian = expected.without(unseen), jacobian[~unseen]
+    task = _Task(plan, candidates, expected, jacobian, cost, grid, report)
+    return task.measuring(simulate) if plan.rival is None else task.excluding(plan.rival, simulate)
 
 
-def _require_candidates(plan: DesignPlan, result: Candidates) -> None:
-    if not result.size:
-        why = "; ".join(f"{count} times: {reason}" for reason, count in result.left_out.items())
+def _require_candidates(plan: DesignPlan, candidates: Candidates) -> None:
+    if not candidates.index.size:
+        why = "; ".join(f"{count} times: {text}" for text, count in candidates.left_out.items())
         raise InputError(
             f"{plan.name}.ranges must hold operating points at which the slider slides steadily, "
-            f"got none of {result.total} ({why}); lower W0, stiffen the spring, or widen the ranges"
+            f"got none of {candidates.total} ({why}); lower W0, stiffen the spring, or widen the "
+            "ranges"
         )
-
-
-def _in_blocks(
-    model: PointModel, values: Mapping[str, float], report: Progress, label: str
-) -> tuple[LockInTable, Float]:
-    """Expected readings, and the derivatives of one reading in its standard uncertainties."""
-    tables, jacobians, order = [], [], []
-    for slow, block in ((False, _BLOCK), (True, _SLOW_BLOCK)):
-        some = np.flatnonzero(model.slow == slow)
-        for start in range(0, some.size, block):
-            rows = some[start : start + block]
-            points = {n: v[rows] for n, v in model.points.items()}
-            part = PointModel(model.plan, model.hypothesis, points, model.slow[rows])
-            readings, result = part.expected(values)
-            tables.append(readings)
-            jacobians.append(result.jacobian)
-            order.append(rows)
-            report(sum(r.size for r in order), model.size, label)
-    back = np.argsort(np.concatenate(order))
-    return rows_of(stacked(tables), back), np.concatenate(jacobians)[back]
 
 
 def fisher_information(jacobian: Float) -> Float:
@@ -154,134 +142,119 @@ class _Task:
     expected: LockInTable
     jacobian: Float
     cost: Float
-    total: float
     grid: EvenGrid
     report: Progress
 
     @property
     def prior(self) -> Float:
         """Information of the priors of the later fit."""
-        _, slopes = prior_terms(self.plan.truth, self.plan.truth.coordinates[None])
-        return np.asarray(slopes[0].T @ slopes[0])
+        truth = self.plan.truth
+        slopes = truth.prior_residuals(truth.coordinates(expected_values(truth)))[1]
+        return np.asarray(slopes.T @ slopes)
 
     def measuring(self, simulate: int) -> Design:
         """The design that measures parameters."""
-        criterion = self._determinant()
+        total, criterion = self.plan.budget, self._determinant()
         self.report(0, 1, "shares")
-        shares = optimal_shares(criterion, self.total / self.cost)
-        n = whole_readings(criterion, self.cost, self.total, shares.shares)
-        grid = self.grid.readings(self.cost, self.total)
-        fewer = times_fewer(criterion, n.astype(float), grid)
+        shares = optimal_shares(criterion, total / self.cost)
+        n = whole_readings(criterion, self.cost, total, shares.shares)
         value = criterion.value(n.astype(float))
-        best = criterion.value(shares.shares * self.total / self.cost)
+        best = criterion.value(shares.shares * total / self.cost)
         reached = shares.efficiency * criterion.least_efficiency(best - value, value)
-        alone = self._alone(criterion, value)
-        return self._described(n, shares, reached, fewer, simulate, {"alone": alone})
+        fewer = times_fewer(criterion, self.grid.readings(self.cost, total), value)
+        numbers = {"fewer": fewer, "alone": self._alone(criterion, value)}
+        return self._described(n, shares, reached, simulate, numbers)
 
     def _alone(
         self, criterion: Determinant, value: float
     ) -> dict[str, tuple[tuple[float, int, float], ...]]:
         """What each setting gives by itself, the others chosen best."""
         result: dict[str, tuple[tuple[float, int, float], ...]] = {}
-        for axis in self.plan.axes:
-            if axis.levels.size == 1:
+        for axis, values in self.plan.axes.items():
+            if values.size == 1:
                 continue
             levels = []
-            for level in axis.levels:
-                rows = np.flatnonzero(self.candidates.points[axis.name] == level)
+            for level in values:
+                rows = np.flatnonzero(self.candidates.points[axis] == level)
                 more = math.inf
                 if rows.size:
                     part = criterion.restricted(rows)
-                    readings = self.total / self.cost[rows]
+                    readings = self.plan.budget / self.cost[rows]
                     n = optimal_shares(part, readings).shares * readings
-                    more = times_fewer_of(part, n, value)
+                    more = times_fewer(part, n, value)
                 levels.append((float(level), int(rows.size), more))
-            result[axis.name] = tuple(levels)
+            result[axis] = tuple(levels)
         return result
 
-    def excluding(self, simulate: int) -> Design:
+    def excluding(self, rival: Objective, simulate: int) -> Design:
         """The design that excludes the rival."""
-        plan = self.plan
-        assert plan.rival is not None  # by the choice of the aim
-        fits = RivalFit(plan, plan.rival, self.candidates, self.expected)
-        result = separation(fits, self.cost, self.total, self.report)
-        n = result.readings
-        grid = self.grid.readings(self.cost, self.total)
-        starts = np.array(
-            [[float(u.to_coordinate(result.values[u.name])) for u in plan.rival.unknowns]]
-        )
-        starts = np.vstack([starts, plan.rival.coordinates])
-        on_grid = fits.fitted(grid, starts)
-        counts = (len(plan.truth.names), len(plan.rival.names))
-        probable = [
-            probability_of_deciding(self.jacobian, linear, readings, counts, plan.seed)
+        plan, total = self.plan, self.plan.budget
+        fits = RivalFit(plan, rival, self.candidates.points, self.expected)
+        result = separation(fits, self.cost, total, self.report)
+        grid = self.grid.readings(self.cost, total)
+        on_grid = fits.fitted(grid, result.u)
+        probable, probable_on_grid = (
+            probability_of_deciding(self.jacobian, linear, readings, plan.question.seed)
             for linear, readings in (
-                (result.criterion, n.astype(float)),
-                (fits.criterion(on_grid.coordinates[0])[0], grid),
+                (result.criterion, result.readings.astype(float)),
+                (fits.criterion(on_grid.u)[0], grid),
             )
-        ]
-        behind = float(on_grid.chi2[0])
-        separated = {
+        )
+        numbers: dict[str, Any] = {
+            "fewer": result.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf,
             "chi2": result.chi2,
-            "chi2_grid": behind,
-            "probability": probable[0],
-            "probability_grid": probable[1],
-            "rival_values": result.values,
+            "chi2_grid": on_grid.chi2,
+            "probability": probable,
+            "probability_grid": probable_on_grid,
+            "rival_values": rival.named(result.u),
         }
-        warnings = []
         if result.unseen:
-            warnings.append(
-                f"{plan.rival.law.name} has no response at {result.unseen} candidates with the "
-                "values that come nearest; they were not judged"
+            numbers["warnings"] = (
+                f"{rival.law.name} has no response at {result.unseen} candidates with the "
+                "values that come nearest; they were not judged",
             )
-        fewer = result.chi2 / behind if behind > 0 else math.inf
         whole = result.criterion.least_efficiency(result.chi2_shares - result.chi2, result.chi2)
         reached = result.shares.efficiency * whole
-        return self._described(
-            n, result.shares, reached, fewer, simulate, separated, warnings, (fits, result)
-        )
+        other = (fits, result.u)
+        return self._described(result.readings, result.shares, reached, simulate, numbers, other)
 
     def _determinant(self) -> Determinant:
         """The criterion at the expected values, or averaged over the draws."""
-        plan, result = self.plan, self.candidates
-        interest = [plan.truth.names.index(name) for name in plan.measured]
-        if not plan.draws:
-            information = fisher_information(self.jacobian)[None]
-            return Determinant(information, self.prior[None], interest)
+        plan, points = self.plan, self.candidates.points
+        interest = [plan.truth.names.index(name) for name in plan.question.measure]
         parts = []
-        for k, values in enumerate(result.draws):
-            rows = np.flatnonzero(result.usable[k])
-            some = {n: v[rows] for n, v in result.points.items()}
-            model = PointModel(plan, plan.truth, some, result.slow[rows])
-            label = f"derivatives, draw {k + 1} of {len(result.draws)}"
-            _, jacobian = _in_blocks(model, values, self.report, label)
+        for k, values in enumerate(self.candidates.draws):
+            rows = np.flatnonzero(self.candidates.usable[k])
+            some = some_of(points, rows)
+            label = f"derivatives, draw {k + 1} of {len(self.candidates.draws)}"
+            at = predicted(plan, plan.truth, some, values, labelled(self.report, label))
+            readings = expected_readings(plan, some, at.whole)
+            jacobian = differences(plan.truth, readings, at, values)[1]
             # A point that slides unsteadily tells nothing.
-            information = np.zeros((result.size, len(plan.truth.names), len(plan.truth.names)))
-            information[rows] = np.nan_to_num(fisher_information(jacobian))
+            information = np.zeros((len(points["V"]), *self.prior.shape))
+            information[rows] = fisher_information(jacobian)
             parts.append(information)
-        prior = np.broadcast_to(self.prior, (len(parts), *self.prior.shape))
-        return Determinant(np.array(parts), prior, interest)
+        parts = parts or [fisher_information(self.jacobian)]
+        return Determinant(np.array(parts), np.array([self.prior] * len(parts)), interest)
 
     def _described(
         self,
         n: NDArray[np.int64],
         shares: Shares,
         reached: float,
-        fewer: float,
         simulate: int,
-        separated: Mapping[str, Any] | None = None,
-        warnings: Sequence[str] = (),
-        rival: tuple[RivalFit, Separation] | None = None,
+        numbers: Mapping[str, Any],
+        rival: tuple[RivalFit, Float] | None = None,
     ) -> Design:
-        plan, result = self.plan, self.candidates
+        candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
-        said = [*warnings, *self._warnings(errors, shares)]
+        said = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
         simulation = None
         if simulate:
-            simulation = self._simulated(n, simulate, rival)
+            simulation = self._simulated(n.astype(float), simulate, rival)
             said += _surprises(simulation, errors)
         return Design(
-            plan=plan,
+            plan=self.plan,
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
             readings=int(n.sum()),
             spent=float(n @ self.cost),
@@ -289,46 +262,44 @@ class _Task:
             efficiency_whole=reached,
             parameters=errors,
             correlation=correlation,
-            fewer=fewer,
             grid_levels=self.grid.levels,
             grid_usable=(self.grid.rows.size, self.grid.size),
-            candidates=result.size,
-            combinations=result.total,
-            left_out=result.left_out,
+            candidates=candidates.index.size,
+            combinations=candidates.total,
+            left_out=candidates.left_out,
             simulation=simulation,
-            warnings=tuple(said),
-            **(separated or {}),
+            **{**numbers, "warnings": tuple(said)},
         )
 
     def _errors(self, n: Float) -> tuple[dict[str, ExpectedError], Float]:
         """Expected standard errors with the design and with the even grid, and correlations."""
-        truth = self.plan.truth
         information = fisher_information(self.jacobian)
-        grid = self.grid.readings(self.cost, self.total)
+        grid = self.grid.readings(self.cost, self.plan.budget)
         (covariance, loose), (even, loose_even) = (
             inverse_information(np.einsum("i,ipq->pq", m, information) + self.prior)
             for m in (n, grid)
         )
         sd, sd_even = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(even))
         errors = {}
-        for i, u in enumerate(truth.unknowns):
-            value = truth.values[u.name]
-            slope = abs(u.slope(value))
+        for i, u in enumerate(self.plan.truth.unknowns):
+            slope = abs(u.slope(u.middle))
             errors[u.name] = ExpectedError(
                 u.name,
                 u.parameter.unit,
-                value,
+                u.middle,
                 math.inf if loose[i] else slope * float(sd[i]),
                 math.inf if loose_even[i] else slope * float(sd_even[i]),
             )
         return errors, covariance / np.outer(sd, sd)
 
     def _warnings(self, errors: Mapping[str, ExpectedError], shares: Shares) -> list[str]:
-        said = []
+        said, usable = [], self.candidates.index.size
         for unknown in self.plan.truth.unknowns:
             error = errors[unknown.name]
             slope = abs(unknown.slope(error.value))
-            if error.se > UNDETERMINED * slope and unknown.name in (self.plan.measured or errors):
+            if error.se > UNDETERMINED * slope and (
+                unknown.name in (self.plan.question.measure or errors)
+            ):
                 said.append(
                     f"{unknown.name} will not be determined by these readings: its standard error "
                     f"will be {error.se:.3g} {error.unit}".rstrip()
@@ -338,59 +309,103 @@ class _Task:
                 f"the search for the best shares ended early: they are at least "
                 f"{shares.efficiency:.2g} times as good as the best possible"
             )
-        if self.candidates.size < _FEW * len(errors):
+        if usable < _FEW * len(errors):
             said.append(
-                f"only {self.candidates.size} of {self.candidates.total} combinations can be used; "
+                f"only {usable} of {self.candidates.total} combinations can be used; "
                 "the ranges decide this design more than the question"
             )
         return said
 
     def _point(self, i: int, n: NDArray[np.int64]) -> DesignedPoint:
+        readings = self.expected
         return DesignedPoint(
             {name: float(v[i]) for name, v in self.candidates.points.items()},
             int(n[i]),
-            float(n[i] * self.cost[i]) if self.plan.budget.time is not None else None,
-            {
-                name: (float(self.expected.values[name][i]), float(self.expected.errors[name][i]))
-                for name in self.expected.values
-            },
+            float(n[i] * self.cost[i]) if self.plan.question.time is not None else None,
+            {k: (float(v[i]), float(readings.errors[k][i])) for k, v in readings.values.items()},
         )
 
-    def _simulated(
-        self, n: NDArray[np.int64], sets: int, rival: tuple[RivalFit, Separation] | None
-    ) -> Simulated:
-        rows = np.flatnonzero(n)
-        keep = np.zeros(n.size, bool)
-        keep[rows] = True
-        some = {name: v[rows] for name, v in self.candidates.points.items()}
-        model = PointModel(self.plan, self.plan.truth, some, self.candidates.slow[rows])
-        other = None
+    def _simulated(self, n: Float, sets: int, rival: tuple[RivalFit, Float] | None) -> Simulated:
+        """Fits of synthetic readings, each set with its own noise and priors about the values.
+
+        Nothing is linear here but the start.
+        """
+        plan, random = self.plan, np.random.default_rng(self.plan.question.seed)
+        counts, readings = n[n > 0], self.expected.without(n <= 0)
+        truth = with_readings(plan, plan.truth, readings, counts)
+        u, estimates, behind = truth.coordinates(expected_values(truth)), [], []
+        data = float(counts.sum()) * len(plan.noise)
         if rival is not None:
-            fits, result = rival
-            other = fits.at(rows)[0], result.values
-        return simulated(
-            model,
-            self.expected.without(~keep),
-            n[rows].astype(float),
-            sets,
-            self.plan.seed,
-            self.report,
-            other,
+            theirs, nearest = rival[0].to(n), rival[1]
+        for done in range(sets):
+            self.report(done, sets, "synthetic sets")
+            normal = random.normal(size=(readings.rows, len(OBSERVABLES)))
+            drawn = readings.disturbed(readings.values, normal / np.sqrt(counts)[:, None])
+            shifted = tuple(_with_drawn_prior(unknown, random) for unknown in truth.unknowns)
+            end = _refitted(replace(truth, unknowns=shifted), drawn, counts, u)
+            other = None if rival is None else _refitted(theirs, drawn, counts, nearest)
+            if end is None or (rival is not None and other is None):
+                continue
+            estimates.append(list(truth.named(end.u).values()))
+            if other is not None:
+                more = penalty(len(nearest), data) - penalty(len(u), data)
+                behind.append(other.chi2 - end.chi2 + more)
+        columns = np.array(estimates).reshape(-1, len(u)).T
+        spreads = {
+            name: _spread(column, random) for name, column in zip(truth.names, columns, strict=True)
+        }
+        return Simulated(
+            columns.shape[1],
+            sets - columns.shape[1],
+            {name: spread for name, (spread, _) in spreads.items()},
+            {name: error for name, (_, error) in spreads.items()},
+            float((np.array(behind) >= EXCLUDED).mean()) if behind else None,
         )
 
 
-def _surprises(result: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
+def _with_drawn_prior(unknown: Unknown, random: np.random.Generator) -> Unknown:
+    """The prior as another measurement of the expected value would have given it."""
+    if unknown.prior is None:
+        return unknown
+    mean = unknown.middle + unknown.prior.sd * random.normal()
+    return replace(unknown, prior=replace(unknown.prior, mean=mean))
+
+
+def _refitted(
+    objective: Objective, readings: LockInTable, counts: Float, u: Float
+) -> Minimum | None:
+    """The minimum for other readings at the same points; None where it was not reached."""
+    (term,) = objective.terms_of(LockInTerm)
+    other = LockInTerm(readings, term.forward).weighted(np.sqrt(counts))
+    objective = replace(objective, terms=(other,))
+    end = objective.minimise(u)
+    reached = math.isfinite(end.chi2) and objective.expected_decrease(end.u) < _LEFT
+    return end if reached else None
+
+
+def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
+    """Half the width of the central 68 %, which outliers do not inflate, and its standard error."""
+    if x.size < 3:
+        return float("nan"), float("nan")
+    copies = np.vstack([x, random.choice(x, size=(200, x.size))])
+    low, high = np.quantile(copies, [0.158655, 0.841345], axis=-1)
+    half = (high - low) / 2
+    return float(half[0]), float(half[1:].std())
+
+
+def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
     """Where the simulated fits differ from what was expected."""
     said = []
-    if result.failed:
+    if simulation.failed:
         said.append(
-            f"{result.failed} of {result.failed + result.sets} simulated fits did not converge"
+            f"{simulation.failed} of {simulation.failed + simulation.sets} simulated fits did not "
+            "converge"
         )
-    for name, spread in result.spread.items():
-        expected = errors[name].se
-        if abs(spread - expected) > _SURPRISING * result.uncertainty[name] + _LINEAR * expected:
+    for name, spread in simulation.spread.items():
+        se, error = errors[name].se, simulation.uncertainty[name]
+        if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
             said.append(
                 f"the simulated spread of {name}, {spread:.3g}, is not the expected standard error "
-                f"{expected:.3g}: predictions are not linear in it over so wide a range"
+                f"{se:.3g}: predictions are not linear in it over so wide a range"
             )
     return said

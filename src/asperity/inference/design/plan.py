@@ -1,38 +1,47 @@
-"""A plan of an experiment in SI: what can be set, what is measured how well, and what is asked."""
+"""A plan of an experiment, checked against its laws and in SI."""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.unknowns import Unknown
-from asperity.laws import Law
+from asperity.errors import InputError, closest
+from asperity.inference.fitting.inputs import (
+    fixed_values,
+    priors_of,
+    require_motion,
+    start_values,
+)
+from asperity.inference.objective import Objective
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
+from asperity.inference.unknowns import EPS_RATIO, unknowns_of
+from asperity.laws import Law, get_law
+from asperity.laws.registry import known_law
+from asperity.materials import Material
+from asperity.materials import load as load_material
+from asperity.parameters import MODULATION, Parameter, point_parameters
+from asperity.parameters.toml_file import toml_content
+from asperity.questions.design import MOST, Design, Noise, Range
+from asperity.questions.record import require_unit as with_unit
+from asperity.questions.record import units_required
+from asperity.units import to_radians, to_si
 
 Float = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Axis:
-    """Values that one quantity of the experiment can take.
-
-    Attributes
-    ----------
-    name : str
-        V, epsilon (as applied), frequency, or a parameter of the machine.
-    levels : array, shape (n,)
-        In SI, as given or evenly spaced between the ends of a range.
-    """
-
-    name: str
-    levels: Float
+#: Ranges of these are divided by equal factors unless the plan says otherwise.
+_LOGARITHMIC = ("V", "frequency")
 
 
-@dataclass(frozen=True)
-class NoiseLevel:
+class NoiseLevel(NamedTuple):
     """Standard uncertainty of one reading: sqrt(absolute^2 + (relative * value)^2).
 
     Attributes
@@ -50,67 +59,6 @@ class NoiseLevel:
         return np.asarray(np.hypot(self.absolute, self.relative * value))
 
 
-@dataclass(frozen=True)
-class Budget:
-    """What limits the experiment: a number of readings, or a time.
-
-    Attributes
-    ----------
-    readings : int or None
-    time : float or None
-        Time available (s).
-    settling_slip : float
-        Slip before each reading (m): it takes settling_slip/V.
-    integration : float
-        Duration of a reading (s).
-    """
-
-    readings: int | None = None
-    time: float | None = None
-    settling_slip: float = 0.0
-    integration: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """What may be spent: a number of readings, or a time (s)."""
-        return float(self.readings if self.readings is not None else self.time or 0.0)
-
-    def cost(self, V: Float) -> Float:
-        """What one reading costs at each velocity, in the unit of `total`."""
-        if self.readings is not None:
-            return np.ones_like(V)
-        return self.settling_slip / V + self.integration
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """A law with its free parameters, as a later fit would have them.
-
-    Attributes
-    ----------
-    law : type of Law
-    unknowns : tuple of Unknown
-    values : mapping of str to float
-        Values of the free parameters that the design is made for, in SI.
-    fixed : mapping of str to float
-    """
-
-    law: type[Law]
-    unknowns: tuple[Unknown, ...]
-    values: Mapping[str, float]
-    fixed: Mapping[str, float]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the free parameters."""
-        return tuple(u.name for u in self.unknowns)
-
-    @property
-    def coordinates(self) -> Float:
-        """Coordinates of `values`."""
-        return np.array([float(u.to_coordinate(self.values[u.name])) for u in self.unknowns])
-
-
 @dataclass(frozen=True, eq=False)
 class DesignPlan:
     """A checked plan.
@@ -119,46 +67,357 @@ class DesignPlan:
     ----------
     name : str
         What messages call the plan.
-    axes : tuple of Axis
+    question : asperity.questions.design.Design
+        Aim, budget, draws, seed, and what counts in the equation of motion.
+    axes : mapping of str to array, shape (n,)
+        Values in SI of V, epsilon (as applied), frequency, and parameters of the machine.
     noise : mapping of str to NoiseLevel
         By observable: what is measured.
-    budget : Budget
-    truth : Hypothesis
-        The law that the readings are expected to follow.
-    rival : Hypothesis or None
+    truth : Objective
+        The law that the readings are expected to follow, without data. Its unknowns start at the
+        values that the design is made for.
+    rival : Objective or None
         The law to be excluded; None where parameters are to be measured.
-    measured : tuple of str
-        Parameters to be measured; empty where a law is to be excluded.
-    draws : int
-        Values of the uncertain parameters to average over; 0 for the given values alone.
     uncertainty : mapping of str to float
         Standard deviation of the free parameters over which is averaged, in SI.
-    usable_share : float
-        Share of the draws in which a point must slide steadily to be a candidate.
-    inertia, radiation_damping : bool
-    seed : int
     """
 
     name: str
-    axes: tuple[Axis, ...]
+    question: Design
+    axes: Mapping[str, Float]
     noise: Mapping[str, NoiseLevel]
-    budget: Budget
-    truth: Hypothesis
-    rival: Hypothesis | None = None
-    measured: tuple[str, ...] = ()
-    draws: int = 0
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    usable_share: float = 0.9
-    inertia: bool = False
-    radiation_damping: bool = False
-    seed: int = 0
+    truth: Objective
+    rival: Objective | None
+    uncertainty: Mapping[str, float]
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of levels along each axis."""
-        return tuple(a.levels.size for a in self.axes)
+    def motion(self) -> dict[str, bool]:
+        """What counts in the equation of motion."""
+        return {n: getattr(self.question, n) for n in ("inertia", "radiation_damping")}
+
+    @property
+    def budget(self) -> float:
+        """What may be spent: a number of readings, or a time (s)."""
+        return float(self.question.points or self.question.time)
+
+    def cost(self, V: Float) -> Float:
+        """What one reading costs at each velocity: 1, or settling_slip/V + integration (s)."""
+        q = self.question
+        if q.points is not None:
+            return np.ones_like(V)
+        return np.asarray((q.settling_slip or 0.0) / V + (q.integration or 0.0))
 
     def candidates(self) -> dict[str, Float]:
         """Every combination of the levels, by name of the axis, the last axis fastest."""
-        grid = np.array(list(itertools.product(*(a.levels for a in self.axes))))
-        return {a.name: grid[:, i] for i, a in enumerate(self.axes)}
+        grid = np.array(list(itertools.product(*self.axes.values())))
+        return dict(zip(self.axes, grid.T, strict=True))
+
+
+def expected_values(hypothesis: Objective) -> dict[str, float]:
+    """Values of the free parameters that a design is made for, in SI."""
+    return {u.name: u.middle for u in hypothesis.unknowns}
+
+
+def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
+    """Read a plan from a TOML file; quantities carry their unit.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or anything in it is wrong.
+    """
+    file, content = toml_content(path, "plan")
+    for key in ("law", "rival"):
+        place = content.get(key)
+        # A law in a file of its own stands beside the plan.
+        if isinstance(place, str) and ".py:" in place:
+            content[key] = str(file.parent / place)
+    try:
+        return plan_of(content, name=file.name, require_unit=True)
+    except InputError as error:
+        raise InputError(f"{error} (in '{Path(path).name}')") from None
+
+
+def plan_of(
+    content: Mapping[str, Any] | Design, *, name: str = "plan", require_unit: bool = False
+) -> DesignPlan:
+    """A plan from the content of a file, the same as a dictionary, or a question.
+
+    Parameters
+    ----------
+    content : mapping or Design
+        Keys as in docs/design.md.
+    name : str
+        What the design calls the plan.
+    require_unit : bool
+        Refuse numbers without a unit, as files do; else they are SI.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong.
+    """
+    with units_required() if require_unit else contextlib.nullcontext():
+        question = content if isinstance(content, Design) else Design(**content)
+        return _checked(question, name)
+
+
+def _checked(question: Design, name: str) -> DesignPlan:
+    law = _law(question.law, "plan.law")
+    material = None if question.material is None else load_material(question.material)
+    known = _known(law)
+    axes = _axes(question, {n: p for n, p in known.items() if p.place != "law"})
+    # The ends of all axes, as rows that stand for the candidates.
+    ends = {n: np.array([levels.min(), levels.max()]) for n, levels in axes.items()}
+    table = LockInTable(name, ends, {}, {})
+    truth = _hypothesis(question, law, law, question.free, material, table)
+    rival = None
+    if question.rival is not None:
+        rival_law = _law(question.rival, "plan.rival")
+        free = question.rival_free or tuple(n for n in truth.names if n in _known(rival_law))
+        rival = _hypothesis(question, rival_law, law, free, material, table)
+        if rival_law is law and set(truth.names) <= set(rival.names):
+            raise InputError(
+                "plan.rival",
+                "differ from the law",
+                f"{law.name} with the same free parameters",
+                "name another law, or leave one out in rival_free",
+            )
+    noise = _noise(question)
+    uncertainty = _uncertainties(question, known, material, truth) if question.draws else {}
+    plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
+    require_motion(truth.names, plan.motion, label="plan.free", plan=True)
+    if rival is not None:
+        require_motion(rival.names, plan.motion, label="plan.rival_free", plan=True)
+    for parameter in question.measure:
+        if parameter not in truth.names:
+            raise InputError(
+                "plan.measure",
+                "name free parameters",
+                f"'{parameter}'",
+                f"free it or choose among {', '.join(truth.names)}",
+            )
+    largest = float(axes["epsilon"].max())
+    for hypothesis in (truth, rival) if rival else (truth,):
+        carried = {**hypothesis.fixed, **expected_values(hypothesis)}["eps_ratio"] * largest
+        if carried >= 1:
+            raise InputError(
+                "plan.ranges.epsilon times eps_ratio",
+                "be below 1",
+                f"{carried:g}",
+                "contact would be lost",
+            )
+    unknown = sum(1 for u in truth.unknowns if u.prior is None)
+    if question.points is not None and question.points * len(noise) < unknown:
+        raise InputError(
+            "plan.points",
+            "give at least as many data as free parameters",
+            f"{question.points * len(noise)} for {unknown} without a prior",
+            "plan more, or free fewer",
+        )
+    return plan
+
+
+def _law(name: str, field: str) -> type[Law]:
+    law = get_law(known_law(name))
+    if not law.rate_dependent:
+        raise InputError(
+            field,
+            "depend on the velocity",
+            law.name,
+            "its one number follows from the mean friction",
+        )
+    return law
+
+
+def _known(law: type[Law]) -> dict[str, Parameter]:
+    """Parameters that a plan may name."""
+    every = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
+    return {n: p for n, p in every.items() if n not in MODULATION and n != "inertia"}
+
+
+def _quantity(value: Any, parameter: Parameter, label: str) -> float:
+    """A value of a parameter in SI, checked by the rule of the parameter."""
+    with_unit(value, parameter.kind, label)
+    return float(parameter.check(to_si(value, parameter.kind, label), label))
+
+
+def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> dict[str, float]:
+    """A table of values of parameters, in SI."""
+    result = {}
+    for name, value in getattr(question, field).items():
+        if name not in known:
+            raise InputError(
+                f"plan.{field}", "have names of parameters", f"'{name}'", closest(name, known)
+            )
+        result[name] = _quantity(value, known[name], f"plan.{field}.{name}")
+    return result
+
+
+def _axes(question: Design, known: Mapping[str, Parameter]) -> dict[str, Float]:
+    """The ranges, in the order of the plan."""
+    axes = {}
+    for name, given in question.ranges.items():
+        if name not in known or name == EPS_RATIO.name:
+            raise InputError(
+                "plan.ranges",
+                "be of the drive or the machine",
+                f"'{name}'",
+                closest(name, known),
+            )
+        axes[name] = _levels(name, given, known[name])
+    count = math.prod(levels.size for levels in axes.values())
+    if count > MOST:
+        raise InputError(
+            "plan.ranges", f"have at most {MOST} combinations", count, "give fewer levels"
+        )
+    return axes
+
+
+def _levels(name: str, given: Range, parameter: Parameter) -> Float:
+    """Values of one axis in SI: listed ones, or divisions of a range."""
+    label = f"plan.ranges.{name}"
+    if given.values is not None:
+        levels = np.array([_quantity(v, parameter, label) for v in given.values])
+        if np.unique(levels).size != levels.size:
+            raise InputError(label, "have each value once", list(given.values), "drop copies")
+        return levels
+    low = _quantity(given.from_, parameter, f"{label}.from")
+    high = _quantity(given.to, parameter, f"{label}.to")
+    if not low < high:
+        raise InputError(f"{label}.to", "be above from", f"{high:g}", "exchange the two")
+    if (given.spacing or ("log" if name in _LOGARITHMIC else "linear")) == "linear":
+        return np.linspace(low, high, given.levels)
+    if low <= 0:
+        raise InputError(
+            f"{label}.from",
+            "be positive with spacing 'log'",
+            f"{low:g}",
+            "raise it, or choose 'linear'",
+        )
+    return np.geomspace(low, high, given.levels)
+
+
+def _noise(question: Design) -> dict[str, NoiseLevel]:
+    """Standard uncertainties of a reading, by observable."""
+    for name in question.noise:
+        if name not in OBSERVABLES:
+            raise InputError(
+                "plan.noise", "be of observables", f"'{name}'", closest(name, OBSERVABLES)
+            )
+    return {n: _level(n, question.noise[n]) for n in OBSERVABLES if n in question.noise}
+
+
+def _level(name: str, given: Noise) -> NoiseLevel:
+    """Standard uncertainty of one observable."""
+    label = f"plan.noise.{name}"
+    phase = name.startswith("phase")
+    if phase and given.relative:
+        raise InputError(label, "be absolute", "a relative part", "give an angle")
+    absolute = given.absolute
+    if phase and not isinstance(absolute, str) and absolute != 0:
+        raise InputError(
+            label,
+            "be an angle in rad or deg, with its unit",
+            repr(absolute),
+            "write it like '1 deg' or '20 mrad'",
+        )
+    a = to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label)
+    r = to_si(given.relative, "dimensionless", f"{label}.relative")
+    a, r = float(a), float(r)
+    if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
+        worst = max(a, r) if min(a, r) >= 0 else min(a, r)
+        raise InputError(
+            label, "be positive", f"{worst:g}", "give the standard uncertainty of one reading"
+        )
+    return NoiseLevel(a, r)
+
+
+def _hypothesis(
+    question: Design,
+    law: type[Law],
+    first: type[Law],
+    free: Sequence[str],
+    material: Material | None,
+    table: LockInTable,
+) -> Objective:
+    """A law with its free and fixed parameters, without data.
+
+    `first` is the law of the plan, whose values are those of the plan, and `table` stands for the
+    candidates.
+    """
+    known = _known(law)
+    every = {**known, **_known(first)}
+    given, fixed = (
+        {n: v for n, v in _numbers(question, field, every).items() if n in known}
+        for field in ("values", "fixed")
+    )
+    for name, field in itertools.chain(((n, "fixed") for n in fixed), ((n, "free") for n in free)):
+        if name in table.points:
+            raise InputError(
+                f"plan.{field}",
+                "not have what ranges has",
+                f"'{name}'",
+                "drop one" if field == "fixed" else "it is set, not fitted",
+            )
+    for name in given:
+        if name in fixed and name not in free:
+            raise InputError(f"plan.{name}", "be given once", "two", "drop one")
+        if name not in free and first is law:
+            fixed[name] = given[name]
+    start = start_values(law, free, {n: v for n, v in given.items() if n in free}, material)
+    if "eps_ratio" in free:
+        start.setdefault("eps_ratio", 1.0)
+    missing = [n for n in free if n in known and n not in start]
+    if missing:
+        raise InputError(
+            "plan.values",
+            f"have a value for each free parameter of {law.name}",
+            f"none for {', '.join(missing)}",
+            "a design is made for values that are expected",
+        )
+    unknowns = unknowns_of(
+        law,
+        free,
+        largest_epsilon=float(table.points["epsilon"].max()),
+        start=start,
+        priors=priors_of(question.prior, free),
+    )
+    constants = fixed_values(law, table, free, fixed, material)
+    constants = {n: float(v) for n, v in constants.items() if n not in table.points}
+    return Objective((), law, unknowns, constants)
+
+
+def _uncertainties(
+    question: Design,
+    known: Mapping[str, Parameter],
+    material: Material | None,
+    truth: Objective,
+) -> dict[str, float]:
+    """Standard deviations of the free parameters that are drawn, in SI."""
+    given = {}
+    for name, value in question.uncertainty.items():
+        label = f"plan.uncertainty.{name}"
+        if name not in known or name not in truth.names:
+            raise InputError(
+                "plan.uncertainty", "be of free parameters", f"'{name}'", "free it or leave it out"
+            )
+        with_unit(value, known[name].kind, label)
+        given[name] = float(to_si(value, known[name].kind, label))
+        if given[name] < 0:
+            raise InputError(label, "not be negative", f"{given[name]:g}", "change it")
+    for name in truth.names:
+        if material is not None and name in material and material[name].uncertainty:
+            given.setdefault(name, float(material[name].si_uncertainty or 0.0))
+    if not given:
+        raise InputError(
+            "plan.uncertainty",
+            "have a free parameter to draw",
+            "none",
+            "add one, or leave draws out",
+        )
+    return {n: given[n] for n in truth.names if n in given}

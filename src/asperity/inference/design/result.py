@@ -10,10 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
-from asperity.inference.design.plan import DesignPlan
-from asperity.inference.design.simulation import Simulated
+from asperity.inference.design.plan import DesignPlan, expected_values
 
 Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What came of fits to synthetic readings.
+
+    Attributes
+    ----------
+    sets : int
+        Fits that converged.
+    failed : int
+    spread : mapping of str to float
+        Standard deviation of the estimates in SI: half the width that holds 68 % of them.
+    uncertainty : mapping of str to float
+        Standard error of that spread, by bootstrap.
+    decided : float or None
+        Share of the sets that exclude the rival.
+    """
+
+    sets: int
+    failed: int
+    spread: Mapping[str, float]
+    uncertainty: Mapping[str, float]
+    decided: float | None = None
 
 
 @dataclass(frozen=True)
@@ -126,11 +149,11 @@ class Design:
 
     def record(self) -> dict[str, Any]:
         """Everything as plain numbers and texts, for JSON; numbers that are infinite are None."""
-        plan, axes = self.plan, [a.name for a in self.plan.axes]
+        plan = self.plan
         result: dict[str, Any] = {
             "law": plan.truth.law.name,
             "aim": "measure" if plan.rival is None else "exclude",
-            "measured": list(plan.measured),
+            "measured": list(plan.question.measure),
             "rival": None if plan.rival is None else plan.rival.law.name,
             "points": [
                 {
@@ -144,7 +167,7 @@ class Design:
                 for p in self.points
             ],
             "readings": self.readings,
-            "spent": {"value": self.spent, "unit": "s" if plan.budget.time else "readings"},
+            "spent": {"value": self.spent, "unit": "s" if plan.question.time else "readings"},
             "efficiency_bound": self.efficiency,
             "efficiency_bound_whole": self.efficiency_whole,
             "parameters": {
@@ -153,7 +176,7 @@ class Design:
             },
             "correlation": {"names": list(self.parameters), "matrix": self.correlation.tolist()},
             "even_grid": {
-                "levels": dict(zip(axes, self.grid_levels, strict=True)),
+                "levels": dict(zip(plan.axes, self.grid_levels, strict=True)),
                 "usable": self.grid_usable[0],
                 "size": self.grid_usable[1],
                 "times_fewer": self.fewer,
@@ -206,7 +229,7 @@ class Design:
         other than 1 the contacts carry eps_ratio times it.
         """
         truth = self.plan.truth
-        constants = {**truth.fixed, **truth.values}
+        constants = {**truth.fixed, **expected_values(truth)}
         constants.pop("eps_ratio", None)
         rows = []
         for p in self.points:

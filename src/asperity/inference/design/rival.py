@@ -9,27 +9,18 @@ rival follows from the linear predictions of both laws.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.comparison.scale import EXCLUDED
-from asperity.inference.design.candidates import Candidates
-from asperity.inference.design.plan import DesignPlan, Hypothesis
-from asperity.inference.design.predictions import (
-    PointModel,
-    Refitted,
-    Whitened,
-    prior_terms,
-    refit,
-    repeated,
-)
+from asperity.inference.design.candidates import differences, predicted, with_readings
+from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
+from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import LockInTable
-from asperity.inference.tables.term import on_contacts
-from asperity.orbit import Outcome, response_function
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -42,10 +33,11 @@ _PARTS = (1.0, 0.5, 0.25, 0.1)
 _NEGLIGIBLE = 1e-4
 #: Rounds of exchanges of whole readings, each at the rival's last fit.
 _EXCHANGES = 4
+#: Synthetic sets of readings, linear in the parameters, for the probability of deciding.
+_DRAWS = 20_000
 
 
-@dataclass(frozen=True, eq=False)
-class Separation:
+class Separation(NamedTuple):
     """Shares of the budget, the whole readings, and the rival that comes nearest to them.
 
     Attributes
@@ -54,8 +46,8 @@ class Separation:
     readings : int array, shape (candidates,)
     chi2, chi2_shares : float
         Of the rival refitted to the expected readings, for whole readings and for the shares.
-    values : mapping of str to float
-        Its parameters there.
+    u : array, shape (p,)
+        Coordinates of the rival there.
     criterion : Misfit
         At that fit.
     unseen : int
@@ -66,7 +58,7 @@ class Separation:
     readings: NDArray[np.int64]
     chi2: float
     chi2_shares: float
-    values: dict[str, float]
+    u: Float
     criterion: Misfit
     unseen: int
 
@@ -77,59 +69,39 @@ class RivalFit:
     Parameters
     ----------
     plan : DesignPlan
-    rival : Hypothesis
-    candidates : Candidates
+    rival : Objective
+    points : mapping of str to array, shape (candidates,)
     expected : LockInTable
         Readings at all candidates by the other law.
     """
 
     def __init__(
-        self, plan: DesignPlan, rival: Hypothesis, candidates: Candidates, expected: LockInTable
+        self,
+        plan: DesignPlan,
+        rival: Objective,
+        points: Mapping[str, Float],
+        expected: LockInTable,
     ) -> None:
-        self.plan, self.rival, self.expected = plan, rival, expected
-        self.points = dict(candidates.points)
-        self.slow = candidates.slow | _slow(plan, rival, candidates)
+        self.plan, self.rival, self.points, self.expected = plan, rival, points, expected
+        self.start = rival.coordinates(expected_values(rival))
 
-    def at(self, rows: NDArray[np.intp]) -> tuple[PointModel, LockInTable]:
-        """Model and readings at some candidates."""
-        keep = np.zeros(len(self.slow), bool)
-        keep[rows] = True
-        some = {n: v[keep] for n, v in self.points.items()}
-        model = PointModel(self.plan, self.rival, some, self.slow[keep])
-        return model, self.expected.without(~keep)
+    def to(self, n: Float) -> Objective:
+        """The rival with n readings of each candidate."""
+        return with_readings(self.plan, self.rival, self.expected.without(n <= 0), n[n > 0])
 
-    def everywhere(self, u: Float) -> Whitened:
-        """Differences at all candidates with the coordinates u."""
-        model = PointModel(self.plan, self.rival, self.points, self.slow)
-        values = {k.name: k.to_value(x) for k, x in zip(self.rival.unknowns, u, strict=True)}
-        return model.whitened(self.expected, values)
-
-    def fitted(self, n: Float, starts: Float) -> Refitted:
-        """The best of the fits from several starts, as one set."""
-        rows = np.flatnonzero(n > 0)
-        model, expected = self.at(rows)
-        result = refit(model, repeated(expected, len(starts)), n[rows], starts)
-        k = [int(np.argmin(result.chi2))]
-        return Refitted(result.coordinates[k], result.chi2[k], result.converged[k])
+    def fitted(self, n: Float, *starts: Float) -> Minimum:
+        """The best of the fits to n readings of each candidate, from several starts."""
+        objective = self.to(n)
+        return min((objective.minimise(u) for u in (*starts, self.start)), key=lambda m: m.chi2)
 
     def criterion(self, u: Float) -> tuple[Misfit, Bool]:
         """Misfit linear at the coordinates u, and the candidates at which there is a response."""
-        result = self.everywhere(u)
-        seen = np.asarray(np.isfinite(result.values).all(axis=-1))
-        prior, slopes = prior_terms(self.rival, u[None])
-        blank = np.where(seen[:, None], result.values, 0.0)
-        jacobian = np.where(seen[:, None, None], result.jacobian, 0.0)
-        return Misfit(blank, jacobian, prior[0], slopes[0]), seen
-
-
-def _slow(plan: DesignPlan, rival: Hypothesis, candidates: Candidates) -> Bool:
-    """Candidates at which the fast method does not solve the rival, with its expected values."""
-    if plan.inertia or plan.radiation_damping:
-        return np.ones(candidates.size, bool)
-    quick = response_function(rival.law, search=False)
-    given = on_contacts({**rival.fixed, **candidates.points, **rival.values})
-    outcome = quick({n: given[n] for n in quick.parameters}).outcome
-    return np.asarray(outcome) != Outcome.CONVERGED
+        values = self.rival.named(u)
+        at = predicted(self.plan, self.rival, self.points, values)
+        residual, jacobian = differences(self.rival, self.expected, at, values)
+        # A point without a response is not judged: it tells nothing.
+        residual = np.where(at.seen[:, None], residual, 0.0)
+        return Misfit(residual, jacobian, *self.rival.prior_residuals(u)), at.seen
 
 
 def separation(
@@ -147,56 +119,40 @@ def separation(
     progress : callable
     """
     readings = total / cost
-    u = fits.rival.coordinates
-    nominal = u
-    criterion, seen = fits.criterion(u)
-    shares = np.full(criterion.size, 1 / criterion.size)
-    shares = optimal_shares(criterion, readings).shares
-    best = fits.fitted(_cleaned(shares) * readings, np.array([u]))
-    shares, efficiency = _cleaned(shares), 0.0
+    criterion, _ = fits.criterion(fits.start)
+    shares = _cleaned(optimal_shares(criterion, readings).shares)
+    best, efficiency = fits.fitted(shares * readings), 0.0
     for round_ in range(_ROUNDS):
         progress(round_, _ROUNDS, "refits of the rival")
-        u, chi2 = best.coordinates[0], float(best.chi2[0])
-        criterion, seen = fits.criterion(u)
+        criterion, _ = fits.criterion(best.u)
         slope = criterion.gradient(shares * readings) * readings
         gap = float(slope.max() - shares @ slope)
-        efficiency = criterion.least_efficiency(gap, chi2)
+        efficiency = criterion.least_efficiency(gap, best.chi2)
         if efficiency >= _ENOUGH:
             break
-        proposed = _cleaned(optimal_shares(criterion, readings, start=_mixed(shares)).shares)
+        mixed = 0.9 * shares + 0.1 / shares.size
+        proposed = _cleaned(optimal_shares(criterion, readings, start=mixed).shares)
         for part in _PARTS:
             tried = _cleaned((1 - part) * shares + part * proposed)
-            result = fits.fitted(tried * readings, np.array([u, nominal]))
-            if result.chi2[0] > chi2 * (1 + 1e-6):
+            result = fits.fitted(tried * readings, best.u)
+            if result.chi2 > best.chi2 * (1 + 1e-6):
                 shares, best = tried, result
                 break
         else:
             break
-    chi2_shares = float(best.chi2[0])
     n = whole_readings(criterion, cost, total, shares)
-    fitted = fits.fitted(n.astype(float), np.array([best.coordinates[0], nominal]))
+    fitted = fits.fitted(n.astype(float), best.u)
     for _ in range(_EXCHANGES):
         progress(_ROUNDS, _ROUNDS, "whole readings")
-        linear, _ = fits.criterion(fitted.coordinates[0])
+        linear, _ = fits.criterion(fitted.u)
         changed = whole_readings(linear, cost, total, n * cost / total)
-        again = fits.fitted(changed.astype(float), np.array([fitted.coordinates[0], nominal]))
-        if again.chi2[0] <= fitted.chi2[0] * (1 + 1e-6):
+        again = fits.fitted(changed.astype(float), fitted.u)
+        if again.chi2 <= fitted.chi2 * (1 + 1e-6):
             break
         n, fitted = changed, again
-    last, seen = fits.criterion(fitted.coordinates[0])
-    values = {
-        k.name: float(k.to_value(x))
-        for k, x in zip(fits.rival.unknowns, fitted.coordinates[0], strict=True)
-    }
-    return Separation(
-        Shares(shares, efficiency),
-        n,
-        float(fitted.chi2[0]),
-        chi2_shares,
-        values,
-        last,
-        int((~seen).sum()),
-    )
+    last, seen = fits.criterion(fitted.u)
+    shared = Shares(shares, efficiency)
+    return Separation(shared, n, fitted.chi2, best.chi2, fitted.u, last, int((~seen).sum()))
 
 
 def _cleaned(shares: Float) -> Float:
@@ -204,16 +160,7 @@ def _cleaned(shares: Float) -> Float:
     return np.asarray(kept / kept.sum())
 
 
-def _mixed(shares: Float) -> Float:
-    return 0.9 * shares + 0.1 / shares.size
-
-
-_DRAWS = 20_000
-
-
-def probability_of_deciding(
-    jacobian: Float, rival: Misfit, readings: Float, parameters: tuple[int, int], seed: int
-) -> float:
+def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, seed: int) -> float:
     """Probability that the rival's AICc exceeds that of the true law enough to exclude it.
 
     Both laws are linear in their parameters about their fits to the expected readings, so that the
@@ -226,8 +173,6 @@ def probability_of_deciding(
     rival : Misfit
         At its fit to the expected readings.
     readings : array, shape (candidates,)
-    parameters : (int, int)
-        Numbers of free parameters of the true law and of the rival.
     seed : int
     """
     rows = np.flatnonzero(readings > 0)
@@ -243,13 +188,15 @@ def probability_of_deciding(
     noise = np.random.default_rng(seed).normal(size=(_DRAWS, apart.size))
     noise[:, apart.size - q :] = 0.0
     difference = _outside(theirs, apart - noise) - _outside(own, noise)
-    penalty = [
-        2 * k + (2 * k * (k + 1) / (data - k - 1) if data > k + 1 else np.inf) for k in parameters
-    ]
-    if not np.isfinite(penalty).all():
-        return 0.0
-    behind = difference + penalty[1] - penalty[0]
+    behind = difference + penalty(theirs.shape[1], data) - penalty(own.shape[1], data)
     return float((behind >= EXCLUDED).mean())
+
+
+def penalty(parameters: int, data: float) -> float:
+    """What AICc adds to the deviance; infinite where the data are too few."""
+    if data <= parameters + 1:
+        return np.inf
+    return 2 * parameters + 2 * parameters * (parameters + 1) / (data - parameters - 1)
 
 
 def _outside(jacobian: Float, vectors: Float) -> Float:

@@ -24,7 +24,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,47 +33,6 @@ Float = NDArray[np.float64]
 
 #: Added to the diagonal of an information matrix, relative to its scale, so that it has an inverse.
 _RIDGE = 1e-11
-
-
-class Criterion(Protocol):
-    """A concave, increasing function of the numbers of readings.
-
-    Attributes
-    ----------
-    size : int
-        Number of candidates.
-    """
-
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        ...
-
-    def value(self, n: Float) -> float:
-        """Criterion of a design n, shape (candidates,)."""
-        ...
-
-    def gradient(self, n: Float) -> Float:
-        """Derivatives to the number of readings of each candidate, shape (candidates,)."""
-        ...
-
-    def exchanged(self, n: Float) -> Float:
-        """Criterion of n with one more reading, for each candidate, shape (candidates,)."""
-        ...
-
-    def least_efficiency(self, gap: float, value: float) -> float:
-        """Share of the information of the best design that is reached at least.
-
-        Parameters
-        ----------
-        gap : float
-            By how much the best design can exceed `value` at most.
-        """
-        ...
-
-    def restricted(self, rows: NDArray[np.intp]) -> Criterion:
-        """The same for some of the candidates."""
-        ...
 
 
 class Determinant:
@@ -227,6 +185,8 @@ class Misfit:
 
 
 Whole = NDArray[np.int64]
+#: A concave, increasing function of the numbers of readings.
+Criterion = Determinant | Misfit
 
 #: Largest part of the information of the best design that may be missing.
 _TOLERANCE = 1e-3
@@ -235,7 +195,7 @@ _ROUNDS = 200
 _NEGLIGIBLE = 1e-5
 #: Candidates that join the support at once.
 _JOINING = 3
-_MULTIPLICATIVE_STEPS = 200
+_MULTIPLICATIVE_STEPS = 20
 #: Sweeps of exchanges of whole readings.
 _SWEEPS = 30
 
@@ -302,7 +262,7 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     """Optimal shares of a few candidates."""
     # Multiplicative steps always improve a little; the quadratic method finishes.
     shares = start
-    for _ in range(_MULTIPLICATIVE_STEPS // 10):
+    for _ in range(_MULTIPLICATIVE_STEPS):
         shares = _multiplied(criterion, readings, shares)
     result = minimize(
         lambda s: -criterion.value(s * readings),
@@ -316,13 +276,8 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
         options={"maxiter": 200, "ftol": 1e-12},
     )
     improved = np.clip(result.x, 0.0, None)
-    if np.isfinite(improved).all() and improved.sum() > 0:
-        improved /= improved.sum()
-        if criterion.value(improved * readings) >= criterion.value(shares * readings):
-            return np.asarray(improved)
-    for _ in range(_MULTIPLICATIVE_STEPS):
-        shares = _multiplied(criterion, readings, shares)
-    return shares
+    improved /= improved.sum()
+    return max(shares, improved, key=lambda s: criterion.value(s * readings))
 
 
 def _multiplied(criterion: Criterion, readings: Float, shares: Float) -> Float:
@@ -440,28 +395,23 @@ def even_grid(
     return best[1]
 
 
-def times_fewer(criterion: Criterion, design: Float, grid: Float) -> float:
-    """How many times the readings of a grid must be for the criterion of a design.
+def times_fewer(criterion: Criterion, readings: Float, target: float) -> float:
+    """How many times as many some readings must be for a value of the criterion.
 
     Parameters
     ----------
     criterion : Criterion
-    design, grid : array, shape (candidates,)
-        Readings of the same budget.
+    readings : array, shape (candidates,)
+    target : float
 
     Returns
     -------
     float
-        Infinite if the grid does not get there with a million times the readings.
+        Infinite if a million times the readings do not reach it.
     """
-    return times_fewer_of(criterion, grid, criterion.value(design))
-
-
-def times_fewer_of(criterion: Criterion, grid: Float, target: float) -> float:
-    """How many times the readings of a grid must be for a value of the criterion."""
 
     def lacking(log_factor: float) -> float:
-        return criterion.value(np.exp(log_factor) * grid) - target
+        return criterion.value(np.exp(log_factor) * readings) - target
 
     low, high = -np.log(1e3), np.log(1e6)
     if lacking(high) < 0:

@@ -210,15 +210,14 @@ def fit(
     steps = _Steps(progress, len(objective.unknowns))
     # Minima of a long recording are looked for in fewer, longer blocks.
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
+    if recordings:
+        searched = under_drift(searched)
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
 
     minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
     agreed = True
     if minima and recordings:
-        # Under white noise a drift looks like slow evolution, and the true minimum may vanish.
-        drifting = under_drift(searched) if options.order != 0 else None
-        besides = minima_of(drifting, seed, drawn=starts) if drifting else []
-        minima, agreed = with_noise(objective, minima, drifting, besides)
+        minima, agreed = with_noise(objective, minima, searched)
     if not minima or not math.isfinite(minima[0][1]):
         return failed_fit(objective)
     if recordings:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,46 +10,37 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.fitting.minima import distinct
 from asperity.inference.objective import Minimum, Objective
-from asperity.inference.runs.term import NoiseState, RunTerm
+from asperity.inference.runs.term import RunTerm
 
 Float = NDArray[np.float64]
-#: Minima, best first, and whether noise and parameters agree at the best.
-Found = tuple[list[Minimum], bool]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
-#: Minima under white noise that are nearer than so many standard deviations are followed as one.
+#: Starts that are nearer than so many standard deviations are followed as one.
 _ONE_END = 1.0
 #: Standard deviations of the parameters within which two starts lead to the same minimum.
 _ALLOWED = 5.0
-#: Relative change of the coordinates that ends the way to a minimum of a drift, which only tells
-#: starts apart: along its valleys chi-squared falls by less than `_ALLOWED` leaves open.
+#: Relative change of the coordinates that ends the way to a minimum of the search.
 _COARSE = 1e-4
 
 
 def under_drift(objective: Objective) -> Objective:
-    """The objective with recordings whose noise is taken for a slow drift."""
-    terms = tuple(copy(term) for term in objective.terms)
-    drifting = replace(objective, terms=terms, tolerance=_COARSE)
-    for term in drifting.terms_of(RunTerm):
-        term.expect_slow_noise()
-    return drifting
+    """The objective with recordings whose noise is taken for a slow drift, to search with."""
+    terms = (t.under_drift() if isinstance(t, RunTerm) else t for t in objective.terms)
+    return replace(objective, terms=tuple(terms), tolerance=_COARSE)
 
 
 def with_noise(
-    objective: Objective,
-    minima: list[Minimum],
-    drifting: Objective | None = None,
-    besides: Sequence[Minimum] = (),
-) -> Found:
+    objective: Objective, minima: list[Minimum], searched: Objective
+) -> tuple[list[Minimum], bool]:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    `besides` are minima of `drifting`; one is followed where no end of the others is a minimum of
-    `drifting` too. Each minimum has the noise that its own residual shows. They are compared by the
-    likelihood, noise included: under the noise of one, which holds its misfit, another is no
-    minimum.
+    From each of the `minima` of `searched`, the objective under a drift, the way goes by that under
+    white noise, and straight on too where the drift does not allow that one. Each is followed under
+    the noise that its own residual shows. They are compared by the likelihood, noise included:
+    under the noise of one, which holds its misfit, another is no minimum. The objective takes the
+    noise of the best.
 
     Returns
     -------
@@ -59,37 +49,30 @@ def with_noise(
         higher as twice the logarithm of their likelihood is lower.
     bool
     """
-    noisy = objective.terms_of(RunTerm)
-    first = [term.noise_state() for term in noisy]
-    ends = []
-    for u in _apart(objective, minima):
-        for term, state in zip(noisy, first, strict=True):
-            term.restore_noise(state)
-        ends.append(_with_own_noise(objective, noisy, u))
-    for u, value in distinct(list(besides)):
-        assert drifting is not None  # whose minima they are
+    starts: list[Float] = []
+    for u, value in minima:
+        white = objective.minimise(u).u
         # Chi-squared of a drift says how large it is: noise has one a sample.
-        allowed = value * (1 + _ALLOWED**2 / drifting.residuals(u)[0].size)
-        if all(drifting.chi2(end.u) > allowed for end in ends):
-            for term, state in zip(noisy, first, strict=True):
-                term.restore_noise(state)
-            ends.append(_with_own_noise(objective, noisy, u))
-    best = min(ends, key=lambda end: end.deviance)
-    for term, state in zip(noisy, best.states, strict=True):
-        term.restore_noise(state)
+        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        starts += [white] if searched.chi2(white) <= allowed else [u, white]
+    ends = [_with_own_noise(objective, u) for u in _apart(objective, starts)]
+    ends.sort(key=lambda end: end.deviance)
+    best = ends[0]
+    objective.terms = best.objective.terms
     objective.forget()
     chi2 = objective.chi2(best.u)
-    result = [Minimum(best.u, chi2)]
-    for end in sorted(ends, key=lambda end: end.deviance):
-        if end is not best and math.isfinite(end.deviance):
-            result.append(Minimum(end.u, chi2 + end.deviance - best.deviance))
-    return result, best.agreed
+    others = [
+        Minimum(end.u, chi2 + end.deviance - best.deviance)
+        for end in ends[1:]
+        if math.isfinite(end.deviance)
+    ]
+    return [Minimum(best.u, chi2), *others], best.agreed
 
 
-def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
-    """Minima without those that the data hardly tell from an earlier one: both lead to one end."""
+def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
+    """Starts without those that the data hardly tell from an earlier one: both lead to one end."""
     kept: list[Float] = []
-    for u, _ in minima:
+    for u in starts:
         _, jacobian = objective.residuals(u)
         if all(float(np.linalg.norm(jacobian @ (u - other))) > _ONE_END for other in kept):
             kept.append(u)
@@ -97,17 +80,19 @@ def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
 
 
 class _End(NamedTuple):
-    """A minimum under its own noise."""
+    """A minimum, and the objective under its own noise."""
 
     u: Float
     #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
     deviance: float
-    states: list[NoiseState]
+    objective: Objective
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _End:
+def _with_own_noise(objective: Objective, u: Float) -> _End:
     """Noise and parameters in turn, until the parameters stay where they are."""
+    objective = replace(objective, terms=tuple(copy(term) for term in objective.terms))
+    noisy = objective.terms_of(RunTerm)
     agreed = False
     for _ in range(_ROUNDS):
         begin = u
@@ -125,5 +110,4 @@ def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _En
     priors = objective.prior_residuals(u)[0]
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
-    states = [term.noise_state() for term in noisy]
-    return _End(u, deviance, states, agreed)
+    return _End(u, deviance, objective, agreed)

@@ -84,24 +84,12 @@ class WindowedFit:
 
     def record(self) -> dict[str, Any]:
         """Plain numbers and texts, for JSON."""
-        return {
-            "windows": [[plain(t) for t in window] for window in self.windows],
-            "parameters": {
-                name: {
-                    "value": plain(p.value),
-                    "unit": p.unit,
-                    "se": plain(p.se),
-                    "se_noise": plain(p.se_noise),
-                    "se_window": plain(p.se_window),
-                    "interval_68": [plain(x) for x in p.interval_68],
-                    "interval_95": [plain(x) for x in p.interval_95],
-                    "values": [plain(x) for x in p.values],
-                }
-                for name, p in self.parameters.items()
-            },
-            "undetermined": list(self.undetermined),
-            "warnings": list(self.warnings),
+        parameters = {
+            name: {key: value for key, value in vars(p).items() if key != "name"}
+            for name, p in self.parameters.items()
         }
+        whole = {name: value for name, value in vars(self).items() if name != "fits"}
+        return {name: plain(value) for name, value in (whole | {"parameters": parameters}).items()}
 
 
 def fit_windows(

@@ -13,10 +13,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
 from asperity.inference.holds.table import HEALING, HealingTable
-from asperity.inference.objective import Likelihood, Residuals
-from asperity.inference.unknowns import Unknown
+from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.slider import Slider
@@ -28,7 +26,7 @@ Float = NDArray[np.float64]
 _ROWS, _MANY = 32, 1024
 
 
-class HoldTerm:
+class HoldTerm(DataTerm):
     """A table of holds as a `DataTerm` of an objective.
 
     Errors that the table does not give are one for all rows. It is `error`, at first a guess that
@@ -42,26 +40,22 @@ class HoldTerm:
         Parameters of the law that are not free, in SI.
     """
 
-    nuisances: tuple[Unknown, ...] = ()
-    searches = None
-    affordable = 1024
     observables = (HEALING,)
     failure = (
         "no start has a solution at every hold; give start values nearer to those of the interface"
     )
 
     def __init__(self, table: HealingTable, law: type[Law], fixed: Mapping[str, Any]) -> None:
-        self.table, self.law = table, law
+        self.table, self.law, self.name = table, law, table.name
         self._fields = {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(law).items()}
         self._fixed = {n: float(v) for n, v in fixed.items() if n in self._fields}
-        self.profiled = int(table.errors is None)
         self.error = 0.1 * float(np.ptp(table.healing)) or 1e-3
         self._freedom = math.inf
 
     @property
-    def name(self) -> str:
-        """Name of the table."""
-        return self.table.name
+    def profiled(self) -> int:
+        """The error, if it is estimated."""
+        return int(self.table.errors is None)
 
     @property
     def sigma(self) -> Float:
@@ -143,17 +137,6 @@ class HoldTerm:
         table = self.table
         return jnp.asarray(table.K[at]), jnp.asarray(table.V[at]), jnp.asarray(table.hold_time[at])
 
-    def likelihood(self, names: tuple[str, ...]) -> tuple[Likelihood, Any]:
-        """Not there: compiled samplers take gradients that an integration to an event has not."""
-        raise InputError(
-            f"a posterior must be of lock-in readings or recordings, got the holds of {self.name}; "
-            "take intervals by profile likelihood (profile=True, --profile)"
-        )
-
-    def thinned(self, rows: int, data: int = 0) -> None:
-        """Nothing: holds are few."""
-        return
-
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
@@ -165,9 +148,6 @@ class HoldTerm:
         """Holds and healing."""
         t = self.table
         return {"hold_time": t.hold_time, "V": t.V, "K": t.K, HEALING: t.healing}
-
-    def use_search(self, always: bool) -> None:
-        """There is one method."""
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
@@ -212,10 +192,8 @@ def _with_slopes(
     def of(values: dict[str, Array]) -> Array:
         return _healing(law, fields, {**given, **values}, K, V, hold_time)
 
-    free = {n: given[n] for n in names}
+    def along(shares: Array) -> Array:
+        change = {n: jnp.broadcast_to(s, K.shape) for n, s in zip(names, shares, strict=True)}
+        return jax.jvp(of, ({n: given[n] for n in names},), (change,))[1]
 
-    tangents = {
-        n: jnp.stack([jnp.full_like(v, float(n == m)) for m in names]) for n, v in free.items()
-    }
-    slopes = jax.vmap(lambda t: jax.jvp(of, (free,), (t,))[1])(tangents)
-    return of(free), slopes
+    return of({}), jax.vmap(along)(jnp.eye(len(names)))

@@ -4,8 +4,8 @@ The sampler walks in z, where the posterior is near a normal density of unit cov
 q = mode + root @ z, with unbounded coordinates q and a root of the covariance that the curvature at
 the mode stands for (Laplace).
 
-The coordinate u of a fit has bounds. With two of them, u = low + (high - low) / (1 + exp(-q));
-with one, u = low + exp(q) or u = high - exp(-q); without, u = q. Densities are multiplied by du/dq.
+The coordinate u of a fit lies in a range, u = low + (high - low) / (1 + exp(-q)). Densities are
+multiplied by du/dq.
 
 The prior is a proper density of u. A parameter with a prior has that normal density, cut off where
 its rule says. Without, its coordinate is uniform over a range: a tenth of the lowest to ten times
@@ -27,13 +27,11 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtr
 
-from asperity.inference.objective import Likelihood, Objective
+from asperity.inference.objective import CompiledResiduals, Objective
 from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
-#: Kinds of coordinates.
-_FREE, _ABOVE, _BELOW, _BETWEEN = 0, 1, 2, 3
 #: The mode is reached where the gradient of the log density is smaller, by standard deviations: a
 #: step gains half its square, near what the accuracy of orbits and motions leaves. Steps at most.
 _REACHED, _STEPS = 0.05, 20
@@ -42,101 +40,52 @@ _NARROWEST, _WIDEST = 1e-9, 3.0
 
 
 class Coordinates(NamedTuple):
-    """Bounds of the coordinates u and what they are turned into.
+    """Ranges and normal priors of the coordinates u; arrays of shape (n,).
 
     Attributes
     ----------
-    low, high : array, shape (n,)
-        Bounds of u; 0 where there is none.
-    kind : int array, shape (n,)
+    low, high : array
+        Range of u.
+    logarithmic : bool array
+        Where u is the logarithm of the parameter.
+    scale : array
+        Parameter over u elsewhere.
+    mean, precision : array
+        Of normal priors of the parameter, in SI; 0 where there is none.
     """
 
     low: Any
     high: Any
-    kind: Any
-
-    @classmethod
-    def of(cls, bounds: Sequence[tuple[float, float]]) -> Coordinates:
-        """Coordinates with bounds (low, high), infinite where there is none."""
-        low, high = np.array(bounds, float).reshape(-1, 2).T
-        kind = np.isfinite(low) * _ABOVE + np.isfinite(high) * _BELOW
-        low, high = (np.where(np.isfinite(end), end, 0.0) for end in (low, high))
-        return cls(low, high, kind)
-
-    @property
-    def bounded_twice(self) -> NDArray[np.bool_]:
-        """Which coordinates have bounds on both sides."""
-        return np.asarray(self.kind == _BETWEEN)
-
-    def to_q(self, u: Float) -> Float:
-        """Unbounded coordinates of u; u must lie between the bounds."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            above, below = np.log(u - self.low), -np.log(self.high - u)
-        return np.choose(self.kind, [u, above, below, above + below])
-
-    def to_u(self, q: Any) -> Any:
-        """Coordinates of the fit, for q of shape (..., n)."""
-        share = 1 / (1 + jnp.exp(-q))
-        return jnp.select(
-            [self.kind == _ABOVE, self.kind == _BELOW, self.kind == _BETWEEN],
-            [
-                self.low + _exp(q),
-                self.high - _exp(-q),
-                self.low + (self.high - self.low) * share,
-            ],
-            q,
-        )
-
-    def log_slope(self, q: Any) -> Array:
-        """ln(du/dq) of each coordinate."""
-        between = jnp.log(jnp.maximum(self.high - self.low, 1e-300))
-        between = between - jnp.logaddexp(0.0, q) - jnp.logaddexp(0.0, -q)
-        return jnp.select(
-            [self.kind == _ABOVE, self.kind == _BELOW, self.kind == _BETWEEN],
-            [q, -q, between],
-            jnp.zeros_like(q),
-        )
-
-    def inside(self, u: Float, sd: Float) -> Float:
-        """The nearest coordinates that are off the bounds by a tenth of a standard deviation."""
-        step = 0.1 * np.minimum(sd, np.where(self.kind == _BETWEEN, self.high - self.low, np.inf))
-        low = np.where(np.isin(self.kind, (_ABOVE, _BETWEEN)), self.low + step, -np.inf)
-        high = np.where(np.isin(self.kind, (_BELOW, _BETWEEN)), self.high - step, np.inf)
-        return np.clip(u, low, high)
-
-
-def _exp(q: Any) -> Array:
-    """Exponential without overflow, for coordinates of which another kind is chosen."""
-    return jnp.exp(jnp.clip(q, -700.0, 700.0))
-
-
-class PriorArrays(NamedTuple):
-    """Numbers of a prior.
-
-    Attributes
-    ----------
-    logarithmic : bool array, shape (n,)
-        Where the coordinate u is the logarithm of the parameter.
-    scale : array, shape (n,)
-        Of the others.
-    mean, precision : array, shape (n,)
-        Of normal priors, in SI; 0 where there is none.
-    """
-
     logarithmic: Any
     scale: Any
     mean: Any
     precision: Any
 
+    def to_q(self, u: Float) -> Float:
+        """Unbounded coordinates of u, which must lie within the range."""
+        return np.asarray(np.log(u - self.low) - np.log(self.high - u))
+
+    def to_u(self, q: Any) -> Any:
+        """Coordinates of the fit, for q of shape (..., n)."""
+        return self.low + (self.high - self.low) / (1 + jnp.exp(-q))
+
+    def log_slope(self, q: Any) -> Array:
+        """ln(du/dq) of each coordinate."""
+        return jnp.log(self.high - self.low) - jnp.logaddexp(0.0, q) - jnp.logaddexp(0.0, -q)
+
     def values(self, u: Any) -> Array:
-        """Parameters in SI at coordinates of shape (..., n)."""
+        """Parameters in SI, for u of shape (..., n)."""
         return jnp.where(self.logarithmic, jnp.exp(u), u * self.scale)
 
-    def log_density(self, u: Any) -> Array:
-        """Logarithm of the density of u but for a constant, shape (..., n) to (...)."""
+    @property
+    def volumes(self) -> Any:
+        """1 where the normal prior is one of exp(u), whose density of u has the factor exp(u)."""
+        return (self.precision > 0) & self.logarithmic
+
+    def log_prior(self, u: Any) -> Array:
+        """Logarithm of the prior density of u but for a constant, shape (..., n) to (...)."""
         normal = -0.5 * ((self.values(u) - self.mean) * self.precision) ** 2
-        volume = jnp.where((self.precision > 0) & self.logarithmic, u, 0.0)
-        return jnp.sum(normal + volume, axis=-1)
+        return jnp.sum(normal + jnp.where(self.volumes, u, 0.0), axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,31 +95,21 @@ class PriorDensity:
     Attributes
     ----------
     unknowns : tuple of Unknown
-    low, high : array, shape (n,)
-        Range of the coordinates.
-    mean, precision : array, shape (n,)
-        Of the normal priors, in SI; 0 where there is none.
+    coordinates : Coordinates
     log_norm : float
         Logarithm of the normalising factor.
     """
 
     unknowns: tuple[Unknown, ...]
-    low: Float
-    high: Float
-    mean: Float
-    precision: Float
+    coordinates: Coordinates
     log_norm: float
 
     @classmethod
     def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> PriorDensity:
         """The prior, with ranges that reach an estimate u with standard deviations sd."""
-        low, high = np.array(
-            [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
-        ).T
-        mean = np.array([k.prior.mean if k.prior else 0.0 for k in unknowns])
-        sds = np.array([k.prior.sd if k.prior else math.inf for k in unknowns])
+        ranges = [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
         log_norm = 0.0
-        for k, a, b in zip(unknowns, low, high, strict=True):
+        for k, (a, b) in zip(unknowns, ranges, strict=True):
             if k.prior is None:
                 log_norm -= math.log(b - a)
             else:
@@ -178,23 +117,20 @@ class PriorDensity:
                 log_norm -= math.log(ndtr(z[1]) - ndtr(z[0]))
                 log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
                 log_norm += 0.0 if k.logarithmic else math.log(k.scale)
-        return cls(tuple(unknowns), low, high, mean, 1 / sds, log_norm)
-
-    @property
-    def arrays(self) -> PriorArrays:
-        """What a compiled program needs of it."""
-        return PriorArrays(
-            np.array([k.logarithmic for k in self.unknowns]),
-            np.array([k.scale for k in self.unknowns]),
-            self.mean,
-            self.precision,
+        coordinates = Coordinates(
+            *np.array(ranges).reshape(-1, 2).T,
+            np.array([k.logarithmic for k in unknowns]),
+            np.array([k.scale for k in unknowns]),
+            np.array([k.prior.mean if k.prior else 0.0 for k in unknowns]),
+            np.array([1 / k.prior.sd if k.prior else 0.0 for k in unknowns]),
         )
+        return cls(tuple(unknowns), coordinates, log_norm)
 
     def log_density(self, u: Float) -> Float:
         """Logarithm of the density at u, shape (..., n) to (...); minus infinity out of range."""
-        outside = ((u < self.low) | (u > self.high)).any(-1)
-        density = np.asarray(self.arrays.log_density(u)) + self.log_norm
-        return np.where(outside, -np.inf, density)
+        c = self.coordinates
+        outside = ((u < c.low) | (u > c.high)).any(-1)
+        return np.where(outside, -np.inf, np.asarray(c.log_prior(u)) + self.log_norm)
 
     def record(self) -> dict[str, dict[str, float | str]]:
         """Each prior in SI, for JSON."""
@@ -210,8 +146,8 @@ class PriorDensity:
             else:
                 result[k.name] = {
                     "kind": "uniform in the logarithm" if k.logarithmic else "uniform",
-                    "low": float(k.to_value(self.low[i])),
-                    "high": float(k.to_value(self.high[i])),
+                    "low": float(k.to_value(self.coordinates.low[i])),
+                    "high": float(k.to_value(self.coordinates.high[i])),
                 }
         return result
 
@@ -223,15 +159,13 @@ class DensityData(NamedTuple):
     ----------
     mode, root : array, shapes (n,) and (n, n)
     coordinates : Coordinates
-    prior : PriorArrays
     terms : tuple
-        Of each set of data, as its likelihood reads them.
+        Of each set of data, as its residuals read them.
     """
 
     mode: Any
     root: Any
     coordinates: Coordinates
-    prior: PriorArrays
     terms: tuple[Any, ...]
 
 
@@ -243,21 +177,21 @@ class PosteriorDensity:
     ----------
     names : tuple of str
         Free parameters.
-    likelihoods : tuple
+    residuals : tuple
         Of each set of data: functions of the parameters by name and of its arrays.
     """
 
     names: tuple[str, ...]
-    likelihoods: tuple[Likelihood, ...]
+    residuals: tuple[CompiledResiduals, ...]
 
     def __call__(self, z: Array, data: DensityData) -> Array:
         """Log density at z, of shape (n,)."""
         q = data.mode + data.root @ z
         u = data.coordinates.to_u(q)
-        total = data.prior.log_density(u) + jnp.sum(data.coordinates.log_slope(q))
-        values = dict(zip(self.names, data.prior.values(u), strict=True))
-        for likelihood, arrays in zip(self.likelihoods, data.terms, strict=True):
-            total = total + likelihood(values, arrays)
+        total = data.coordinates.log_prior(u) + jnp.sum(data.coordinates.log_slope(q))
+        values = dict(zip(self.names, data.coordinates.values(u), strict=True))
+        for residuals, arrays in zip(self.residuals, data.terms, strict=True):
+            total = total - 0.5 * jnp.sum(residuals(values, arrays) ** 2)
         return total
 
 
@@ -269,23 +203,28 @@ class Whitened:
     ----------
     objective : Objective
     prior : PriorDensity
-    coordinates : Coordinates
     mode, root : array
         As of `DensityData`.
     """
 
     objective: Objective
     prior: PriorDensity
-    coordinates: Coordinates
     mode: Float
     root: Float
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Of the prior."""
+        return self.prior.coordinates
 
     @classmethod
     def at(cls, objective: Objective, prior: PriorDensity, u: Float, sd: Float) -> Whitened:
         """The posterior whitened at the mode that is reached from u."""
-        coordinates = Coordinates.of(list(zip(prior.low, prior.high, strict=True)))
-        start = coordinates.to_q(coordinates.inside(u, sd))
-        near = cls(objective, prior, coordinates, start, np.eye(len(u)))
+        low, high, *_ = prior.coordinates
+        # Off the bounds by a tenth of a standard deviation.
+        step = 0.1 * np.minimum(sd, high - low)
+        start = prior.coordinates.to_q(np.clip(u, low + step, high - step))
+        near = cls(objective, prior, start, np.eye(len(u)))
         near = near._rooted(start)
         climbed = minimize(
             lambda z: -near.log_density(z)[0],
@@ -324,26 +263,18 @@ class Whitened:
         log_slope = np.asarray(self.coordinates.log_slope(q))
         slope, share = np.exp(log_slope), 1 / (1 + np.exp(-q))
         # Derivatives of the logarithm of the slope, first and second.
-        one, nothing = np.ones_like(q), np.zeros_like(q)
-        bend = np.choose(self.coordinates.kind, [nothing, one, -one, 1 - 2 * share])
-        curvature = np.where(self.coordinates.bounded_twice, 2 * share * (1 - share), 0.0)
-        # Priors are densities of the parameter itself: that of its logarithm has a volume.
-        volume = np.where((self.prior.precision > 0) & self.prior.arrays.logarithmic, 1.0, 0.0)
+        bend, curvature = 1 - 2 * share, 2 * share * (1 - share)
+        volume = self.coordinates.volumes.astype(float)
         J = jacobian * slope
         value = -0.5 * float(r @ r) + float(volume @ u + log_slope.sum())
         return value, -J.T @ r + volume * slope + bend, J.T @ J + np.diag(curvature)
 
     def compiled(self) -> tuple[PosteriorDensity, DensityData]:
         """The density as a compiled program evaluates it, and its data."""
-        parts = [term.likelihood(self.objective.names) for term in self.objective.terms]
-        data = DensityData(
-            self.mode,
-            self.root,
-            self.coordinates,
-            self.prior.arrays,
-            tuple(arrays for _, arrays in parts),
-        )
-        return PosteriorDensity(self.objective.names, tuple(own for own, _ in parts)), data
+        parts = [term.compiled(self.objective.names) for term in self.objective.terms]
+        residuals, arrays = zip(*parts, strict=True)
+        data = DensityData(self.mode, self.root, self.coordinates, arrays)
+        return PosteriorDensity(self.objective.names, residuals), data
 
 
 def _root(information: Float) -> Float:

@@ -137,18 +137,8 @@ class Posterior:
             "draws": draws,
             "seed": self.seed,
             "parameters": {
-                name: {
-                    "unit": p.unit,
-                    "mean": p.mean,
-                    "sd": p.sd,
-                    "median": p.median,
-                    "interval_68": list(p.interval_68),
-                    "interval_95": list(p.interval_95),
-                    "r_hat": plain(p.r_hat),
-                    "ess_bulk": plain(p.ess_bulk),
-                    "ess_tail": plain(p.ess_tail),
-                    "prior": self.prior[name],
-                }
+                name: {key: plain(value) for key, value in vars(p).items() if key != "name"}
+                | {"prior": self.prior[name]}
                 for name, p in self.parameters.items()
             },
             "divergences": int(self.diverging.sum()),

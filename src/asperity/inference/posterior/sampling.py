@@ -11,7 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -45,26 +45,9 @@ _ASK = 0.5
 _ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-class ChainState(NamedTuple):
-    """Where a chain is, all as arrays.
-
-    Attributes
-    ----------
-    key : uint32 array
-        Data of the key of the next block.
-    z, log_density, gradient : array
-        Whitened position, of shape (n,), log density there and its gradient.
-    step_size : array, shape ()
-    metric : array, shape (n, n)
-        Inverse mass matrix.
-    """
-
-    key: Any
-    z: Any
-    log_density: Any
-    gradient: Any
-    step_size: Any
-    metric: Any
+#: Where a chain is, all as arrays: data of the key of the next block, position with its density and
+#: gradient, step size, and inverse mass matrix.
+ChainState = tuple[Any, Any, Any, Any]
 
 
 def sample_posterior(
@@ -226,37 +209,25 @@ def _warm_up(data: Any, key: Any, z: Any, *, log_density: LogDensity) -> ChainSt
     )
     later, now = jax.random.split(jax.random.wrap_key_data(key))
     (state, result), _ = adaptation.run(now, z, WARM_UP)
-    return ChainState(
-        jax.random.key_data(later),
-        state.position,
-        state.logdensity,
-        state.logdensity_grad,
-        result["step_size"],
-        result["inverse_mass_matrix"],
-    )
+    return jax.random.key_data(later), state, result["step_size"], result["inverse_mass_matrix"]
 
 
 @partial(jit_large, static_argnames=("log_density",))
 def _block(
     data: Any, state: ChainState, *, log_density: LogDensity
 ) -> tuple[ChainState, Transitions]:
-    from blackjax.mcmc import hmc, nuts
+    import blackjax
 
-    kernel = nuts.build_kernel()
+    kernel = blackjax.nuts.build_kernel()
     density = finite_density(log_density, data)
+    *begin, step_size, metric = state
 
-    def draw(state: ChainState, _: None) -> tuple[ChainState, Transitions]:
-        key, now = jax.random.split(jax.random.wrap_key_data(state.key))
-        before = hmc.HMCState(state.z, state.log_density, state.gradient)
-        after, info = kernel(now, before, density, state.step_size, state.metric)
+    def draw(carry: Any, _: None) -> tuple[Any, Transitions]:
+        key, now = jax.random.split(jax.random.wrap_key_data(carry[0]))
+        after, info = kernel(now, carry[1], density, step_size, metric)
         ends = info.trajectory_leftmost_state, info.trajectory_rightmost_state
         failed = jnp.logical_or(*(~jnp.isfinite(end.logdensity) for end in ends))
-        return state._replace(
-            key=jax.random.key_data(key),
-            z=after.position,
-            log_density=after.logdensity,
-            gradient=after.logdensity_grad,
-        ), Transitions(
+        return (jax.random.key_data(key), after), Transitions(
             after.position,
             after.logdensity,
             info.acceptance_rate,
@@ -266,7 +237,8 @@ def _block(
             info.energy,
         )
 
-    return jax.lax.scan(draw, state, None, length=BLOCK)
+    end, transitions = jax.lax.scan(draw, tuple(begin), None, length=BLOCK)
+    return (*end, step_size, metric), transitions
 
 
 def finite_density(log_density: LogDensity, data: Any) -> Callable[[Array], Array]:

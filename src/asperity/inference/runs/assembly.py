@@ -10,19 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
-from asperity.inference.runs.term import RunTerm, cut_delays
+from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
+from asperity.parameters.arguments import typed
 
 #: Kind of quantity of K, by the unit of the load.
 _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
@@ -33,11 +34,12 @@ USUAL_STIFFNESS = (5e2, 5e4)
 _SAMPLES_PER_PARAMETER = 8
 #: Of an air layer: its gap, the radius of the patch and the pressure, as users call them.
 _LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
-LINEAR = ("offset", "trend", "bend", "drift")
+Linear = Literal["offset", "trend", "bend", "drift"]
 #: Standard deviations of the departures of the initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
 
 
+@typed
 @dataclass(frozen=True)
 class RunOptions:
     """How recorded runs are compared with the motion.
@@ -59,21 +61,14 @@ class RunOptions:
         over blocks as short as their changes need.
     """
 
-    linear: tuple[str, ...] = ("offset", "trend")
-    initial: str = "steady"
+    linear: tuple[Linear, ...] = ("offset", "trend")
+    initial: Literal["steady", "free"] = "steady"
     gauge: tuple[int, float] | None = None
     order: int | None = None
     fit_rate: float | str | None = None
 
     def __post_init__(self) -> None:
         checked_rate(self.fit_rate)
-        for name in self.linear:
-            if name not in LINEAR:
-                raise InputError(
-                    f"linear must be of {', '.join(LINEAR)}, got '{name}'; {closest(name, LINEAR)}"
-                )
-        if self.initial not in ("steady", "free"):
-            raise InputError(f"initial must be steady or free, got '{self.initial}'; choose one")
 
 
 def stiffness(run: RecordedRun) -> Parameter:
@@ -323,10 +318,7 @@ def _initial(
         name = inner + suffix
         meaning = "departure of the initial state from steady sliding"
         parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
-        prior = Prior(0.0, sd, "wide")
-        result.append(
-            Unknown(parameter, False, sd, -10 * sd, 10 * sd, (0.0, 0.0), 0.0, prior, nuisance=True)
-        )
+        result.append(about_zero(parameter, sd, 10 * sd, "wide"))
         own[name] = inner
     return tuple(result), own
 
@@ -427,32 +419,12 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
 
 def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:
     """Where the first samples of x that are also in y begin in both."""
-    if min(x.size, y.size) < _EQUAL:
-        return None
     rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
     various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT
-    begins = np.flatnonzero(various)
-    marks = _marks(x)[::_EQUAL][begins]
-    order = np.argsort(marks)
-    others = _marks(y)
-    at = np.searchsorted(marks[order], others)
-    at[at == order.size] = 0
-    for j in np.flatnonzero(marks[order][at] == others) if order.size else ():
-        k = int(begins[order[at[j]]])
-        if np.array_equal(y[j : j + _EQUAL], rows[k]):
-            return k * _EQUAL, int(j)
+    places = {rows[k].tobytes(): k for k in np.flatnonzero(various)[::-1]}
+    whole, size = y.tobytes(), y.itemsize
+    for j in range(y.size - _EQUAL + 1 if places else 0):
+        k = places.get(whole[size * j : size * (j + _EQUAL)])
+        if k is not None:
+            return int(k) * _EQUAL, j
     return None
-
-
-def _marks(x: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """A number for each 64 samples in a row that depends on all of their bits."""
-    bits = np.ascontiguousarray(x).view(np.uint64)
-    factor = 0x9E3779B97F4A7C15
-    length, mark = 1, bits * np.uint64(factor)
-    # Of twice as many samples each time; numbers wrap at 2^64.
-    while length < _EQUAL:
-        factor = (factor * factor + 2) % 2**64
-        later = mark[length:]
-        mark = mark[: mark.size - length] * np.uint64(factor) + (later ^ (later >> np.uint64(29)))
-        length *= 2
-    return mark

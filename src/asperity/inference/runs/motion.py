@@ -8,7 +8,7 @@ forwards; a sampler the logarithm of the likelihood and its gradient.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -201,49 +201,6 @@ def through(
     return f, jax.vmap(along)(slopes, free.directions), steps, done
 
 
-def density_through(
-    density: Callable[[Array], Array],
-    motion: Motion,
-    free: Free,
-    given: dict[str, Any],
-    drive: Drive,
-    reading: Reading,
-    *,
-    room: int,
-) -> tuple[Array, Array]:
-    """A number that depends on the recorded friction, and its gradient.
-
-    The motion is differentiated forwards, as by `through`, and the samples, of which there are far
-    more than steps, backwards.
-
-    Parameters
-    ----------
-    density : callable
-        Of what `through` gives as friction.
-    motion, free, given, drive, reading, room
-        As of `through`.
-
-    Returns
-    -------
-    value : array, shape ()
-        NaN where the end was not reached.
-    gradient : array, shape (derivatives,)
-        Along the directions of `free`.
-    """
-    x = free.numbers(given)
-    curve, slopes, steps, done = integrated(motion, free, given, drive, room)
-
-    def value_of(curve: Curve, x: Array) -> Array:
-        values = free.values(given, x)
-        return density(_recorded(motion, drive, values, curve, steps, reading))
-
-    value, (back, direct) = jax.value_and_grad(value_of, argnums=(0, 1))(curve, x)
-    gradient = free.directions @ direct
-    for weight, slope in zip(back, slopes, strict=True):
-        gradient += jnp.sum(weight * slope, axis=tuple(range(1, slope.ndim)))
-    return jnp.where(done, value, jnp.nan), gradient
-
-
 def _recorded(
     motion: Motion,
     drive: Drive,
@@ -367,8 +324,11 @@ class RunArrays(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RunLikelihood:
-    """Log likelihood of a recording under the noise of the estimate, but for a constant.
+class RunResiduals:
+    """Innovations of a recording within compiled programs, under the noise of the estimate.
+
+    The motion is differentiated forwards, as by `through`, and the samples, of which there are far
+    more than steps, backwards.
 
     Attributes
     ----------
@@ -388,27 +348,32 @@ class RunLikelihood:
     room: int
 
     def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
-        """Log likelihood of parameters by name; NaN where the motion cannot be computed."""
+        """Of parameters by name, shape (n,); NaN where the motion cannot be computed."""
         motion = eqx.combine(data.motion, self.equation)
         names = tuple(inner for _, inner in self.inner)
 
-        def density(friction: Array) -> Array:
-            departures = friction - data.recorded
-            white = innovations(departures, data.noise, self.stretches, data.basis, jnp)
-            return -0.5 * jnp.sum(white**2)
+        def forward(x: Array) -> tuple[Array, Any]:
+            numbers = {**data.fixed, **dict(zip(names, x, strict=True))}
+            given, free = arranged(numbers, names, motion.size, len(data.drive.edges), jnp)
+            curve, slopes, steps, done = integrated(motion, free, given, data.drive, self.room)
 
-        def both(x: Array) -> tuple[Array, Array]:
-            values = {**data.fixed, **dict(zip(names, x, strict=True))}
-            edges = len(data.drive.edges)
-            given, free = arranged(values, names, motion.size, edges, jnp)
-            value, gradient = density_through(
-                density, motion, free, given, data.drive, data.reading, room=self.room
-            )
-            return value, gradient[: len(names)]
+            def white(curve: Curve, x: Array) -> Array:
+                values = free.values(given, x)
+                friction = _recorded(motion, data.drive, values, curve, steps, data.reading)
+                departures = friction - data.recorded
+                return innovations(departures, data.noise, self.stretches, data.basis, jnp)
 
-        @jax.custom_vjp
-        def likelihood(x: Array) -> Array:
-            return both(x)[0]
+            result, back = jax.vjp(white, curve, free.numbers(given))
+            return jnp.where(done, result, jnp.nan), (back, slopes, free.directions)
 
-        likelihood.defvjp(both, lambda gradient, change: (change * gradient,))
-        return likelihood(jnp.stack([values[name] for name, _ in self.inner]))
+        def backward(saved: Any, change: Array) -> tuple[Array]:
+            back, slopes, directions = saved
+            by_curve, direct = back(change)
+            gradient = directions @ direct
+            for weight, slope in zip(by_curve, slopes, strict=True):
+                gradient += jnp.sum(weight * slope, axis=tuple(range(1, slope.ndim)))
+            return (gradient[: len(names)],)
+
+        residuals = jax.custom_vjp(lambda x: forward(x)[0])
+        residuals.defvjp(forward, backward)
+        return residuals(jnp.stack([values[name] for name, _ in self.inner]))

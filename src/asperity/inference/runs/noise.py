@@ -12,9 +12,7 @@ Biometrics Bull. 2, 110, 1946) Student's t needs; both as Kenward and Roger (Bio
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -57,32 +55,8 @@ def innovations(
     return white if basis is None else white - basis @ (basis.T @ white)
 
 
-@dataclass(frozen=True)
-class Whiteness:
-    """Tests of whether innovations are white.
-
-    Attributes
-    ----------
-    portmanteau : float
-        Probability of larger autocorrelations by chance (Ljung and Box, 1978).
-    periodogram : float
-        Probability of a larger departure of the cumulative periodogram from a line (Bartlett).
-    line : float
-        Probability of a higher peak of the periodogram (Fisher, 1929).
-    """
-
-    portmanteau: float
-    periodogram: float
-    line: float
-
-    @property
-    def p_value(self) -> float:
-        """Of the three tests together, by Bonferroni."""
-        return min(1.0, 3 * min(self.portmanteau, self.periodogram, self.line))
-
-
-def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
-    """Test stretches of innovations.
+def whiteness(innovations: Sequence[Float], fitted_order: int) -> float:
+    """Probability of larger autocorrelations by chance (Ljung and Box, Biometrika 65, 297, 1978).
 
     Parameters
     ----------
@@ -95,24 +69,7 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
     products = sum(LaggedProducts(x[None], lags).sums for x in innovations)
     r = products[1 : lags + 1] / products[0]
     q = float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    portmanteau = float(chdtrc(max(lags - fitted_order, 1), n * (n + 2) * q))
-    worst = peak = 1.0
-    for x in innovations:
-        spectrum = np.abs(np.fft.rfft(x))[1 : (x.size - 1) // 2 + 1] ** 2
-        m = spectrum.size
-        if m < 8:
-            continue
-        rise = np.cumsum(spectrum) / spectrum.sum()
-        line = np.arange(1, m + 1) / m
-        largest = float(np.max(np.abs(rise - line))) * math.sqrt(m - 1)
-        j = np.arange(1, 101)
-        chance = float(
-            np.clip(2 * np.sum((-1.0) ** (j - 1) * np.exp(-2 * (j * largest) ** 2)), 0, 1)
-        )
-        worst = min(worst, 1.0 if largest < 0.2 else chance)
-        peak = min(peak, -math.expm1(m * math.log1p(-math.exp(-spectrum.max() / spectrum.mean()))))
-    count = len(innovations)
-    return Whiteness(portmanteau, min(1.0, worst * count), min(1.0, peak * count))
+    return float(chdtrc(max(lags - fitted_order, 1), n * (n + 2) * q))
 
 
 #: Samples after a change in which a misfit is looked for, and before it: its time is uncertain.

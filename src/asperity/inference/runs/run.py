@@ -58,30 +58,22 @@ class Blocks:
         Samples in a block, of each stretch of one sampling rate.
     recorded : int
         Samples of the recording.
-    lines : tuple of float
-        Lines (Hz) that were taken off the friction before.
     """
 
     edges: Float
     samples: tuple[int, ...]
     recorded: int
-    lines: tuple[float, ...] = ()
 
     @property
     def sentence(self) -> str:
         """What was averaged, for readers."""
         lengths = np.unique(np.round(np.diff(self.edges, axis=1)[:, 0], 9))
         spread = [f"{1e3 * x:.4g}" for x in (lengths[0], lengths[-1])]
-        said = (
+        return (
             f"{self.recorded} samples are compared as {len(self.edges)} means over blocks of "
             + (" or ".join(map(str, sorted(set(self.samples)))))
             + f" ({' to '.join(dict.fromkeys(spread))} ms)"
         )
-        if self.lines:
-            said += (
-                f", after lines at {', '.join(f'{f:.4g}' for f in self.lines)} Hz were taken off"
-            )
-        return said
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,29 +304,47 @@ def strange_friction(friction: Float) -> list[str]:
     return said
 
 
-def _load(
-    trace: Trace, load: str, name: str, time: Float, unit: str
-) -> tuple[float, str, bool, Float, Float]:
-    """Load at the first sample, its unit, whether it varies, and its line over time."""
-    ends = np.array([time[0], time[-1]])
+def recorded_load(
+    trace: Trace, load: str, time: Float, subject: str, advice: str
+) -> tuple[Float, Float] | None:
+    """Times and load, positive in compression, of the samples within the span of `time`.
+
+    None where no load is recorded.
+
+    Raises
+    ------
+    InputError
+        If it is not positive.
+    """
     try:
         channel = trace.channel(load)
     except InputError:
         if load != "W":
             raise
-        return 1.0, "", False, ends, np.ones(2)
-    good = np.isfinite(channel.values) & np.isfinite(trace.time)
-    good &= (trace.time >= time[0]) & (trace.time <= time[-1])
+        return None
+    good = np.isfinite(channel.values) & (trace.time >= time[0]) & (trace.time <= time[-1])
     t, W = trace.time[good], compressive(channel.values[good], channel.values[good])[0]
     if t.size < 2:
-        return 1.0, "", False, ends, np.ones(2)
+        return None
     if not (W > 0).all():
         raise InputError(
-            f"{name} must be under a positive load, got {W.min():.4g} {unit}; give a window in "
-            "which the slider is in contact"
+            f"{subject} must be under a positive load, got {W.min():.4g} {channel.unit}; {advice}"
         )
     order = np.argsort(t, kind="stable")
-    t, W = t[order], W[order]
+    return t[order], W[order]
+
+
+def _load(
+    trace: Trace, load: str, name: str, time: Float, unit: str
+) -> tuple[float, str, bool, Float, Float]:
+    """Load at the first sample, its unit, whether it varies, and its line over time."""
+    ends = time[[0, -1]]
+    recorded = recorded_load(
+        trace, load, time, name, "give a window in which the slider is in contact"
+    )
+    if recorded is None:
+        return 1.0, "", False, ends, np.ones(2)
+    t, W = recorded
     mean = float(W.mean())
     noise = float(np.median(np.abs(np.diff(W, 2)))) / 0.6745 / np.sqrt(6.0) if W.size > 4 else 0.0
     knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from copy import copy
+from typing import Any
 
 import equinox as eqx
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.objective import Residuals
+from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
+from asperity.inference.runs.motion import RunArrays, RunMotion, RunResiduals
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
@@ -40,21 +41,11 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _CUT_INTERVALS = 2.0
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
-#: Motions that are remembered.
-_REMEMBERED = 128
 #: Spikes that a warning names.
 _NAMED = 5
 
 
-class NoiseState(NamedTuple):
-    """Noise of a recording: the parts of a `RunTerm` that change."""
-
-    models: tuple[Autoregression, ...]
-    whiteness: float
-    after_changes: tuple[float, float]
-
-
-class RunTerm:
+class RunTerm(DataTerm):
     """A recorded run as a `DataTerm` of an objective.
 
     Nuisances that enter linearly, such as the offset of the gauge and a trend over slip, are
@@ -90,9 +81,6 @@ class RunTerm:
         "compute; give start values with a stiffness above the critical one, or a shorter window"
     )
     observables = ("friction",)
-    searches = None
-    #: A motion takes ten times as long as the orbits of a table.
-    affordable = 256
 
     def __init__(
         self,
@@ -108,10 +96,10 @@ class RunTerm:
         radiation_damping: bool = False,
         order: int | None = None,
     ) -> None:
-        self.run, self.law, self.fixed = run, law, dict(fixed)
+        self.run, self.law, self.fixed, self.name = run, law, dict(fixed), run.name
         self.linear, self.nuisances = linear, nuisances
         self._own = dict(own or {})
-        self.gauge, self._order = gauge, order
+        self._order = order
         self.motion = RunMotion(
             law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
         )
@@ -120,15 +108,8 @@ class RunTerm:
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
-        # Of starts, shared by copies that differ in their noise.
-        self._differences: dict[tuple[float, ...], Float | None] = {}
         self.models = [self._first_noise(a, b) for a, b in run.stretches]
         self._prepare()
-
-    @property
-    def name(self) -> str:
-        """Name of the run."""
-        return self.run.name
 
     @property
     def profiled(self) -> int:
@@ -147,29 +128,24 @@ class RunTerm:
             "effective_samples": round(
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
-            "lines_removed": [] if self.run.blocks is None else list(self.run.blocks.lines),
             "outliers": list(self.run.spikes or ()),
             "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
 
-    def noise_state(self) -> NoiseState:
-        """Everything that `update_noise` changes."""
-        return NoiseState(tuple(self.models), self._whiteness, self._after_changes)
+    def under_drift(self) -> RunTerm:
+        """The same under noise that is a slow drift, nearly a random walk.
 
-    def restore_noise(self, state: NoiseState) -> None:
-        """Take the noise back to an earlier state."""
-        self.models = list(state.models)
-        self._whiteness, self._after_changes = state.whiteness, state.after_changes
-        self._prepare()
-
-    def expect_slow_noise(self) -> None:
-        """Take the noise for a slow drift, nearly a random walk."""
-        steps = [self._first_noise(a, b).variance for a, b in self.run.stretches]
-        slow = np.array([_SLOW])
-        self.models = [Autoregression(slow, v / (1 - _SLOW**2)) for v in steps]
-        self._prepare()
+        Under white noise a drift looks like slow evolution of friction, and the true minimum may
+        vanish. The order of the noise, where the user has chosen it to be 0, stays.
+        """
+        if self._order == 0:
+            return self
+        result, slow = copy(self), np.array([_SLOW])
+        result.models = [Autoregression(slow, m.variance / (1 - _SLOW**2)) for m in self.models]
+        result._prepare()
+        return result
 
     def use_search(self, always: bool) -> None:
         """Let the motion take more steps, from now on."""
@@ -184,7 +160,7 @@ class RunTerm:
         if raw is None:
             return None
         difference, jacobian = raw
-        white = self._innovations(np.column_stack([difference, jacobian]))
+        white = self._whitened(np.column_stack([difference, jacobian]), self.basis)
         n = difference.size
         scale = sum(
             m.log_scale(b - a) for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
@@ -197,33 +173,16 @@ class RunTerm:
         self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
     ) -> Float:
         """Sums of the squared innovations; see `DataTerm`."""
-        return np.array([self._chi2(v) for v in values])
-
-    def thinned(self, rows: int, data: int = 0) -> None:
-        """A recording has no rows."""
-        return
+        result = []
+        for numbers in values:
+            raw = self.departures(numbers)
+            white = np.array([np.inf]) if raw is None else self._whitened(raw[0], self.basis)
+            result.append(float(white @ white))
+        return np.array(result)
 
     def observed(self) -> dict[str, Float]:
         """Times and friction."""
         return {"time": self.run.time, "friction": self.run.friction}
-
-    def _chi2(self, values: Mapping[str, float]) -> float:
-        """Sum of the squared innovations; infinite where the motion cannot be computed.
-
-        The motion is remembered, for the same values under another noise, until the noise of the
-        residual is known.
-        """
-        key = tuple(values.values())
-        if key not in self._differences:
-            raw = self.departures(values)
-            while len(self._differences) >= _REMEMBERED:
-                del self._differences[next(iter(self._differences))]
-            self._differences[key] = None if raw is None else raw[0]
-        difference = self._differences[key]
-        if difference is None:
-            return math.inf
-        white = self._innovations(difference)
-        return float(white @ white)
 
     def departures(self, values: Mapping[str, float]) -> tuple[Float, Float] | None:
         """Computed less recorded friction without linear nuisances, and the derivatives."""
@@ -242,16 +201,15 @@ class RunTerm:
         jacobian[:, [name in free for name in values]] = computed.derivatives
         return computed.friction - self.run.friction, jacobian
 
-    def likelihood(self, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
-        """The likelihood as compiled programs evaluate it, and its arrays."""
+    def compiled(self, names: tuple[str, ...]) -> tuple[RunResiduals, RunArrays]:
+        """As in `DataTerm`."""
         inner = tuple((n, result) for n in names if (result := self.inner(n)) is not None)
         fixed = {n: np.float64(v) for n, v in {**self.fixed, "W0": self.run.W0}.items()}
         # Any numbers serve for the template: those of the parameters take their place.
         template = {**{name: np.float64(1.0) for _, name in inner}, **fixed}
         arrays, equation = eqx.partition(self.motion.equations(template), eqx.is_array_like)
-        return RunLikelihood(
-            equation, inner, tuple(self.run.stretches), self.motion.room
-        ), RunArrays(
+        stretches = tuple(self.run.stretches)
+        return RunResiduals(equation, inner, stretches, self.motion.room), RunArrays(
             jax.tree.map(np.asarray, arrays),
             fixed,
             filled_up(self.run.drive),
@@ -263,7 +221,6 @@ class RunTerm:
 
     def update_noise(self, values: Mapping[str, float]) -> bool:
         """Estimate the noise from the residual at `values`; False if there is no motion."""
-        self._differences.clear()
         raw = self.departures(values)
         if raw is None:
             return False
@@ -272,7 +229,7 @@ class RunTerm:
         left = raw[0] + self._columns @ self._coefficients(raw[0])
         white = self._whitened(left[:, None])[:, 0]
         innovations = [white[a:b] for a, b in self.run.stretches]
-        self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
+        self._whiteness = whiteness(innovations, max(m.order for m in self.models))
         self._after_changes = misfit_after_changes(white, first_after_changes(self.run))
         return True
 
@@ -389,17 +346,11 @@ class RunTerm:
         return Autoregression(np.zeros(0), max(float(steps @ steps) / (2 * steps.size), 1e-300))
 
     def _prepare(self) -> None:
-        white = self._whitened(self._columns)
-        self.basis, self._triangle = np.linalg.qr(white)
-        self._white_columns = white
+        self.basis, self._triangle = np.linalg.qr(self._whitened(self._columns))
 
-    def _whitened(self, columns: Float) -> Float:
+    def _whitened(self, columns: Float, basis: Float | None = None) -> Float:
         noise = [m.whitening for m in self.models]
-        return np.asarray(innovations(columns, noise, self.run.stretches))
-
-    def _innovations(self, columns: Float) -> Float:
-        noise = [m.whitening for m in self.models]
-        return np.asarray(innovations(columns, noise, self.run.stretches, self.basis))
+        return np.asarray(innovations(columns, noise, self.run.stretches, basis))
 
     def _coefficients(self, difference: Float) -> Float:
         white = self._whitened(difference[:, None])[:, 0]
@@ -434,18 +385,12 @@ def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict
         near = np.diff(run.drive.edges)[max(edge - 1, 0) : edge + 1].min()
         limit = min(20 * sd, 0.9 * float(near))
         parameter = Parameter(name, "time", "finite", "delay of a velocity change", place="drive")
-        result.append(
-            Unknown(
-                parameter,
-                logarithmic=False,
-                scale=sd,
-                lower=-limit,
-                upper=limit,
-                start=(0.0, 0.0),
-                given=0.0,
-                prior=Prior(0.0, sd, "sampling interval"),
-                nuisance=True,
-            )
-        )
+        result.append(about_zero(parameter, sd, limit, "sampling interval"))
         own[name] = f"shift_{edge}"
     return tuple(result), own
+
+
+def about_zero(parameter: Parameter, sd: float, limit: float, source: str) -> Unknown:
+    """A nuisance that is zero within a standard deviation, and below a limit."""
+    prior, start = Prior(0.0, sd, source), (0.0, 0.0)
+    return Unknown(parameter, False, sd, -limit, limit, start, 0.0, prior, nuisance=True)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.inference.runs.run import recorded_load
 from asperity.inference.unknowns import Prior
-from asperity.measurement.samples import compressive
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
@@ -139,9 +139,12 @@ def measured_stiffness(
             f"span must hold at least {_FEWEST} samples, got {count} from {low:g} to {high:g} s; "
             "give a longer one"
         )
-    weight, unit = _load(trace, load, signals.time[here], signals.load_unit)
+    inside = signals.time[here]
+    known = recorded_load(trace, load, inside, "span", "give another one")
+    weight = np.ones(count) if known is None else np.interp(inside, *known)
+    unit = "" if known is None else signals.load_unit
     x = signals.displacement
-    columns = np.stack([signals.time[here], x[here], signals.friction[here] * weight], axis=1)
+    columns = np.stack([inside, x[here], signals.friction[here] * weight], axis=1)
     noise = displacement_noise(columns[:, 0], columns[:, 1])
     q = max(1, count // _MOST)
     t, moved, F = columns[: count // q * q].reshape(-1, q, 3).mean(axis=1).T
@@ -184,27 +187,6 @@ def measured_stiffness(
         bend=bend,
         bend_se=bend_se,
     )
-
-
-def _load(trace: Trace, load: str, time: Float, unit: str) -> tuple[Float, str]:
-    """Load at the samples and its unit; ones where none is recorded."""
-    try:
-        channel = trace.channel(load)
-    except InputError:
-        if load != "W":
-            raise
-        return np.ones_like(time), ""
-    good = np.isfinite(channel.values) & np.isfinite(trace.time)
-    if not good.any():
-        return np.ones_like(time), ""
-    order = np.argsort(trace.time[good], kind="stable")
-    borne = compressive(channel.values[good], channel.values[good])[0]
-    W = np.interp(time, trace.time[good][order], borne[order])
-    if not (W > 0).all():
-        raise InputError(
-            f"span must be under a positive load, got {W.min():.4g} {unit}; give another one"
-        )
-    return W, unit
 
 
 def _direction(x: Float, here: NDArray[np.bool_], length: float) -> float:

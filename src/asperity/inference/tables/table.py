@@ -130,6 +130,40 @@ class LockInTable:
             row_names=self.row_names[keep],
         )
 
+    def disturbed(self, exact: Mapping[str, Float], normal: Float) -> LockInTable:
+        """The table with simulated readings: exact ones and errors in units of the uncertainties.
+
+        Those of a harmonic with a phase are added in the complex plane. The uncertainty across the
+        phasor is that of this table, whatever amplitude was simulated.
+
+        Parameters
+        ----------
+        exact : mapping of str to array, shape (rows,)
+            Observables without noise.
+        normal : array, shape (rows, len(OBSERVABLES))
+            Errors, of unit variance for one reading.
+        """
+        values = {n: np.where(np.isfinite(self.values[n]), exact[n], np.nan) for n in self.values}
+        errors, units = dict(self.errors), dict(zip(OBSERVABLES, normal.T, strict=True))
+        for name in ("mean_friction", "delta_mu"):
+            if name in values:
+                values[name] = values[name] + errors[name] * units[name]
+        for amplitude, phase in (("mu1", "phase1"), ("mu2", "phase2")):
+            if amplitude not in values:
+                continue
+            # Relative to the exact phase.
+            phasor = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
+            if phase in values:
+                across = self.values[amplitude] * errors[phase]
+                both = np.isfinite(values[phase])
+                phasor = phasor + 1j * np.where(both, across * units[phase], 0.0)
+                values[phase] = values[phase] + np.angle(phasor)
+                errors[phase] = np.where(both, across / np.maximum(np.abs(phasor), 1e-300), np.nan)
+            values[amplitude] = np.abs(phasor)
+        scale = {n: errors[n] / self.errors[n] for n in errors}
+        covariances = {(a, b): c * scale[a] * scale[b] for (a, b), c in self.covariances.items()}
+        return replace(self, values=values, errors=errors, covariances=covariances)
+
 
 def read_table(
     path: str | Path, given: Mapping[str, Any] | None = None, *, name: str = ""
@@ -160,23 +194,54 @@ def read_table(
     shown = name or path.name
     require_rereadable(path, "data")
     try:
-        lines = file_content(path).decode("utf-8-sig").splitlines()
+        text = file_content(path).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not text in UTF-8"
         raise InputError(
             f"data must be a readable table, got '{path}': {reason}; give a CSV file"
         ) from None
     if path.suffix.lower() == ".json":
-        return table_of(_given(_reading(shown, "\n".join(lines)), given), name=shown)
-    lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+        return table_of(_given(_reading(shown, text), given), name=shown)
+    texts = _cells(shown, text)
+    rows = len(next(iter(texts.values())))
+    blank = np.full(rows, "")
+    kind, failed = texts.get(_KIND, blank), texts.get(_REASON, blank) != ""
+    # Of a campaign, a level without modulation is a reading too.
+    level = (kind == "level") & np.isin(texts.get("epsilon", blank), ("0", "0.0"))
+    kept = ~failed & (np.isin(kind, ("", "amplitude")) | level)
+    remarks = []
+    if not kept.any():
+        raise InputError(
+            f"{shown} must have lock-in readings, got none: every row is another kind of "
+            "measurement or has a reason why it could not be measured; measure a modulated "
+            "recording"
+        )
+    if not kept.all():
+        remarks.append(
+            f"{int((~kept).sum())} rows of {shown} are no lock-in readings and are left out, the "
+            f"first of them row {np.argmin(kept) + 1}"
+        )
+    texts = {n: column[kept] for n, column in texts.items()}
+    columns: dict[str, Any] = {
+        n: _numbers(shown, n, column) for n, column in texts.items() if n not in _TEXTS
+    }
+    if _UNIT in texts and "W0" in columns:
+        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT])
+    run = next((texts[n].tolist() for n in _RUN if n in texts), None)
+    table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
+    return replace(table, row_names=np.array([f"row {i + 1}" for i in np.flatnonzero(kept)]))
+
+
+def _cells(shown: str, text: str) -> dict[str, NDArray[np.str_]]:
+    """Columns of a text by name, as texts without space about them."""
+    lines = [x for x in text.splitlines() if x.strip() and not x.lstrip().startswith("#")]
     if len(lines) < 2:
         raise InputError(
             f"{shown} must have a header and rows, got {len(lines)} lines; give one "
             "operating point a row"
         )
-    delimiter = max(_DELIMITERS, key=lines[0].count)
-    header, *rows = csv.reader(lines, delimiter=delimiter)
-    names = [cell.strip() for cell in header]
+    names, *rows = csv.reader(lines, delimiter=max(_DELIMITERS, key=lines[0].count))
+    names = [cell.strip() for cell in names]
     for column in names:
         if names.count(column) > 1:
             raise InputError(
@@ -189,41 +254,8 @@ def read_table(
                 f"{shown} must have {len(names)} cells in each row, got {len(row)} in row "
                 f"{number}; correct the separators"
             )
-    places = {n: i for i, n in enumerate(names) if n not in _OF_RESPONSES}
-    texts = {n: [row[places[n]].strip() for row in rows] for n in _TEXTS if n in places}
-    at = places.get("epsilon")
-    zero = [at is not None and row[at].strip() in ("0", "0.0") for row in rows]
-    lost = [i for i in range(len(rows)) if _not_a_reading(texts, i, zero[i])]
-    remarks = []
-    if lost:
-        if len(lost) == len(rows):
-            raise InputError(
-                f"{shown} must have lock-in readings, got none: every row is another kind of "
-                "measurement or has a reason why it could not be measured; measure a modulated "
-                "recording"
-            )
-        remarks.append(
-            f"{len(lost)} rows of {shown} are no lock-in readings and are left out, the first "
-            f"of them row {lost[0] + 1}"
-        )
-    kept = [row for i, row in enumerate(rows) if i not in set(lost)]
-    texts = {n: [t for i, t in enumerate(c) if i not in set(lost)] for n, c in texts.items()}
-    columns: dict[str, Any] = {
-        n: _numbers(shown, n, i, kept) for n, i in places.items() if n not in _TEXTS
-    }
-    if _UNIT in texts and "W0" in columns:
-        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT])
-    run = next((texts[n] for n in _RUN if n in texts), None)
-    table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
-    places_in_file = [i for i in range(1, len(rows) + 1) if i - 1 not in set(lost)]
-    return replace(table, row_names=np.array([f"row {i}" for i in places_in_file]))
-
-
-def _not_a_reading(texts: Mapping[str, Sequence[str]], row: int, unmodulated: bool = False) -> bool:
-    """Whether a campaign says that a row is no reading; a level with an epsilon of 0 is one."""
-    kind = texts[_KIND][row] if _KIND in texts else ""
-    failed = bool(texts[_REASON][row]) if _REASON in texts else False
-    return failed or not (kind in ("", "amplitude") or (kind == "level" and unmodulated))
+    columns = np.char.strip(np.array(rows, dtype=str).T)
+    return {n: c for n, c in zip(names, columns, strict=True) if n not in _OF_RESPONSES}
 
 
 def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
@@ -270,21 +302,20 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
     return columns
 
 
-def _numbers(shown: str, name: str, place: int, rows: Sequence[Sequence[str]]) -> Float:
-    values = []
-    for number, row in enumerate(rows, start=1):
-        cell = row[place].strip()
+def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
+    """Numbers of a column; NaN in empty cells, and where a column of the user's own has texts."""
+    values = np.full(cells.size, math.nan)
+    for row, cell in enumerate(cells.tolist()):
         try:
-            values.append(float(cell) if cell else math.nan)
+            values[row] = float(cell or math.nan)
         except ValueError:
             if canonical_name(name, _known()) is None and _observable_of(name) is None:
-                values.append(math.nan)  # a column of the user's own
                 continue
             raise InputError(
                 f"{shown} must have numbers in SI without unit in column {name}, got '{cell}' in "
-                f"row {number}; write it with a decimal point"
+                f"row {row + 1}; write it with a decimal point"
             ) from None
-    return np.array(values)
+    return values
 
 
 def table_of(
@@ -333,9 +364,14 @@ def table_of(
         parameter = canonical_name(key, known)
         pair = _pair_of(key)
         if parameter in MODULATION:
-            _refuse_modulated(name, key, column)
+            # An empty cell says that the load is harmonic, as 0 does.
+            rule = "be 0, since fits are to a harmonic load"
+            zero = np.nan_to_num(column) == 0
+            _require(zero, name, key, column, rule, "leave those rows out")
         elif parameter is not None:
-            points[parameter] = _checked(name, parameter, column)
+            advice = "fill the cell in or leave the row out"
+            _require(np.isfinite(column), name, parameter, column, "be a finite number", advice)
+            points[parameter] = np.asarray(known[parameter].check(column, f"{name}.{parameter}"))
         elif pair is not None:
             covariances[pair] = column
         elif key.endswith("_cov") and key.startswith(OBSERVABLES):
@@ -360,7 +396,7 @@ def table_of(
     values, errors = _observables(name, observed)
     runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])
     table = LockInTable(name, points, values, errors, covariances, runs, tuple(remarks))
-    _refuse_duplicates(table)
+    _refuse_copies(table, table, "{0} must have each reading once, got {2} equal to {1}")
     _refuse_impossible(table)
     return _without_copies(table)
 
@@ -396,28 +432,19 @@ def _pair_of(column: str) -> tuple[str, str] | None:
     return None
 
 
-def _refuse_modulated(table: str, parameter: str, column: Float) -> None:
-    """Refuse rows of another than a harmonic load; 0 and an empty cell say that it is harmonic."""
-    if np.any(np.nan_to_num(column)):
-        raise InputError(
-            f"{table}.{parameter} must be 0, since fits are to a harmonic load, got "
-            f"{column[np.nan_to_num(column) != 0][0]:g}; leave those rows out"
-        )
-
-
 def _known() -> Mapping[str, Any]:
     return all_parameters(registered().values())
 
 
-def _checked(table: str, parameter: str, column: Float) -> Float:
-    known = _known()[parameter]
-    for number, value in enumerate(column, start=1):
-        if not math.isfinite(value):
-            raise InputError(
-                f"{table}.{parameter} must be a finite number, got '{value}' in row {number}; fill "
-                "the cell in or leave the row out"
-            )
-    return np.asarray(known.check(column, f"{table}.{parameter}"))
+def _require(
+    good: NDArray[np.bool_], table: str, column: str, values: Float, rule: str, advice: str
+) -> None:
+    """Refuse a column with the first row that breaks a rule."""
+    if not good.all():
+        row = int(np.argmin(good))
+        raise InputError(
+            f"{table}.{column} must {rule}, got {values[row]:g} in row {row + 1}; {advice}"
+        )
 
 
 def _observables(
@@ -431,69 +458,52 @@ def _observables(
         )
     errors = {}
     for name, column in values.items():
-        _refuse_impossible_values(table, name, column)
+        _require_possible(table, name, column)
         if f"{name}_err" not in observed:
             raise InputError(
                 f"{table} must have the standard uncertainty of {name}, got no column {name}_err; "
                 "add it: a fit without it cannot say how sure it is"
             )
-        error = observed[f"{name}_err"]
-        bad = np.isfinite(column) & ~(np.isfinite(error) & (error > 0))
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{table}.{name}_err must be a finite positive number, got {error[row]:g} in row "
-                f"{row + 1}; give the standard uncertainty"
-            )
+        error, absent = observed[f"{name}_err"], ~np.isfinite(column)
+        advice = "give the standard uncertainty"
+        good = absent | (np.isfinite(error) & (error > 0))
+        _require(good, table, f"{name}_err", error, "be a finite positive number", advice)
         # Values are of order 1: below the spacing of doubles there, or as far above, none is known.
-        bad = np.isfinite(column) & ((error < _SMALLEST_ERROR) | (error > 1 / _SMALLEST_ERROR))
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{table}.{name}_err must be from {_SMALLEST_ERROR:g} to {1 / _SMALLEST_ERROR:g}, "
-                f"got {error[row]:g} in row {row + 1}; give the standard uncertainty"
-            )
+        good = absent | ((error >= _SMALLEST_ERROR) & (error <= 1 / _SMALLEST_ERROR))
+        rule = f"be from {_SMALLEST_ERROR:g} to {1 / _SMALLEST_ERROR:g}"
+        _require(good, table, f"{name}_err", error, rule, advice)
         errors[name] = error
-    for harmonic in (1, 2):
-        phase, amplitude = f"phase{harmonic}", f"mu{harmonic}"
-        if phase in values and amplitude not in values:
+    for phase, amplitude in (("phase1", "mu1"), ("phase2", "mu2")):
+        if phase not in values:
+            continue
+        absent = ~np.isfinite(values.get(amplitude, np.full_like(values[phase], math.nan)))
+        alone = np.isfinite(values[phase]) & absent
+        if amplitude not in values or alone.any():
+            got = f"an empty cell in row {np.argmax(alone) + 1}"
             raise InputError(
-                f"{table} must have {amplitude} where it has {phase}, got no such column; a phase "
-                "weighs as much as its amplitude"
+                f"{table} must have {amplitude} where it has {phase}, got "
+                f"{got if amplitude in values else 'no such column'}; a phase weighs as much as "
+                "its amplitude"
             )
-        if phase in values:
-            alone = np.isfinite(values[phase]) & ~np.isfinite(values[amplitude])
-            if alone.any():
-                raise InputError(
-                    f"{table} must have {amplitude} where it has {phase}, got an empty cell in row "
-                    f"{np.flatnonzero(alone)[0] + 1}; a phase weighs as much as its amplitude"
-                )
     return values, errors
 
 
-def _refuse_impossible_values(table: str, name: str, column: Float) -> None:
+def _require_possible(table: str, name: str, column: Float) -> None:
     """Refuse infinite values, wrong signs, and phases or forces in other units."""
+    size = np.abs(column)
     rules = [(np.isinf(column), "be finite", "leave the cell empty")]
     if name == "mean_friction":
         rules.append((column <= 0, "be positive", "reverse the sign of the force"))
     if name in ("mu1", "mu2"):
-        rules.append(
-            (column < 0, "be an amplitude, at least 0", f"put the sign into phase{name[-1]}")
-        )
+        advice = f"put the sign into phase{name[-1]}"
+        rules.append((column < 0, "be an amplitude, at least 0", advice))
     if name in ("phase1", "phase2"):
-        rules.append(
-            (np.abs(column) > 2 * math.pi, "be in rad, from -2 pi to 2 pi", "convert degrees")
-        )
+        rules.append((size > 2 * math.pi, "be in rad, from -2 pi to 2 pi", "convert degrees"))
     else:
         limit = f"be a force over W0, below {_LARGEST_FRICTION:g}"
-        beyond = np.abs(column) >= _LARGEST_FRICTION
-        rules.append((beyond, limit, "divide by the load, or convert per cent"))
+        rules.append((size >= _LARGEST_FRICTION, limit, "divide by the load, or convert per cent"))
     for bad, rule, advice in rules:
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{table}.{name} must {rule}, got {column[row]:g} in row {row + 1}; {advice}"
-            )
+        _require(~bad, table, name, column, rule, advice)
 
 
 def _refuse_impossible(table: LockInTable) -> None:
@@ -540,10 +550,8 @@ def _without_copies(table: LockInTable) -> LockInTable:
     if dof < 1:
         return table
     doubt = np.hypot(table.errors["mean_friction"][both], table.errors["delta_mu"][both])
-    columns = np.vander(x - x.mean(), degree + 1) / doubt[:, None]
-    y = steady[both] / doubt
-    left = y - columns @ np.linalg.lstsq(columns, y)[0]
-    if chdtr(dof, float(left @ left)) > _SAME_NOISE:
+    smooth = np.polyval(np.polyfit(x - x.mean(), steady[both], degree, w=1 / doubt), x - x.mean())
+    if chdtr(dof, float(np.sum(((steady[both] - smooth) / doubt) ** 2))) > _SAME_NOISE:
         return table
     kept = np.where(both, np.nan, table.values["delta_mu"])
     values = {**table.values, "delta_mu": kept}
@@ -556,46 +564,30 @@ def _without_copies(table: LockInTable) -> LockInTable:
     return replace(table, values=values, remarks=(*table.remarks, remark))
 
 
-def _refuse_duplicates(table: LockInTable) -> None:
-    columns = np.column_stack([*table.points.values(), *table.values.values()])
-    _, first, inverse = np.unique(
-        np.nan_to_num(columns, nan=np.inf), axis=0, return_index=True, return_inverse=True
-    )
-    twice = np.flatnonzero(first[inverse.ravel()] != np.arange(table.rows))
-    if twice.size:
-        raise InputError(
-            f"{table.name} must have each reading once, got row {twice[0] + 1} equal to row "
-            f"{first[inverse.ravel()[twice[0]]] + 1}; remove the copy: it would count twice"
-        )
+def _refuse_copies(first: LockInTable, second: LockInTable, sentence: str) -> None:
+    """Refuse a reading that two tables hold, or one twice: columns that both have are equal.
 
-
-def _refuse_shared(tables: Sequence[LockInTable]) -> None:
-    """Refuse a reading that two tables hold: columns that both have are equal.
-
-    One table may have columns that the other has not, such as the load or another observable.
+    One may have columns that the other has not, such as the load or another observable. `sentence`
+    has places for the name of the second table and those of the two rows.
     """
-    for j, second in enumerate(tables):
-        for i, first in enumerate(tables[:j]):
-            inputs = [n for n in first.points if n in second.points]
-            observed = [n for n in first.values if n in second.values]
-            if not observed:
-                continue
-            values, readings = (
-                np.column_stack([t.values[n] for n in observed]) for t in (first, second)
+    inputs = [n for n in first.points if n in second.points]
+    observed = [n for n in first.values if n in second.values]
+    if not observed:
+        return
+    values, readings = (np.column_stack([t.values[n] for n in observed]) for t in (first, second))
+    points, others = (zip(*(t.points[n] for n in inputs), strict=True) for t in (first, second))
+    places: dict[tuple[float, ...], list[int]] = {}
+    for row, point in enumerate(points):
+        places.setdefault(point, []).append(row)
+    for row, point in enumerate(others):
+        at = [i for i in places.get(point, []) if first is not second or i < row]
+        both = np.isfinite(values[at]) & np.isfinite(readings[row])
+        equal = both.any(1) & ((values[at] == readings[row]) | ~both).all(1)
+        if equal.any():
+            one, other = first.row_names[at[int(np.argmax(equal))]], second.row_names[row]
+            raise InputError(
+                f"{sentence.format(second.name, one, other)}; remove the copy: it would count twice"
             )
-            places: dict[tuple[float, ...], list[int]] = {}
-            for row, point in enumerate(zip(*(first.points[n] for n in inputs), strict=True)):
-                places.setdefault(point, []).append(row)
-            for row, point in enumerate(zip(*(second.points[n] for n in inputs), strict=True)):
-                for place in places.get(point, []):
-                    both = np.isfinite(values[place]) & np.isfinite(readings[row])
-                    if both.any() and (values[place] == readings[row])[both].all():
-                        raise InputError(
-                            "data must hold each reading once, got "
-                            f"{second.row_names[row]} of {second.name} (table {j + 1}) equal to "
-                            f"{first.row_names[place]} of {first.name} (table {i + 1}); remove the "
-                            "copy: it would count twice"
-                        )
 
 
 def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, NDArray[np.intp]]:
@@ -610,7 +602,14 @@ def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, NDArray[np.intp]
         If two tables hold the same reading.
     """
     tables = list(tables)
-    _refuse_shared(tables)
+    for j, second in enumerate(tables):
+        for i, first in enumerate(tables[:j]):
+            _refuse_copies(
+                first,
+                second,
+                "data must hold each reading once, got {2} of {0} "
+                f"(table {j + 1}) equal to {{1}} of {first.name} (table {i + 1})",
+            )
     run = np.concatenate([np.full(t.rows, i) for i, t in enumerate(tables)])
 
     def stacked(field: str) -> dict[Any, Float]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import jax
@@ -16,7 +16,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from asperity.inference.objective import Residuals
+from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
 from asperity.inference.tables.outliers import standardised
 from asperity.inference.tables.residuals import (
     Prediction,
@@ -26,7 +26,6 @@ from asperity.inference.tables.residuals import (
     weights_of,
 )
 from asperity.inference.tables.table import LockInTable
-from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 from asperity.orbit import (
     KnownOrbits,
@@ -47,7 +46,7 @@ _FEW = 0.05
 _SAMPLES, _SEARCHED_SAMPLES = 1024, 80
 
 
-class LockInTerm:
+class LockInTerm(DataTerm):
     """A table of lock-in readings as a `DataTerm` of an objective.
 
     Parameters
@@ -57,8 +56,6 @@ class LockInTerm:
         Predictions at the rows of the table.
     """
 
-    nuisances: tuple[Unknown, ...] = ()
-    profiled = 0
     failure = (
         "no start has a periodic orbit at every operating point; give start values, or fix "
         "parameters for which sliding is stable"
@@ -66,17 +63,8 @@ class LockInTerm:
 
     def __init__(self, table: LockInTable, forward: Forward) -> None:
         self.table, self.forward = table, forward
+        self.name, self.observables = table.name, table.observables
         self._weights: Weights | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the table."""
-        return self.table.name
-
-    @property
-    def observables(self) -> tuple[str, ...]:
-        """What the table reports."""
-        return self.table.observables
 
     @property
     def noise(self) -> dict[str, Any]:
@@ -103,12 +91,12 @@ class LockInTerm:
         finite = np.isfinite(result.values).all() and np.isfinite(result.jacobian).all()
         return result if finite else None
 
-    def likelihood(
+    def compiled(
         self, names: tuple[str, ...]
-    ) -> tuple[LockInLikelihood, tuple[dict[str, Float], Weights]]:
-        """The likelihood as compiled programs evaluate it, and its arrays."""
+    ) -> tuple[CompiledResiduals, tuple[dict[str, Float], Weights]]:
+        """As in `DataTerm`."""
         f = self.forward
-        compiled = LockInLikelihood(f.law, f.inertia, f.radiation_damping, f.uses_search)
+        compiled = _CompiledResiduals(f.law, f.inertia, f.radiation_damping, f.uses_search)
         return compiled, (f.fixed, self.weights)
 
     def with_rows(self, kept: NDArray[np.bool_], *, coarse: bool = False) -> LockInTerm:
@@ -165,12 +153,6 @@ class LockInTerm:
         order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
         chosen = order[np.linspace(0, table.rows - 1, min(kept, table.rows)).round().astype(int)]
         return self.with_rows(np.isin(np.arange(table.rows), chosen), coarse=True)
-
-    def uncertainty_of_noise(
-        self, values: Mapping[str, float], slopes: Float, covariance: Float
-    ) -> tuple[Float, Float]:
-        """Nothing: uncertainties of readings are given."""
-        return np.zeros_like(covariance), np.zeros(slopes.size)
 
     def observed(self) -> dict[str, Float]:
         """Operating points and readings."""
@@ -446,16 +428,8 @@ def steady_friction(law: type[Law], given: Mapping[str, Array]) -> Array:
 
 
 @dataclass(frozen=True)
-class LockInLikelihood:
-    """Log likelihood of a table but for a constant, within compiled programs.
-
-    Attributes
-    ----------
-    law : type of Law
-    inertia, radiation_damping : bool
-    search : bool
-        Whether orbits that the fast method does not find are searched for, which takes long.
-    """
+class _CompiledResiduals:
+    """Residuals of a table within compiled programs."""
 
     law: type[Law]
     inertia: bool
@@ -463,28 +437,15 @@ class LockInLikelihood:
     search: bool
 
     def __call__(self, values: Mapping[str, Array], data: tuple[dict[str, Any], Weights]) -> Array:
-        """Log likelihood of parameters by name; those of other data are left alone.
-
-        Parameters
-        ----------
-        values : mapping of str to array, shape ()
-        data : (dict of str to array, Weights)
-            Parameters that are not free, of shape (rows,), and the weights of the residuals.
-        """
         fixed, weights = data
-        function = _response(self.law, self.inertia, self.radiation_damping, self.search)
+        function = response_function(
+            self.law,
+            inertia=self.inertia,
+            radiation_damping=self.radiation_damping,
+            search=self.search,
+        )
         given = parameters_at(fixed, values, function)
         result = function(given)
-        predicted = Prediction(
-            result.mean_friction, steady_friction(self.law, given), result.harmonics
-        )
-        return -0.5 * jnp.sum(weights.compared(columns_of(predicted, jnp)) ** 2)
-
-
-@cache
-def _response(
-    law: type[Law], inertia: bool, radiation_damping: bool, search: bool
-) -> ResponseFunction:
-    return response_function(
-        law, inertia=inertia, radiation_damping=radiation_damping, search=search
-    )
+        mu_ss = steady_friction(self.law, given)
+        predicted = Prediction(result.mean_friction, mu_ss, result.harmonics)
+        return weights.compared(columns_of(predicted, jnp))

@@ -17,9 +17,10 @@ from asperity.measurement.samples import (
     require_computable,
     require_one_dimension,
     shear_channel,
+    too_few,
 )
+from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.rows import usable_rows
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class SlidingSignals:
     turned : bool
         Whether the friction was multiplied by -1.
     signs : tuple of Finding
-        What is read with another sign than recorded, besides the friction.
+        Load and shear that are read with the opposite sign.
     left_out : int
         Samples within the window at which something is no number or time does not go on.
     """
@@ -114,12 +115,10 @@ def sliding_signals(
         use &= ~outside
     left_out = int((~use & ~outside).sum())
     if use.sum() < _FEWEST:
-        raise InputError(
-            "measure.trace",
-            f"hold at least {_FEWEST} usable samples",
-            f"{int(use.sum())}",
-            "give a longer recording or window",
-        )
+        used = {name: trace.channels[name].values[~outside] for name in names}
+        if all(np.isfinite(values).all() for values in used.values()):
+            used = {"F/W": friction[~outside]}
+        raise too_few(_FEWEST, int(use.sum()), trace.time[~outside], used)
     time, friction = time[use], friction[use]
     slip = None
     if motion is not None:

@@ -37,15 +37,10 @@ LIMITS: dict[str, tuple[float, float]] = {
     "contact": (0.95, 1.0),
     "low friction": (0.02, -2.0),
     "high friction": (2.0, 20.0),
-    "response": (1.5, 5.0),
-    "aliasing": (2.0, -1.0),
 }
 
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
 _LINE = 6.0
-
-#: Harmonics of a load that is as good as a shaker's are gone from here on.
-_HIGHEST = 8
 
 
 def modulation(reading: LockInReading) -> Check:
@@ -125,7 +120,7 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
 
 
 def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
-    """Whether the mean force settles in the window, and whether it can be told to what.
+    """Whether the mean force settles in the window, and whether its final value is determined.
 
     A settling that ends in the window is part of the reading; a window of the user that holds one
     is none of a steady state all the same. Over a fraction of its time constant a settling is a
@@ -149,7 +144,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
         ) + (
             "what it settles to is read"
             if settling.determined
-            else "what it settles to cannot be told, record a longer stretch"
+            else "its final value is not determined; record a longer stretch"
         )
         seen = chosen_by == "user" or not settling.determined
         return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
@@ -158,7 +153,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
     number = min(away, default=0.0) * length / mean
     sentence = (
         f"over the window the force moves by {percent(number)} of its mean more than without "
-        "modulation: it still settles, to what cannot be told"
+        "modulation: it still settles, and its final value is not determined"
         if number
         else "no settling of the force stands out"
     )
@@ -277,49 +272,3 @@ def friction(reading: LockInReading) -> Check:
     elif number < LIMITS["low friction"][0] or number > LIMITS["high friction"][0]:
         sentence += "; check the units, the zeros and which column is which"
     return judged("friction", number, limits, sentence)
-
-
-def response(reading: LockInReading) -> Check:
-    """Whether the force follows the load by no more than in proportion to it."""
-    phasor = reading.phasor(1)
-    whole = abs(reading.epsilon * reading.mean_friction)
-    number = phasor.amplitude / max(whole, 1e-300)
-    return judged(
-        "response",
-        min(number, 1e300),
-        LIMITS["response"],
-        f"mu1 is {number:.3g} times the mean friction times epsilon, which is what a force in "
-        "proportion to the load has; if it is more, load and force may be exchanged",
-        significant=phasor.amplitude > 3 * phasor.amplitude_uncertainty,
-    )
-
-
-def aliasing(reading: LockInReading, rate: float) -> Check:
-    """Whether a harmonic that is not read looks like one that is.
-
-    Parameters
-    ----------
-    reading : LockInReading
-    rate : float
-        Samples per second, of most of the recording.
-    """
-    n = reading.harmonics.size
-    above = np.arange(n + 1, max(_HIGHEST, n + 1) + 1)
-    # A harmonic below half the rate is where it belongs.
-    folded = above[above * reading.frequency > rate / 2]
-    span = reading.end - reading.start
-    away = (
-        np.abs(np.remainder(folded * reading.frequency + rate / 2, rate) - rate / 2)[:, None]
-        - np.arange(n + 1) * reading.frequency
-    )
-    away = np.abs(away) * span
-    number, sentence = float(span * rate), "no higher harmonic is folded onto one that is read"
-    if away.size:
-        number = float(away.min())
-        at = np.unravel_index(int(np.argmin(away)), away.shape)
-        sentence = (
-            f"at {rate:.5g} samples per second harmonic {folded[at[0]]} of the load looks like "
-            f"{'the mean' if at[1] == 0 else f'harmonic {at[1]}'}, {number:.3g} lines of the "
-            "window away; closer than two, what is read holds both"
-        )
-    return judged("aliasing", number, LIMITS["aliasing"], sentence)

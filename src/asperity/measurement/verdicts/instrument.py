@@ -1,4 +1,4 @@
-"""Faults of the instrument: held samples, dropouts, a force that was made, mains, flat tops.
+"""Faults of the instrument: held samples, a force that was made, mains, flat tops.
 
 A waveform that is clipped before the recorder's noise is added has no two equal samples: only the
 mean cycle shows it. Two descriptions of the mean cycle are compared by the Bayesian information
@@ -18,7 +18,7 @@ from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import Check, judged
 from asperity.measurement.window import LoadInterval
-from asperity.recording.defects.levels import held_length, lost_to_zero
+from asperity.recording.defects.levels import held_length
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 #: mains line is judged by epsilon, small being bad.
 LIMITS: dict[str, tuple[float, float]] = {
     "held samples": (0.01, 0.1),
-    "dropouts": (0.0, 0.01),
     "made force": (0.3, -1.0),
     "mains": (0.02, 0.005),
     "lines in the pauses": (0.02, 0.2),
@@ -50,7 +49,7 @@ _PHASES, _FEWEST = 128, 4
 _FILLED = 16
 #: Periods and samples of a mean that the drift is taken from.
 _MEAN_PERIODS, _MEAN_SAMPLES = 2, 64
-#: What models leave of the height of a cycle, besides noise.
+#: Model error of a cycle, as a share of its height.
 _LEFT = 2e-3
 #: Harmonics of a cycle that may be cut off, and of one that is not.
 _CUT, _WHOLE = 4, 40
@@ -86,22 +85,6 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
                 f"more slowly than recorded, and its first harmonic lags by {lag:.2g} rad"
             )
     return judged("held samples", number, LIMITS["held samples"], sentence)
-
-
-def dropouts(load: Array, force: Array) -> Check:
-    """Whether a channel falls to exactly zero where it is far from zero otherwise."""
-    number, sentence = 0.0, "no channel drops to zero"
-    for name, values in (("load", load), ("force", force)):
-        lost = lost_to_zero(values)
-        if lost is None or lost[0] / values.size <= number:
-            continue
-        count, middle = lost
-        number = count / values.size
-        sentence = (
-            f"{count} of {values.size} samples of the {name} are exactly zero, where {middle:.4g} "
-            "is usual: the signal was lost there"
-        )
-    return judged("dropouts", number, LIMITS["dropouts"], sentence)
 
 
 def made_force(

@@ -27,11 +27,10 @@ LIMITS: dict[str, tuple[float, float]] = {
     "leakage": (0.01, 0.1),
     "steady response": (0.05, 0.5),
     "steady load": (0.01, 0.05),
-    "steady force": (0.002, 0.02),
     "shifting response": (0.07, 0.4),
 }
 
-#: Spectral lines on each side of a line of its own that belong to it if it is not steady.
+#: Spectral lines on each side of a line that are its sidebands if it is not steady.
 _SIDEBANDS = 16
 #: Slow motion of so many times the variance that noise gives it is no noise.
 _EXCESS = 3.0
@@ -62,7 +61,7 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
         count = reading.blocks.count
         slow = reading.residual[:-1, 0, 1].real / count[:-1]
         candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
-    # Above the modulation, harmonics beyond those that are fitted are no oscillations of their own.
+    # Lines at harmonics above those that are fitted belong to the modulation.
     width = 2 / span
     lines = [
         line
@@ -78,7 +77,7 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
 
 
 def left_of_piece(reading: LockInReading, time: Array, values: Array) -> tuple[slice, Array]:
-    """What a fit of its own leaves of a channel in the middle of a window, and where that is."""
+    """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
     return piece, _residual(reading.blocks.basis, time[piece], values[piece])
@@ -93,7 +92,7 @@ def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
 
 
 def _residual(basis: Basis, time: Array, force: Array) -> Array:
-    """What a fit of its own leaves of a piece."""
+    """Residual of a separate fit to a piece."""
     piece = Basis(
         basis.omega,
         basis.harmonics,
@@ -136,7 +135,7 @@ def steady_response(reading: LockInReading) -> Check:
 
 def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
     """Whether the load's mean stays where it is."""
-    slow, seen = _wander(reading, time, load, 0)
+    slow, seen = _wander(reading, time, load)
     drift = float(reading.drift[0].sum())
     number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
     motion = "drifts" if abs(drift) > slow else "wanders"
@@ -150,22 +149,8 @@ def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
     )
 
 
-def steady_force(reading: LockInReading, time: Array, force: Array) -> Check:
-    """Whether the force is steady apart from drift and harmonics, be it stick-slip or not."""
-    slow, seen = _wander(reading, time, force, 1)
-    number = slow / max(abs(reading.mean_force), 1e-300)
-    return judged(
-        "steady force",
-        number,
-        LIMITS["steady force"],
-        f"slower than the modulation, the force wanders by {percent(number)} of its mean about "
-        "the fitted drift",
-        significant=seen,
-    )
-
-
 def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[float, float]:
-    """Share of a line's amplitude that is beside it; and its power there over that farther off."""
+    """Amplitude of the sidebands over that of the line; their power over that farther off."""
     blocks, basis = reading.blocks, reading.blocks.basis
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
     most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)
@@ -182,13 +167,13 @@ def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[fl
     return number, float(power[near].mean() / max(float(power[~near].mean()), 1e-300))
 
 
-def _wander(reading: LockInReading, time: Array, values: Array, channel: int) -> tuple[float, bool]:
-    """Amplitude of what is slower than the modulation, and whether noise does not explain it."""
-    white = float(reading.noise.spectra[1, channel, channel].real)
-    count, sums = reading.blocks.count, reading.residual[:, 0, channel].real
+def _wander(reading: LockInReading, time: Array, load: Array) -> tuple[float, bool]:
+    """Amplitude of slow motion of the load, and whether noise does not explain it."""
+    white = float(reading.noise.spectra[1, 0, 0].real)
+    count, sums = reading.blocks.count, reading.residual[:, 0, 0].real
     # Each block with its samples: a short one at the end says little.
     series = [(sums / count, count)]
-    at, left = left_of_piece(reading, time, values)
+    at, left = left_of_piece(reading, time, load)
     # Half a period keeps what is slower, and of the modulation nothing is left to keep.
     span = float(time[at][-1] - time[at][0])
     blocks = int(min(left.size, max(8, 2 * reading.frequency * span)))

@@ -1,109 +1,44 @@
 """The fast methods within a compiled program: orbits without derivatives, then their response.
 
-Derivatives follow from the implicit function theorem. Where R(p, Y) = 0 fixes the unknowns Y as
-functions of the parameters p,
-
-    dY = -R_Y^-1 R_p dp.
-
-No iteration of a solver is differentiated. The rule refers to itself, so that derivatives of any
-order follow from R; the linear solve has a transpose, so that they do in forward and reverse mode.
+Orbits, and the periodic factors of their fundamental matrices, are fixed points of contractions:
+`asperity.algebra.contraction` has the rule of their derivatives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
+from asperity.algebra.contraction import Equations, contracted, implicit_solution
+from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.orbit.floquet import differentiable_log_multipliers
-from asperity.orbit.gradient.fourier import (
-    FloquetEquations,
-    FourierEquations,
-    FourierUnknowns,
-    floquet_factor,
-    means,
-)
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
-from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_orbit
-from asperity.orbit.methods.fourier.method import LARGEST_CONTRACTING_RATE
-from asperity.orbit.methods.fourier.orbit import (
+from asperity.orbit.methods.balance import BalanceEquations, balanced_orbit
+from asperity.orbit.methods.fourier import (
+    LARGEST_CONTRACTING_RATE,
+    LoadCycle,
+    States,
+    advance,
     force_spectrum,
     fourier_orbit,
+    grid,
+    jacobian,
     load_cycle,
     orbit_error,
+    rates_on,
+    together,
 )
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
 from asperity.orbit.steady_sliding import steady_sliding_of
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
-
-
-class Equations(Protocol):
-    """Equations R(p, Y) = 0 of many operating points; hashable, without arrays."""
-
-    def residual(self, parameters: Any, unknowns: Any, at: Any) -> Any:
-        """R, a pytree like the unknowns, each leaf of which depends on the parameters.
-
-        Parameters
-        ----------
-        parameters, unknowns : pytree
-        at : pytree
-            From `prepare`; of no derivative. It may scale and combine the equations.
-        """
-        ...
-
-    def prepare(self, parameters: Any, unknowns: Any) -> Any:
-        """What `residual` and `solve` need at a solution, computed once."""
-        ...
-
-    def solve(self, product: Callable[[Any], Any], right: Any, at: Any) -> Any:
-        """Solve R_Y y = right, given the product R_Y y as a function of y; NaN where it fails."""
-        ...
-
-    def solve_transposed(self, product: Callable[[Any], Any], right: Any, at: Any) -> Any:
-        """The same with the transpose of R_Y."""
-        ...
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0,))
-def implicit_solution(equations: Equations, parameters: Any, solution: Any) -> Any:
-    """`solution` as a function of the parameters.
-
-    Parameters
-    ----------
-    equations : Equations
-    parameters : pytree of arrays
-    solution : pytree of arrays
-        Unknowns that solve the equations to round-off; a derivative of theirs does not count.
-
-    Returns
-    -------
-    pytree
-        `solution`, with the derivatives of all orders to `parameters`.
-    """
-    return solution
-
-
-@implicit_solution.defjvp
-def _implicit_rule(equations: Equations, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
-    parameters, solution = primals
-    unknowns = implicit_solution(equations, parameters, solution)
-    at = jax.lax.stop_gradient(equations.prepare(parameters, unknowns))
-    _, right = jax.jvp(lambda p: equations.residual(p, unknowns, at), (parameters,), (tangents[0],))
-    _, product = jax.linearize(lambda Y: equations.residual(parameters, Y, at), unknowns)
-    moved = jax.lax.custom_linear_solve(
-        product,
-        jax.tree.map(lambda a: -a, right),
-        solve=lambda multiply, b: equations.solve(multiply, b, at),
-        transpose_solve=lambda multiply, b: equations.solve_transposed(multiply, b, at),
-    )
-    return unknowns, moved
-
 
 #: Grid of quasi-static orbits, and the sharpest slip pulse that it resolves.
 _NODES, _GRADING, _SHARPEST = 32, 0.3, 18.0
@@ -255,3 +190,170 @@ def _balanced_values(
     unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
     mean, harmonics = equations.force_spectrum(problem, unknowns, program.harmonics)
     return mean, harmonics, jnp.zeros((0, *mean.shape), dtype=complex)
+
+
+#: Iterations of a linear system in addition to those that the orbit took.
+_MORE_STEPS = 1
+#: Last change of the Floquet factor.
+_FLOQUET_TOLERANCE = 1e-11
+
+
+class FourierUnknowns(NamedTuple):
+    """A Fourier orbit: mean states (points,) and zero-mean parts (nodes, points)."""
+
+    mean: States
+    zero_mean: States
+
+
+@dataclass(frozen=True)
+class FourierEquations(Equations):
+    """Orbit equations on a grid; the parameters are (problem, steps that the orbit took).
+
+    Parameters
+    ----------
+    nodes : int
+    grading : float
+    """
+
+    nodes: int
+    grading: float
+
+    def cycle(self, problem: Problem) -> LoadCycle:
+        """The load on the grid."""
+        return load_cycle(problem.load, self.nodes, self.grading)
+
+    def jacobian(self, problem: Problem, unknowns: FourierUnknowns) -> Matrix:
+        """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""
+        states = together(*unknowns)
+        _, push = jax.linearize(rates_on(problem.system, self.cycle(problem)), *states)
+        return jacobian(push, states)
+
+    def prepare(
+        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns
+    ) -> tuple[tuple[Matrix, Matrix], Array]:
+        """Jacobian and the inverse of its mean; steps."""
+        problem, steps = parameters
+        J = self.jacobian(problem, unknowns)
+        share = self.cycle(problem).share
+        inverse = inverse_points([[share @ entry for entry in row] for row in J])
+        return (inverse, J), steps + _MORE_STEPS
+
+    def residual(
+        self,
+        parameters: tuple[Problem, Array],
+        unknowns: FourierUnknowns,
+        at: tuple[Matrix, Matrix],
+    ) -> FourierUnknowns:
+        """The unknowns minus the result of one iteration step from them."""
+        problem, _ = parameters
+        cycle = self.cycle(problem)
+        rates = rates_on(problem.system, cycle)(*together(*unknowns))
+
+        def push(*change: Array) -> States:
+            return _times(at[1], change)
+
+        mean, zero_mean, _ = advance(cycle, at[0], unknowns.mean, rates, push)
+        return _less(unknowns, FourierUnknowns(mean, zero_mean))
+
+    def solve(
+        self, product: Any, right: FourierUnknowns, at: Any, steps: Array, *, transposed: bool
+    ) -> FourierUnknowns:
+        """As in `Equations`, by the contraction itself, in half the time.
+
+        With the nodes last, products with the integral need no transposition, however many
+        right-hand sides there are.
+        """
+        inverse, J = at
+        tau, integral = grid(self.nodes)
+        stretch = 1 + self.grading * np.cos(tau)
+        J = [[entry.T for entry in row] for row in J]
+        share, integral, n = stretch / self.nodes, (integral * stretch).T, range(len(J))
+
+        def forwards(y: FourierUnknowns) -> FourierUnknowns:
+            states = tuple(m[:, None] + z for m, z in zip(y.mean, y.zero_mean, strict=True))
+            rates = _times(J, states)
+            change = tuple(-c for c in _times(inverse, tuple(r @ share for r in rates)))
+            follow = _times(J, tuple(c[:, None] for c in change))
+            zero_mean = tuple((r + f) @ integral for r, f in zip(rates, follow, strict=True))
+            return FourierUnknowns(together(y.mean, change), zero_mean)
+
+        def backwards(y: FourierUnknowns) -> FourierUnknowns:
+            zero_mean = tuple(z @ integral.T for z in y.zero_mean)
+            change = [y.mean[j] + sum((J[i][j] * zero_mean[i]).sum(1) for i in n) for j in n]
+            mean = [-sum(inverse[i][j] * change[i] for i in n) for j in n]
+            rates = [r + m[:, None] * share for r, m in zip(zero_mean, mean, strict=True)]
+            states = tuple(sum(J[i][j] * rates[i] for i in n) for j in n)
+            means_too = tuple(m + s.sum(1) for m, s in zip(y.mean, states, strict=True))
+            return FourierUnknowns(means_too, states)
+
+        contract = backwards if transposed else forwards
+        turned = jax.tree.map(jnp.transpose, right)
+        return jax.tree.map(jnp.transpose, contracted(contract, turned, steps, points_first=True))
+
+
+@dataclass(frozen=True)
+class FloquetEquations(Equations):
+    """Equations of the periodic factor Q = 1 + q of the fundamental matrix, q of zero mean.
+
+        dq/dtau = J (1 + q) - (1 + q) L,     L = < J (1 + q) >.
+
+    The parameters are J, [i][j] of shape (nodes, points), per unit of tau, and the steps to take.
+    """
+
+    nodes: int
+
+    def product(self, J: Matrix, q: Matrix) -> Matrix:
+        """J (1 + q)."""
+        n = range(len(J))
+        return [[J[i][c] + sum(J[i][j] * q[j][c] for j in n) for c in n] for i in n]
+
+    def slope(self, J: Matrix, q: Matrix) -> Matrix:
+        """dq/dtau."""
+        n, P = range(len(J)), self.product(J, q)
+        L = means(P)
+        return [[P[i][c] - L[i][c] - sum(q[i][k] * L[k][c] for k in n) for c in n] for i in n]
+
+    def prepare(self, parameters: tuple[Matrix, Array], unknowns: Matrix) -> tuple[None, Array]:
+        """The steps to take."""
+        return None, parameters[1] + _MORE_STEPS
+
+    def residual(self, parameters: tuple[Matrix, Array], unknowns: Matrix, at: None) -> Matrix:
+        """Q minus the result of one iteration step from it."""
+        integral = grid(self.nodes)[1]
+        slope = self.slope(parameters[0], unknowns)
+        return [
+            [q - integral @ s for q, s in zip(*rows, strict=True)]
+            for rows in zip(unknowns, slope, strict=True)
+        ]
+
+
+def floquet_factor(nodes: int, J: Matrix, max_steps: int) -> tuple[Matrix, Array, Array]:
+    """q, whether it converged (points,), and the number of steps."""
+    equations, integral = FloquetEquations(nodes), grid(nodes)[1]
+    zero = [[jnp.zeros_like(entry) for entry in row] for row in J]
+
+    def body(carry: tuple) -> tuple:
+        q, _, steps = carry
+        new = [[integral @ s for s in row] for row in equations.slope(J, q)]
+        change = jnp.stack([jnp.abs(d).max(0) for d in jax.tree.leaves(_less(new, q))]).max(0)
+        return new, change, steps + 1
+
+    def unfinished(carry: tuple) -> Array:
+        _, change, steps = carry
+        return (steps < max_steps) & jnp.any((change > _FLOQUET_TOLERANCE) & (change < 1e3))
+
+    q, change, steps = jax.lax.while_loop(unfinished, body, (zero, jnp.ones(J[0][0].shape[1]), 0))
+    return q, change <= _FLOQUET_TOLERANCE, steps
+
+
+def means(entries: Matrix) -> Matrix:
+    """Means over tau, entries of shape (points,)."""
+    return [[entry.mean(0) for entry in row] for row in entries]
+
+
+def _less(a: Any, b: Any) -> Any:
+    return jax.tree.map(jnp.subtract, a, b)
+
+
+def _times(matrix: Matrix, vector: States) -> States:
+    return tuple(sum(a * b for a, b in zip(row, vector, strict=True)) for row in matrix)

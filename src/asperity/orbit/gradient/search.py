@@ -8,195 +8,193 @@ call it at the same points again and again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
-from asperity.orbit.gradient.known import (
-    COARSER,
-    KnownOrbits,
-    MeshOrbits,
-    SearchedOrbits,
-    converged_orbits,
-    followed_orbits,
-    largest_change,
-)
+from asperity.orbit.floquet import AGREEMENT
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.gradient.settled import settled_orbits
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import ACCEPTED
-from asperity.orbit.mesh.remeshing import refined_orbit
-from asperity.orbit.methods.collocation.initial_guess import orbits_from_averaged_limit
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
+from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
+from asperity.orbit.methods.collocation import orbits_from_averaged_limit
+from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import Solution
+from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
+from asperity.transients.dense_output import DenseOutput
+from asperity.transients.inputs import checked_integration, first_checkpoint
 
-#: Largest difference, relative, of mean and harmonics on a mesh from those of the search, at which
-#: it serves. A steep slip pulse that moves along the mesh multiplies the error of the derivatives
-#: by the pulse's shift over its width, some thousand times.
-_AGREEMENT = 1e-10
-#: Limit on the last mesh, equal to the accuracy of the search.
-_LAST_AGREEMENT = 1e-8
+Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
+MESHES = (216, 648, 1944)
+#: Largest relative difference of mean and harmonics on a mesh from those of the search, at which
+#: the mesh serves, and on the last mesh, equal to the accuracy of the search. A steep slip pulse
+#: that moves along the mesh multiplies the error of the derivatives by the pulse's shift over its
+#: width, some thousand times.
+_AGREEMENT = (1e-10, 1e-8)
+#: The same between two meshes: the error of the finer one is smaller by 3^8, for a stiff orbit by
+#: 3^4.
+_MESH_AGREEMENT = (1e-8, AGREEMENT)
 
 
-def whole_search(
+class MeshOrbits(NamedTuple):
+    """Converged orbits on one mesh, NumPy arrays with the points along the last axis.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    mean_friction : array, shape (points,)
+    harmonics : complex array, shape (count, points)
+    log_multipliers : complex array, shape (states, points)
+        Without states after a direct search, which does not resolve them.
+    """
+
+    orbit: Orbit
+    mean_friction: Float
+    harmonics: Complex
+    log_multipliers: Complex
+
+
+class SearchedOrbits(NamedTuple):
+    """Orbits of a search.
+
+    Attributes
+    ----------
+    outcome : int array, shape (points,)
+        Outcome of every point; `Outcome.NO_ORBIT` where no orbit was requested.
+    parts : list of (array of int, MeshOrbits)
+        Indices and orbits of converged points, one part for each number of intervals.
+    """
+
+    outcome: NDArray[np.int64]
+    parts: list[tuple[Indices, MeshOrbits]]
+
+    def add(self, index: Indices, orbits: MeshOrbits) -> None:
+        """Add converged orbits of the points `index`."""
+        self.outcome[index] = Outcome.CONVERGED
+        for k, (others, before) in enumerate(self.parts):
+            if len(before.orbit.mesh) == len(orbits.orbit.mesh):
+                joined = jax.tree.map(lambda *a: np.concatenate(a, axis=-1), before, orbits)
+                self.parts[k] = np.concatenate([others, index]), joined
+                return
+        self.parts.append((index, orbits))
+
+
+@dataclass
+class KnownOrbits:
+    """The latest orbit of each point, the initial guess of the next call.
+
+    Attributes
+    ----------
+    points : int
+        Number of points; calls must have as many, in the same order.
+    orbit : Orbit or None
+        Points along the last axis; None where no orbit is known.
+    known : bool array, shape (points,)
+        Of which points an orbit is known.
+    """
+
+    points: int
+    orbit: Orbit | None = None
+    known: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.known = np.zeros(self.points, bool)
+
+    def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
+        """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
+        size = problem.system.size
+        if self.orbit is None:
+            intervals = min(MESHES[0], len(orbit.mesh) - 1)
+            self.orbit = Orbit.empty(orbit.scheme, size, intervals, self.points)
+        self.known[index] = True
+        if len(orbit.mesh) == len(self.orbit.mesh):
+            put(self.orbit, index, orbit)
+            return
+        remesh = partial(remeshed, intervals=len(self.orbit.mesh) - 1)
+        inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
+        for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
+            put(self.orbit, index[part], kept)
+
+    def picked(self, index: Indices) -> KnownOrbits:
+        """The known orbits of the points `index`, which may repeat a point."""
+        orbit = None if self.orbit is None else take(self.orbit, index)
+        others = KnownOrbits(len(index), orbit)
+        others.known[:] = self.known[index]
+        return others
+
+
+def followed_orbits(
     problem: Problem,
-    points: int,
+    guess: Orbit,
+    index: Indices,
     harmonics: int,
     meshes: tuple[int, ...],
-) -> SearchedOrbits:
-    """Search for the orbits of all points of `problem`, and solve them again on a mesh.
+    numbers: Complex | None = None,
+) -> Iterator[tuple[Indices, MeshOrbits]]:
+    """Orbits that Newton's method reaches from a guess, on the first mesh that is accurate.
 
     Parameters
     ----------
     problem : Problem
-        NumPy arrays with the points along the last axis.
-    points, harmonics : int
-    meshes : tuple of int
-        Numbers of intervals, rising; an orbit is on the first that agrees with the search.
-    """
-    counted, size = max(harmonics, 2), problem.system.size
-    result = SearchedOrbits.none(points)
-    if not points:
-        return result
-    solution = find_orbits(
-        problem,
-        points,
-        harmonics=counted,
-        phases=0,
-        progress=lambda _: None,
-        intervals=meshes[0],
-    )
-    orbit = solution.orbit
-    left = np.flatnonzero(solution.converged)
-    result.outcome[:] = np.where(solution.converged, int(Outcome.NOT_RESOLVED), solution.outcome)
-    for intervals in meshes:
-        agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
-        finer = Orbit.empty(orbit.scheme, size, intervals, points)
-        solve = partial(refined_orbit, intervals=intervals, harmonics=counted)
-        chunk = mesh_chunk(size)
-        for part, (fine, reading, error) in run_chunks(solve, (problem, orbit), left, chunk):
-            put(finer, part, fine)
-            numbers = np.vstack([solution.mean_friction[part], solution.harmonics[:, part]])
-            served = (error < ACCEPTED) & (largest_change(numbers, reading) < agreement)
-            kept = np.flatnonzero(served)
-            orbits = MeshOrbits(
-                take(fine, kept),
-                solution.mean_friction[part[kept]],
-                solution.harmonics[:harmonics, part[kept]],
-                solution.log_multipliers[:, part[kept]],
-            )
-            result.add(part[kept], orbits)
-        orbit, left = finer, left[result.outcome[left] != Outcome.CONVERGED]
-        if not len(left):
-            break
-    return result
-
-
-Float = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class DirectSearch:
-    """Search for the orbits of some points.
-
-    Attributes
-    ----------
-    equations : ParametrisedProblem
-    parameters : dict of str to array, shape (points,)
-    problem : Problem
-        Of all points.
+    guess : Orbit
+        Of the points of the problem, of meaning for those of `index`.
+    index : array of int
     harmonics : int
     meshes : tuple of int
-        Numbers of intervals of the meshes that orbits may lie on, rising; without any, orbits lie
-        on the coarser mesh, unchecked, and no transients are computed.
-    result : SearchedOrbits
-        To be filled.
-    known : KnownOrbits or None
-        Of the first points; it keeps the orbits.
-    every : bool
-        Whether to give up once a point has no orbit.
+        Numbers of intervals, rising. Without any, orbits are on `FIRST_MESH`, unchecked.
+    numbers : complex array, shape (1 + harmonics, points), optional
+        Mean and harmonics, where they are known. Otherwise each mesh is compared with the one
+        before, the first with `FIRST_MESH`, and a point that Newton's method fails on is left out.
+
+    Yields
+    ------
+    array of int, MeshOrbits
+        Points, and their orbits without multipliers.
     """
-
-    equations: ParametrisedProblem
-    parameters: dict[str, Float]
-    problem: Problem
-    harmonics: int
-    meshes: tuple[int, ...]
-    result: SearchedOrbits
-    known: KnownOrbits | None
-    every: bool
-
-    def run(self, wanted: Indices) -> None:
-        """Search for the orbits of the points `wanted`."""
-        known = self.known
-        if known is not None and known.orbit is not None:
-            self._follow(known.orbit, wanted[known.known[wanted]])
-        left = self._left(wanted)
-        if len(left):
-            self._from_averaged_limit(left)
-        left = self._left(wanted)
-        if not self.meshes:
-            return
-        if len(left) and not (self.every and (self.result.outcome == Outcome.OUT_OF_RANGE).any()):
-            self._from_motions(left)
-
-    @property
-    def _counted(self) -> int:
-        """Harmonics that are computed; the first two are compared between meshes."""
-        return max(self.harmonics, 2)
-
-    def _left(self, wanted: Indices) -> Indices:
-        """Points that are neither solved nor out of range."""
-        done = np.isin(self.result.outcome[wanted], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
-        return wanted[~done]
-
-    def _follow(self, guess: Orbit, index: Indices) -> None:
-        """Solve the points `index`; `guess` has an orbit for every point."""
-        for part, orbit, observables in followed_orbits(
-            self.problem, guess, index, self._counted, self.meshes
+    size, points = guess.centre.shape
+    known, agreements = numbers is not None, _MESH_AGREEMENT if numbers is None else _AGREEMENT
+    before = np.full((1 + harmonics, points), np.nan + 0j) if numbers is None else numbers
+    for intervals in meshes if known else (FIRST_MESH, *meshes):
+        agreement = agreements[(intervals,) == meshes[-1:]]
+        solve = partial(refined_orbit, intervals=intervals, harmonics=harmonics)
+        finer = Orbit.empty(guess.scheme, size, intervals, points)
+        left = [index[:0]]
+        for part, (fine, reading, error) in run_chunks(
+            solve, (problem, guess), index, mesh_chunk(size)
         ):
-            self.result.add(part, converged_orbits(orbit, observables, self.harmonics))
-            if self.known is not None:
-                self.known.keep(self.problem, part, orbit)
-
-    def _from_averaged_limit(self, index: Indices) -> None:
-        """Solve the points `index` in range from the averaged limit."""
-        none = find_orbits(
-            take(self.problem, index),
-            len(index),
-            harmonics=1,
-            phases=0,
-            progress=lambda _: None,
-            methods=(),
-        )
-        self.result.outcome[index] = none.outcome
-        index = self._left(index)
-        guess = orbits_from_averaged_limit(self.problem, len(self.result.outcome), index)
-        self._follow(guess.orbit, index[guess.solved[index]])
-
-    def _from_motions(self, index: Indices) -> None:
-        """Solve the points `index` from motions, up to the first motion without convergence."""
-        guess, periodic = settled_orbits(
-            self.equations, self.parameters, self.problem, index, COARSER, every=self.every
-        )
-        wanted = len(index) if self.every else 1
-        if len(periodic) >= wanted:
-            self._follow(guess, periodic)
-
-
-#: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
-MESHES = (216, 648, 1944)
+            put(finer, part, fine)
+            now, solved = reading.numbers, error < ACCEPTED
+            served = solved & (response_gap(before[:, part], now, each=1) < agreement)
+            served |= solved & (not meshes)
+            kept = np.flatnonzero(served)
+            if len(kept):
+                none = np.zeros((0, len(kept)), complex)
+                numbers_of = now[0, kept].real, now[1:, kept]
+                yield part[kept], MeshOrbits(take(fine, kept), *numbers_of, none)
+            left.append(part[~served & (known | solved)])
+            if not known:
+                before[:, part] = now
+        index, guess = np.concatenate(left), finer
+        if not len(index):
+            return
 
 
 def search_orbits(
     equations: ParametrisedProblem,
     harmonics: int,
-    parameters: dict[str, NDArray[np.float64]],
+    parameters: dict[str, Float],
     wanted: NDArray[np.bool_],
     *,
     direct: bool = False,
@@ -213,26 +211,181 @@ def search_orbits(
     parameters : dict of str to array, shape (points,)
     wanted : bool array, shape (points,)
     direct : bool
-        Whether only to solve each point independently, without following branches. Multipliers
-        are then those of the mesh, unchecked.
+        Whether only to solve each point independently, without following branches: from the known
+        orbits, from the averaged limit, and from motions.
     coarse : bool
-        Whether a direct search takes orbits on the coarsest mesh, unchecked, and no transients.
+        Whether a direct search takes orbits on the coarsest mesh, unchecked, and no motions.
     known : KnownOrbits, optional
         Of the first points, for a direct search, which begins there and keeps what it finds.
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
     problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    result = SearchedOrbits.none(len(wanted))
-    index = np.flatnonzero(wanted)
-    if direct:
-        meshes = () if coarse else MESHES
-        DirectSearch(equations, parameters, problem, harmonics, meshes, result, known, every).run(
-            index
+    points, index = len(wanted), np.flatnonzero(wanted)
+    result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
+
+    def searched(rows: Indices, **options: Any) -> Solution:
+        counted = max(harmonics, 2)
+        return find_orbits(
+            take(problem, rows), len(rows), harmonics=counted, phases=0, progress=_idle, **options
         )
+
+    if not direct:
+        solution = searched(index, intervals=MESHES[0])
+        solved = solution.converged
+        result.outcome[index] = np.where(solved, int(Outcome.NOT_RESOLVED), solution.outcome)
+        numbers, part = solution.numbers[: 1 + harmonics], take(problem, index)
+        rows = np.flatnonzero(solved)
+        for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
+            logs = solution.log_multipliers[:, some]
+            result.add(index[some], orbits._replace(log_multipliers=logs))
         return result
-    searched = whole_search(take(problem, index), len(index), harmonics, MESHES)
-    result.outcome[index] = searched.outcome
-    for part, orbits in searched.parts:
-        result.add(index[part], orbits)
+
+    def left() -> Indices:
+        done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
+        return index[~done]
+
+    def follow(guess: Orbit, rows: Indices) -> None:
+        meshes = () if coarse else MESHES
+        for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
+            result.add(some, orbits)
+            if known is not None:
+                known.keep(problem, some, orbits.orbit)
+
+    if known is not None and known.orbit is not None:
+        follow(known.orbit, index[known.known[index]])
+    if len(rows := left()):
+        # No method at all still marks the points out of range.
+        result.outcome[rows] = searched(rows, methods=()).outcome
+        rows = left()
+        follow(*orbits_from_averaged_limit(problem, rows))
+    rows = left()
+    hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
+    if len(rows) and not coarse and not hopeless:
+        motions, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
+        if len(periodic) >= (len(rows) if every else 1):
+            follow(motions, periodic)
     return result
+
+
+def _idle(_: int) -> None:
+    """No report of progress."""
+
+
+#: Number of periods of a transient, and the largest number of its steps.
+_PERIODS, _MOST_STEPS = 6, 2000
+#: Number of periods over which the modulation rises; after a sudden start the slider may run away.
+_RISE = 2
+#: Tolerance of a step; Newton's method corrects the remaining error.
+_TOLERANCE = 1e-6
+#: Largest change of a state over the last period of a transient that counts as periodic.
+_SETTLED = 0.1
+
+
+def settled_orbits(
+    equations: ParametrisedProblem,
+    parameters: Mapping[str, Float],
+    problem: Problem,
+    index: Indices,
+    *,
+    every: bool = False,
+) -> tuple[Orbit, Indices]:
+    """Initial guesses for Newton's method: the last period of transients from steady sliding.
+
+    Parameters
+    ----------
+    equations : ParametrisedProblem
+    parameters : mapping of str to array, shape (points,)
+    problem : Problem
+        Of these parameters.
+    index : array of int
+    every : bool
+        Whether to stop at the first motion that does not settle.
+
+    Returns
+    -------
+    orbit : Orbit
+        Of all points, on meshes that are finest where the integrator's steps were shortest.
+    index : array of int
+        Points whose transient becomes periodic.
+    """
+    points, size = len(parameters["V"]), problem.system.size
+    orbit = Orbit.empty(scheme_for(problem.system), size, FIRST_MESH, points)
+    if equations.coefficients is not None:
+        return orbit, index[:0]
+    rows = []
+    for i in index:
+        period = _last_period(equations, {n: float(v[i]) for n, v in parameters.items()})
+        if period is not None:
+            put(orbit, np.array([i]), _on_mesh(take(problem, np.array([i])), period))
+            rows.append(i)
+        elif every:
+            break
+    return orbit, np.array(rows, int)
+
+
+def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> DenseOutput | None:
+    """The last period of a transient, over the phase from its beginning; None if not periodic."""
+    slider = jax.tree.map(float, equations.problem(values).system.slider)
+    period = 1 / values["frequency"]
+    programme = Programme(
+        Modulate(
+            (_RISE + _PERIODS) * period,
+            values["epsilon"],
+            values["frequency"],
+            rise=_RISE * period,
+        ),
+        load=values["W0"],
+        velocity=values["V"],
+    )
+    integration = checked_integration(
+        slider,
+        programme,
+        inertia=equations.massive,
+        radiation_damping=values.get("eta") or None,
+        rtol=_TOLERANCE,
+        method="implicit",
+        most_steps=_MOST_STEPS,
+    )
+    if type(integration.motion) is not equations.motion:
+        # The transient has other states, which allow slip to reverse.
+        return None
+    integration.checkpoint = first_checkpoint(integration.motion, programme, "steady")
+    parts = []
+    for part in integration.segment_parts():
+        if part.termination is not None:
+            return None
+        if part.checkpoint.segment == len(programme.segments) - 1:
+            parts.append(part.dense_output)
+    whole = DenseOutput(
+        np.concatenate([p.begin for p in parts]),
+        np.concatenate([p.length for p in parts]),
+        np.concatenate([p.coefficients[:, :-1] for p in parts], axis=-1),
+    )
+    start = (_PERIODS - 1) * period
+    one, other = whole.evaluate(np.array([start, _PERIODS * period])).T
+    if not np.abs(other - one).max() < _SETTLED:
+        return None
+    last = slice(int(np.searchsorted(whole.begin, start, side="right")) - 1, None)
+    radian = 1 / (2 * np.pi * values["frequency"])
+    return DenseOutput(
+        (whole.begin[last] - start) / radian,
+        whole.length[last] / radian,
+        whole.coefficients[..., last],
+    )
+
+
+def _on_mesh(problem: Problem, period: DenseOutput) -> Orbit:
+    """One orbit with as many intervals in each of the integrator's steps."""
+    scheme = scheme_for(problem.system)
+    begin = np.append(np.maximum(period.begin, 0.0), 2 * np.pi)
+    places = np.linspace(0, len(begin) - 1, FIRST_MESH + 1)
+    mesh = np.interp(places, np.arange(len(begin)), begin)
+    stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
+    nodes = period.evaluate(mesh[:-1])
+    inner = period.evaluate(stages.ravel()).reshape(len(nodes), *stages.shape)
+    at = excitation_at(problem.load, stages[..., None])
+    values = values_at(problem.system, at, np.zeros_like(nodes[:, :1]), inner[..., None])
+    return Orbit(
+        mesh[:, None], nodes[:, :1], (nodes - nodes[:, :1])[..., None], values.rates, scheme
+    )

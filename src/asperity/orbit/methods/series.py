@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.orbit.batches import Indices, mesh_chunk, put, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
-from asperity.orbit.methods.collocation.method import accept
-from asperity.orbit.methods.method import Method
-from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.methods.collocation import accept
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem

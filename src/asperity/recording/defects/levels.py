@@ -1,4 +1,4 @@
-"""Repeated values: a channel that is saturated, coarsely rounded, held, or lost to zero."""
+"""Repeated values: a channel that is saturated, coarsely rounded, or held."""
 
 from __future__ import annotations
 
@@ -28,8 +28,6 @@ _REPEATED, _STEPS = 0.1, 4.0
 #: Regular holding: share of runs of the usual length. Irregular holding: share of repeated samples,
 #: and size of the steps between them.
 _REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
-#: Zeros are defects if the channel is usually further than this many standard deviations from zero.
-_AWAY = 5.0
 
 
 class Saturated(NamedTuple):
@@ -140,20 +138,3 @@ def held_length(values: Array) -> float | None:
     if jump > _STEPS and regular > _REGULAR:
         return length
     return length if jump > _FAR and repeated > _OFTEN else None
-
-
-def lost_to_zero(values: Array) -> tuple[int, float] | None:
-    """Samples that are exactly zero where the channel is far from zero, and its usual value.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-    """
-    zeros = values == 0
-    count = int(np.count_nonzero(zeros))
-    if not count or count == values.size:
-        return None
-    others = values[~zeros]
-    middle = float(np.median(others))
-    scatter = float(np.median(np.abs(others - middle)))
-    return (count, middle) if abs(middle) > _AWAY * scatter else None

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.errors import Argument, InputError, listed
+from asperity.parameters.arguments import number
 from asperity.recording.finding import Finding
 from asperity.recording.readers.units import Unit, in_si
 from asperity.recording.roles import candidates, words
-from asperity.units import to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,11 +66,7 @@ def settle_time(
     """
     rows = next(iter(values.values())).size
     if rate is not None:
-        hertz = to_si(rate, "frequency", "read.rate")
-        if hertz <= 0:
-            raise InputError(
-                "read.rate", "be positive", f"{hertz:g} Hz", "give a rate like '10 kHz'"
-            )
+        hertz = number(rate, "read.rate", "frequency", "positive")
         return Clock(np.asarray(np.arange(rows) / hertz), f"rate of {hertz:.10g} Hz, as asked")
     if "time" in roles:
         return _from_column(roles["time"], values, units)

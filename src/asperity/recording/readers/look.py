@@ -27,7 +27,6 @@ from asperity.recording.readers.raw import (
     RawRecording,
     beginning,
     refuse_truncated,
-    truncated,
 )
 from asperity.recording.roles import candidates
 
@@ -41,8 +40,6 @@ _UNUSED = "no_val"
 #: Number formats, the more common first.
 _TYPES = (">f4", "<f8", ">f8", "<f4")
 _SAMPLE = 20_000
-#: Bonus for the number format that agrees with the size of the file.
-_FITS = 0.4
 #: Recorded values lie between these limits, in any unit.
 _SMALLEST, _LARGEST = 1e-12, 1e12
 
@@ -79,12 +76,17 @@ def read(path: Path) -> RawRecording:
     readings = _headers(raw[: 1 << 12].tobytes())
     if not readings:
         raise refuse_truncated(path, "whose LOOK header is not whole or not one")
-    header, dtype, sure = _layout(raw, readings)
-    body = raw[header.size :]
-    count = body.size // np.dtype(dtype).itemsize
-    data = body[: count * np.dtype(dtype).itemsize].view(dtype)
-    data = _as_doubles(data)
-    columns, findings = _columns(path, header, data)
+    pairs = [(h, t) for h in readings for t in _TYPES if _needed(h, t) == raw.size]
+    if not pairs:
+        raise refuse_truncated(path, "which has not as many numbers as its LOOK header says")
+    scores = [_sense(raw, *pair) for pair in pairs]
+    best = int(np.argmax(scores))
+    header, dtype = pairs[best]
+    sure = all(scores[best] - s > 0.05 for i, s in enumerate(scores) if i != best)
+    # A damaged file may hold signalling NaN.
+    with np.errstate(all="ignore"):
+        data = raw[header.size :].view(dtype).astype(np.float64)
+    columns, findings = _columns(header, data)
     if not sure:
         findings.append(
             Finding(
@@ -148,24 +150,6 @@ def _text(raw: bytes) -> str | None:
     return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
 
 
-def _as_doubles(data: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    # A damaged file may hold signalling NaN.
-    with np.errstate(all="ignore"):
-        return data.astype(np.float64)
-
-
-def _layout(raw: np.ndarray[Any, Any], readings: list[_Header]) -> tuple[_Header, str, bool]:
-    """Header and number format that fit, and whether nothing else fits as well."""
-    pairs = [(h, t) for h in readings for t in _TYPES]
-    whole = [p for p in pairs if _needed(*p) == raw.size]
-    # Files are cut more often than they have extra bytes. A cut size may agree by chance.
-    fitting = [p for p in pairs if _needed(*p) >= raw.size] or pairs
-    scores = [_sense(raw, *pair) + (_FITS if pair in whole else 0.0) for pair in fitting]
-    best = int(np.argmax(scores))
-    others = [s for i, s in enumerate(scores) if i != best]
-    return *fitting[best], all(scores[best] - s > 0.05 for s in others)
-
-
 def _needed(header: _Header, dtype: str) -> int:
     elements = sum(c.elements for c in header.channels)
     return header.size + elements * np.dtype(dtype).itemsize
@@ -193,37 +177,27 @@ def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
     return share - 0.2 * min(rough, 2.0) if np.isfinite(rough) else share - 0.4
 
 
-def _columns(
-    path: Path, header: _Header, data: np.ndarray[Any, Any]
-) -> tuple[list[RawColumn], list[Finding]]:
-    """The channels in order; of a cut file the usable channels."""
-    ends = np.cumsum([c.elements for c in header.channels])
-    lost = max(0, int(ends[-1]) - data.size)
-    arrays = []
-    for channel, end in zip(header.channels, ends.tolist(), strict=True):
-        arrays.append(data[end - channel.elements : end])
-    whole = [v.size == c.elements for c, v in zip(header.channels, arrays, strict=True)]
-    columns = list(zip(header.channels, arrays, strict=True))
-    findings: list[Finding] = []
-    if lost and all(whole[:-1]) and arrays[-1].size:
-        # The cut is in the last column: the rows before it are whole.
-        kept = arrays[-1].size
-        where = f"row {kept}"
-        loss = f"{lost} rows lack their last column, and were left out."
-        columns = [(c, v[:kept]) for c, v in columns]
-    elif lost:
-        where = ", ".join(
-            f"'{c.name}'" for c, ok in zip(header.channels, whole, strict=True) if not ok
-        )
-        loss = f"{where} could not be read, being stored behind the cut."
-        columns = [pair for pair, ok in zip(columns, whole, strict=True) if ok]
-    if lost:
-        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {loss}"))
-    if not columns:
-        raise refuse_truncated(path, "which ends within its first column")
-    rows = max(values.size for _, values in columns)
-    findings += [_short(c.name, v.size, rows) for c, v in columns if v.size < rows]
-    return [RawColumn(c.name, _padded(v, rows), c.units) for c, v in columns], findings
+def _columns(header: _Header, data: np.ndarray[Any, Any]) -> tuple[list[RawColumn], list[Finding]]:
+    """The channels in order, short ones filled up with NaN."""
+    rows = max(channel.elements for channel in header.channels)
+    columns, findings, at = [], [], 0
+    for channel in header.channels:
+        values = np.full(rows, np.nan)
+        values[: channel.elements] = data[at : at + channel.elements]
+        at += channel.elements
+        columns.append(RawColumn(channel.name, values, channel.units))
+        if channel.elements < rows:
+            findings.append(
+                Finding(
+                    "short column",
+                    "warning",
+                    rows - channel.elements,
+                    f"{channel.name}, row {channel.elements}",
+                    f"'{channel.name}' has {channel.elements} values where others have {rows}; "
+                    "the missing values are NaN.",
+                )
+            )
+    return columns, findings
 
 
 def _in_seconds(columns: list[RawColumn], period: float) -> tuple[list[RawColumn], list[Finding]]:
@@ -261,19 +235,3 @@ def _counts(values: np.ndarray[Any, Any]) -> bool:
         return False
     whole = bool(np.all(steps == np.rint(steps))) and bool(np.all(steps >= 1))
     return whole and float(np.mean(steps == 1)) > 0.5 and values[0] == np.rint(values[0])
-
-
-def _padded(values: np.ndarray[Any, Any], rows: int) -> np.ndarray[Any, Any]:
-    if values.size == rows:
-        return values
-    return np.concatenate([values, np.full(rows - values.size, np.nan)])
-
-
-def _short(name: str, elements: int, rows: int) -> Finding:
-    return Finding(
-        "short column",
-        "warning",
-        rows - elements,
-        f"{name}, row {elements}",
-        f"'{name}' has {elements} values where others have {rows}; the rest was read as missing.",
-    )

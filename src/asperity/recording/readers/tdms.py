@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,8 +21,6 @@ from asperity.recording.readers.raw import (
     truncated,
 )
 
-_LEAD_IN = struct.Struct("<4siIQQ")
-_UNFINISHED = 0xFFFF_FFFF_FFFF_FFFF
 #: Properties that hold the unit of a channel.
 _UNITS = ("units", "unit", "Units", "Unit", "UNITS", "UNIT", "unit_string", "NI_UnitDescription")
 
@@ -52,14 +49,15 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
             f"'{path.name}', which is TDMS",
             "install npTDMS, as 'pip install asperity[lab]' does",
         ) from None
-    missing = _missing(path)
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
         channels = {g.name: g.channels() for g in file.groups()}
         groups = {name: [_column(c) for c in inside] for name, inside in channels.items()}
+    if not any(groups.values()):
+        raise refuse_truncated(path, "which is cut before its first channel, or has none")
     findings: list[Finding] = []
-    if missing:
-        groups, finding = _whole_rows(path, groups, missing)
+    if file.file_status.incomplete_final_segment:
+        groups, finding = _whole_rows(path, groups)
         findings.append(finding)
     columns, left_out = one_table(groups, path, group, findings)
     used = channels[group.strip("/")] if group else [c for f in channels.values() for c in f]
@@ -91,7 +89,7 @@ def _column(channel: Any) -> RawColumn:
 
 
 def _whole_rows(
-    path: Path, groups: dict[str, list[RawColumn]], missing: int
+    path: Path, groups: dict[str, list[RawColumn]]
 ) -> tuple[dict[str, list[RawColumn]], Finding]:
     """Columns of each group cut to the shortest, and the finding that says so."""
     cut = {}
@@ -105,31 +103,9 @@ def _whole_rows(
         cut[name] = [RawColumn(c.label, c.values[:kept], c.unit) for c in columns if c.values.size]
     if not cut:
         raise refuse_truncated(path, "which is cut before its first value")
-    number = "at least some rows" if missing < 0 else f"{missing} bytes at least"
-    sentence = f"{number} are missing at its end; the rows that all channels have were read."
-    return cut, truncated(
-        path, lost, f"row {min(len(c[0].values) for c in cut.values())}", sentence
-    )
-
-
-def _missing(path: Path) -> int:
-    """Bytes that the last segment lacks; -1 where it was never finished, 0 for a whole file."""
-    size = path.stat().st_size
-    position = 0
-    with path.open("rb") as file:
-        while position < size:
-            file.seek(position)
-            lead = file.read(_LEAD_IN.size)
-            if len(lead) < _LEAD_IN.size:
-                return _LEAD_IN.size - len(lead)
-            _, mask, _, following, _ = _LEAD_IN.unpack(lead)
-            if mask & (1 << 6):
-                # The lead-in itself is big-endian where the flag says so; its mask is not.
-                following = int.from_bytes(lead[12:20], "big")
-            if following == _UNFINISHED:
-                return -1
-            position += _LEAD_IN.size + following
-    return max(0, position - size)
+    sentence = "its last segment is not whole; the rows that all channels have were read."
+    last = min(columns[0].values.size for columns in cut.values())
+    return cut, truncated(path, lost, f"row {last}", sentence)
 
 
 def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import codecs
 import gzip
 import io
-import json
 import re
 import warnings
 from dataclasses import dataclass
@@ -29,9 +28,10 @@ if TYPE_CHECKING:
 
 #: Bytes searched for the table, first and at most: headers of some megabytes exist.
 _HEADS = (1 << 16, 1 << 22)
-_BUFFER = 1 << 20
 #: Smallest number of complete lines from which the layout is determined.
 _FEWEST_LINES = 8
+#: Beginning of JSON; headings in brackets begin with a letter.
+_JSON = re.compile(r"\{|\[\s*[-\d\[{\"]")
 _SKIPPED = re.compile(r"line (\d+)")
 _GZIP = b"\x1f\x8b"
 _ARCHIVES = {
@@ -101,20 +101,7 @@ def _document(head: bytes) -> str:
     text = head.decode("utf-8-sig", errors="replace").lstrip()
     if text.startswith(("<?xml", "<!DOCTYPE", "<!doctype", "<html", "<HTML", "<svg")):
         return "XML or HTML"
-    return "JSON" if text.startswith(("{", "[")) and _is_json(text) else ""
-
-
-def _is_json(text: str) -> bool:
-    """Whether the beginning of a text is that of JSON, which may be cut."""
-    try:
-        json.JSONDecoder().raw_decode(text)
-    except json.JSONDecodeError as error:
-        # Where only the cut is wrong, the rest is JSON; headings in brackets fail at once.
-        return error.pos > 0.9 * len(text) or "Unterminated" in error.msg
-    except RecursionError:  # deeply nested brackets
-        return True
-    # Values one after the other, a line each; "[1], [2]" is a heading.
-    return text.startswith("{") or text.rstrip().endswith("]")
+    return "JSON" if _JSON.match(text) else ""
 
 
 def _wide_order(head: bytes) -> str:
@@ -220,6 +207,8 @@ def _mismatch(layout: Layout) -> Finding:
     others = (
         f"columns {count} to {width - 1} have no name"
         if count < width
+        else "the last name belongs to no column"
+        if count == width + 1
         else f"the last {count - width} names belong to no column"
     )
     return Finding(
@@ -254,23 +243,6 @@ def _layout(
 
 def _is_empty(values: np.ndarray[Any, Any]) -> bool:
     return values.dtype.kind == "f" and bool(np.isnan(values).all())
-
-
-class _Part(io.RawIOBase):
-    """Bytes of a file from one offset to another, so that headings and a cut row are left out."""
-
-    def __init__(self, file: BinaryIO, start: int, stop: int) -> None:
-        self._file, self._left = file, stop - start
-        file.seek(start)
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        got = self._file.read(min(len(buffer), self._left))
-        buffer[: len(got)] = got
-        self._left -= len(got)
-        return len(got)
 
 
 def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.DataFrame:
@@ -308,14 +280,18 @@ def _parse(
         "thousands": {".": ",", ",": "."}[layout.decimal] if layout.grouped else None,
     }
 
+    def rows() -> BinaryIO:
+        """The file from its first row; a copy of its rows where bytes behind them do not count."""
+        end = file.seek(0, io.SEEK_END)
+        file.seek(layout.start)
+        return file if stop == end else io.BytesIO(file.read(stop - layout.start))
+
     def parsed(**more: Any) -> pd.DataFrame:
-        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
-        frame = pd.read_csv(part, **options, **more)
+        frame = pd.read_csv(rows(), **options, **more)
         if isinstance(frame.index, pd.RangeIndex):
             return frame
         # pandas took surplus cells of the first row for row labels, which shifts all columns.
-        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
-        return pd.read_csv(part, index_col=False, **options, **more)
+        return pd.read_csv(rows(), index_col=False, **options, **more)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -324,9 +300,9 @@ def _parse(
         except ValueError:
             caught.clear()
             frame = _parsed_with_texts(parsed, path)
-    rows = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
-    rows = [*range(-layout.longer + 1, 1), *rows]
-    return frame, [_malformed(rows)] if rows else []
+    longer = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
+    longer = [*range(-layout.longer + 1, 1), *longer]
+    return frame, [_malformed(longer)] if longer else []
 
 
 @dataclass(frozen=True)
@@ -364,12 +340,8 @@ def _ending_of(file: BinaryIO, size: int, layout: Layout) -> _Ending:
     padded = len(tail) - len(tail.rstrip(b"\0"))
     tail = tail.rstrip(b"\0\x1a")
     stop = begin + len(tail)
-    every = lines_of(tail, begin)
-    lines = [line for line in every if not line.blank]
+    lines = [line for line in lines_of(tail, begin) if not line.blank]
     if not lines or (lines[-1].ended and not padded):
-        indented = bool(lines) and lines[-1].text[:1] == " "
-        if indented and every[-1].blank and not every[-1].ended:
-            return _Ending(stop, 0, "it ends with the blanks that its rows begin with.", sure=False)
         return _Ending(stop)
     last = lines[-1]
     if padded and last.ended:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,10 +85,10 @@ class FitSolve(SolveKind):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
-        super().settings(plan)
         table = _table(plan)
         free = _free(table)
-        if "M" in free and not _all_inertial(plan):
+        inertia = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
+        if "M" in free and not all(value in (True, "true", "yes", 1) for value in inertia):
             raise InputError(
                 "fit.free must be parameters of the model, got 'M', which has no influence without "
                 "inertia; add inertia = true to parameters or fix M"
@@ -159,18 +158,8 @@ def data_files(plan: Sweep) -> list[str]:
 
 
 def _table(plan: Sweep) -> FitTable:
-    if plan.fit is None:
-        raise InputError(
-            "fit must be given where solve is 'fit', got nothing; add the table [fit] with data "
-            "and free"
-        )
+    assert plan.fit is not None  # a plan has the settings of its solve
     return plan.fit
-
-
-def _all_inertial(plan: Sweep) -> bool:
-    """Whether every point of a plan includes inertia."""
-    values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
-    return all(value in (True, "true", "yes", 1) for value in values)
 
 
 def _known() -> dict[str, Parameter]:
@@ -316,16 +305,10 @@ def _numbers(fitted: Fit) -> dict[str, float]:
         ends = p.interval_95
         numbers |= {f"{name}_fit": p.value, f"{name}_se": p.se}
         numbers |= {f"{name}_low": ends[0], f"{name}_high": ends[1]}
-    return numbers | {
-        "chi2": fitted.chi2,
-        "dof": fitted.dof,
-        "p_value": fitted.p_value,
-        "log_likelihood": fitted.log_likelihood,
-        "aicc": fitted.aicc,
-        "undetermined": len(fitted.undetermined),
-        "other_minima": len(fitted.optima),
-        "warnings": len(fitted.warnings),
-    }
+    whole = ("chi2", "dof", "p_value", "log_likelihood", "aicc")
+    counted = {"undetermined": "undetermined", "other_minima": "optima", "warnings": "warnings"}
+    numbers |= {name: getattr(fitted, name) for name in whole}
+    return numbers | {name: len(getattr(fitted, field)) for name, field in counted.items()}
 
 
 def _simulated(
@@ -352,36 +335,4 @@ def _simulated(
         return None
     root = np.linalg.cholesky(table.correlations())
     normal = np.einsum("rij,rj->ri", root, noise.standard_normal(root.shape[:2]))
-    return _disturbed(table, {n: np.asarray(getattr(response, n)) for n in table.values}, normal)
-
-
-def _disturbed(
-    table: LockInTable, exact: Mapping[str, np.ndarray], normal: np.ndarray
-) -> LockInTable:
-    """Exact observables plus `normal` (standard normal errors) times the table's uncertainties."""
-    from asperity.inference.tables.table import OBSERVABLES
-
-    values = {n: np.where(np.isfinite(table.values[n]), exact[n], np.nan) for n in table.values}
-    errors = dict(table.errors)
-    units = dict(zip(OBSERVABLES, normal.T, strict=True))
-    for name in ("mean_friction", "delta_mu"):
-        if name in values:
-            values[name] = values[name] + errors[name] * units[name]
-    for amplitude, phase in (("mu1", "phase1"), ("mu2", "phase2")):
-        if amplitude not in values:
-            continue
-        # The phasor relative to the exact phase.
-        phasor = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
-        if phase in values:
-            # The quadrature error of the table's reading applies to any simulated amplitude.
-            quadrature = table.values[amplitude] * errors[phase]
-            both = np.isfinite(values[phase])
-            phasor = phasor + 1j * np.where(both, quadrature * units[phase], 0.0)
-            values[phase] = values[phase] + np.angle(phasor)
-            errors[phase] = np.where(both, quadrature / np.maximum(np.abs(phasor), 1e-300), np.nan)
-        values[amplitude] = np.abs(phasor)
-    scale = {n: errors[n] / table.errors[n] for n in errors}
-    covariances = {
-        (a, b): table.covariances[a, b] * scale[a] * scale[b] for a, b in table.covariances
-    }
-    return replace(table, values=values, errors=errors, covariances=covariances)
+    return table.disturbed({n: np.asarray(getattr(response, n)) for n in table.values}, normal)

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from asperity.errors import InputError
 from asperity.laws import Law, get_law
 from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
@@ -70,12 +69,6 @@ class SolveKind(ABC):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """Settings of this kind of solve in a plan, as JSON values."""
-        for other in ("transient", "fit"):
-            if other != self.name and getattr(plan, other) is not None:
-                raise InputError(
-                    f"{other} must be left out where solve is '{self.name}', got a table; "
-                    f"write solve = '{other}' or remove it"
-                )
         return {}
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:

@@ -11,14 +11,11 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.parameters import Output
 from asperity.questions.sweep import Sweep
-from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.outcome import Answers
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
-
-#: Codes of the bifurcations, in the order of `flag_meanings`.
-KINDS = ("fold", "period doubling", "Neimark-Sacker")
 
 
 class ThresholdSolve(SolveKind):
@@ -41,7 +38,6 @@ class ThresholdSolve(SolveKind):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
-        super().settings(plan)
         low, high = plan.threshold.between
         if not 0 < low < high:
             raise InputError(
@@ -78,16 +74,10 @@ def _search(
     low, high = settings["between"]
     searched = search_thresholds(law, values, low * critical, high * critical, settings["scan"])
     numbers = {
-        "K_threshold": searched.K,
-        "threshold_ratio": searched.K / critical,
-        "mode_frequency": searched.turn * values["frequency"],
-        "bifurcation": np.array(
-            [KINDS.index(k) if k in KINDS else np.nan for k in searched.kind], dtype=float
-        ),
+        "K_threshold": searched["K"],
+        "threshold_ratio": searched["K"] / critical,
+        "mode_frequency": searched["turn"] * values["frequency"],
+        "bifurcation": searched["bifurcation"],
     }
-    good = searched.outcome == SweepOutcome.CONVERGED
-    return Answers(
-        {name: np.where(good, numbers[name], np.nan) for name in record["outputs"]},
-        searched.outcome,
-        np.where(good, 0.0, searched.where / critical),
-    )
+    kept = {name: numbers[name] for name in record["outputs"]}
+    return Answers(kept, searched.outcome, searched.detail / critical)

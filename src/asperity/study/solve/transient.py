@@ -55,13 +55,8 @@ class TransientSolve(SolveKind):
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
-        super().settings(plan)
         table = plan.transient
-        if table is None:
-            raise InputError(
-                "transient must be given where solve is 'transient', got nothing; add the table "
-                "[transient] with steps, sampling and numbers"
-            )
+        assert table is not None  # a plan has the settings of its solve
         if not table.numbers:
             raise InputError(
                 "transient.numbers must have at least one number, got none; write it like "

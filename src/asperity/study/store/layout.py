@@ -22,11 +22,10 @@ from zarr.storage import MemoryStore
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
 from asperity.study.outcome import SweepOutcome, flag_attributes
+from asperity.study.plan import OF_CHUNKS, OF_POINTS
 from asperity.study.points import RATIOS
-from asperity.study.record import OF_CHUNKS, OF_POINTS
 from asperity.study.solve import SOLVES
-from asperity.study.store import durable
-from asperity.study.store.root import FORMAT, KIND, Root, write_root
+from asperity.study.store.root import FORMAT, KIND, Root, put, sync_folder, write_root
 
 #: `status` of a chunk that is not done; `status` of a chunk that is done is its failed points.
 NOT_DONE = -1
@@ -56,7 +55,7 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
         fresh.mkdir()
         lay_out(fresh, grid, attributes)
         fresh.rename(path)
-        durable.sync_folder(path.parent)
+        sync_folder(path.parent)
     except OSError:
         shutil.rmtree(fresh, ignore_errors=True)
         raise
@@ -88,10 +87,10 @@ def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[
         else:
             checksums.setdefault(array, checksum()).update(content)
         if not _holds(file, content):
-            durable.put(file, content)
+            put(file, content)
             written.append(name)
     for folder in {(path / name).parents[1] for name in written}:
-        durable.sync_folder(folder)
+        sync_folder(folder)
     write_root(
         path,
         {
@@ -117,9 +116,10 @@ def _holds(file: Path, content: bytes) -> bool:
 
 
 def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
-    """Append points to a store; the call can be repeated after an interruption.
+    """Append points to a store; chunks that get new points become "not done".
 
-    Chunks that get new points become "not done"; the other chunks stay as they are.
+    After an interruption the shorter plan and the longer one can both be continued: the root, which
+    is written last, tells which plan the store has.
 
     Parameters
     ----------
@@ -136,8 +136,6 @@ def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any
     list of str
         As for `lay_out`.
     """
-    pending = {"record": grid.record, "attributes": dict(attributes)}
-    write_root(path, {**root.attributes, "extending": pending}, root.arrays)
     for chunk in _touched(root.grid, grid):
         reset(path, root.grid, chunk)
     return lay_out(path, grid, {"runs": root.runs, **attributes})
@@ -172,7 +170,7 @@ def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
     file = chunk_file(path, "status", grid.place(chunk))
     if file.is_file():
         file.unlink()
-        durable.sync_folder(file.parent)
+        sync_folder(file.parent)
 
 
 def checksum(content: bytes = b"") -> Any:

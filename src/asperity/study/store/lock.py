@@ -1,12 +1,21 @@
-"""The lock of a store: one driver at a time works on a store, and workers check its token."""
+"""The lock of a store: one driver at a time works on a store, and workers check its token.
+
+The lock is a file next to the store, ``STORE.lock``. The operating system drops the lock when the
+process ends, however it ends. On some shared file systems a lock is not seen by other machines;
+there the time of the file, which the driver refreshes, shows that the driver runs.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,96 +34,76 @@ STALE = 60.0
 _HOLDER = {"token": str, "host": str, "process": int, "since": str}
 
 
+@dataclass(frozen=True)
 class StoreLock:
-    """The lock file next to a store, ``STORE.lock``.
-
-    The operating system drops the lock when the process ends, however it ends. On some shared file
-    systems a lock is not seen by other machines; there the time of the file, which the driver
-    refreshes, shows that the driver runs.
-
-    Parameters
-    ----------
-    store : Path
+    """The lock that this process has.
 
     Attributes
     ----------
-    path : Path
     token : str
         Token of this driver; its workers stop writing when the file has another token.
+    descriptor : int
+        Of the open lock file.
     """
 
-    def __init__(self, store: Path) -> None:
-        self.path = lock_file(store)
-        self.token = uuid.uuid4().hex
-        self._descriptor: int | None = None
-
-    def acquire(self) -> None:
-        """Take the lock.
-
-        Raises
-        ------
-        InputError
-            If another driver has it, or the file cannot be written.
-        """
-        while self._descriptor is None:
-            try:
-                descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
-            except OSError as error:
-                raise InputError(
-                    f"out must lie in a folder that can be written, got '{self.path}' "
-                    f"({(error.strerror or str(error)).lower()}); choose another folder"
-                ) from None
-            try:
-                holder = holder_of(self.path)
-                if _is_held(descriptor, holder, exclusive=True):
-                    raise self._refused(holder)
-                # The last holder may have removed the file between the opening and the locking.
-                if os.path.samestat(os.fstat(descriptor), self.path.stat()):
-                    self._descriptor = descriptor
-            except FileNotFoundError:
-                pass
-            finally:
-                if self._descriptor is None:
-                    os.close(descriptor)
-        record = {
-            "token": self.token,
-            "host": socket.gethostname(),
-            "process": os.getpid(),
-            "since": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        }
-        os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
-
-    def _refused(self, holder: dict[str, Any]) -> InputError:
-        who = (
-            f"process {holder['process']} on {holder['host']} since {holder['since']}"
-            if holder
-            else "another process"
-        )
-        return InputError(
-            f"out must not be in use, got '{self.path.with_suffix('').name}', which {who} is "
-            "using; wait for it or stop it (asperity sweep status shows its progress)"
-        )
+    token: str
+    descriptor: int
 
     def refresh(self) -> None:
         """Update the time of the file; the driver calls this every few seconds."""
-        if self._descriptor is not None:
-            os.utime(self._descriptor)
+        os.utime(self.descriptor)
 
-    def release(self) -> None:
-        """Release the lock and remove its file."""
-        if self._descriptor is not None:
-            if holder_of(self.path).get("token") == self.token:
-                self.path.unlink(missing_ok=True)
-            os.close(self._descriptor)
-            self._descriptor = None
 
-    def __enter__(self) -> StoreLock:
-        self.acquire()
-        return self
+@contextmanager
+def store_lock(store: Path) -> Iterator[StoreLock]:
+    """Take the lock of a store; its file is removed at the end.
 
-    def __exit__(self, *error: object) -> None:
-        self.release()
+    Raises
+    ------
+    InputError
+        If another driver has it, or the file cannot be written.
+    """
+    path, token = lock_file(store), uuid.uuid4().hex
+    descriptor = _locked(path)
+    record = {
+        "token": token,
+        "host": socket.gethostname(),
+        "process": os.getpid(),
+        "since": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+    }
+    try:
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, json.dumps(record).encode(), 0)
+        yield StoreLock(token, descriptor)
+    finally:
+        if current_token(store) == token:
+            path.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _locked(path: Path) -> int:
+    """Descriptor of the lock file, with the lock."""
+    while True:
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise InputError(
+                f"out must lie in a folder that can be written, got '{path}' "
+                f"({(error.strerror or str(error)).lower()}); choose another folder"
+            ) from None
+        holder = _holder_of(path)
+        held = _is_held(descriptor, holder, exclusive=True)
+        # The last holder may have removed the file between the opening and the locking.
+        with contextlib.suppress(FileNotFoundError):
+            if not held and os.path.samestat(os.fstat(descriptor), path.stat()):
+                return descriptor
+        os.close(descriptor)
+        if held:
+            raise InputError(
+                f"out must not be in use, got '{path.with_suffix('').name}', which "
+                f"{_text(holder) or 'another process'} is using; wait for it or stop it (asperity "
+                "sweep status shows its progress)"
+            )
 
 
 def lock_file(store: Path) -> Path:
@@ -137,23 +126,27 @@ def _is_held(descriptor: int, holder: dict[str, Any], *, exclusive: bool) -> boo
     return bool(holder) and time.time() - os.fstat(descriptor).st_mtime < STALE
 
 
-def running_driver(store: Path) -> dict[str, Any]:
-    """Contents of the lock file while a driver runs; empty without one.
+def running_driver(store: Path) -> str:
+    """The driver that works on a store, in words; "" without one.
 
     A killed driver leaves the file, but holds no lock.
     """
-    holder = holder_of(lock_file(store))
+    holder = _holder_of(lock_file(store))
     try:
         descriptor = os.open(lock_file(store), os.O_RDONLY)
     except OSError:
-        return {}
+        return ""
     try:
-        return holder if _is_held(descriptor, holder, exclusive=False) else {}
+        return _text(holder) if _is_held(descriptor, holder, exclusive=False) else ""
     finally:
         os.close(descriptor)
 
 
-def holder_of(path: Path) -> dict[str, Any]:
+def _text(holder: dict[str, Any]) -> str:
+    return "process {process} on {host} since {since}".format_map(holder) if holder else ""
+
+
+def _holder_of(path: Path) -> dict[str, Any]:
     """Contents of a lock file; empty if it is missing or invalid."""
     holder = json_content(path)
     if not isinstance(holder, dict):
@@ -164,4 +157,4 @@ def holder_of(path: Path) -> dict[str, Any]:
 
 def current_token(store: Path) -> str:
     """Token of the driver that works on a store; empty without a driver."""
-    return str(holder_of(lock_file(store)).get("token", ""))
+    return str(_holder_of(lock_file(store)).get("token", ""))

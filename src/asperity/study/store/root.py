@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
+import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +21,7 @@ from typing import Any
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.study.grid import SweepGrid
-from asperity.study.record import ATTRIBUTES
-from asperity.study.store import durable
+from asperity.study.plan import ATTRIBUTES
 
 #: Attribute that marks a store of a sweep; its value is the version of the format.
 KIND = "asperity_sweep"
@@ -74,8 +76,8 @@ def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
 
 
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
-    durable.put(folder / "zarr.json", json.dumps(content, indent=2).encode())
-    durable.sync_folder(folder.parent)
+    put(folder / "zarr.json", json.dumps(content, indent=2).encode())
+    sync_folder(folder.parent)
 
 
 def _seal(attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,3 +125,43 @@ def _sealed(content: Any) -> tuple[dict[str, Any], dict[str, Any]] | None:
     except (TypeError, KeyError, ValueError, AttributeError, RecursionError):
         return None
     return (attributes, arrays) if whole else None
+
+
+# Durable writing: a file is complete or absent, whenever the process ends
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the directory entries of a folder are on the disk; Windows needs no call."""
+    if os.name == "posix":
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file by renaming a complete one; it is on the disk when this returns."""
+    make_way(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    fresh = file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")
+    try:
+        with fresh.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(fresh, file)
+    finally:
+        fresh.unlink(missing_ok=True)
+    sync_folder(file.parent)
+
+
+def make_way(file: Path) -> None:
+    """Remove a folder in place of `file`, or a file in place of its folder."""
+    if file.is_dir() and not file.is_symlink():
+        shutil.rmtree(file)
+    folder = file.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        folder.unlink()

@@ -18,10 +18,9 @@ from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.outputs.written import to_disk
 from asperity.study.outcome import Answers
-from asperity.study.record import OF_CHUNKS, OF_POINTS
-from asperity.study.store import durable
+from asperity.study.plan import OF_CHUNKS, OF_POINTS
 from asperity.study.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset
-from asperity.study.store.root import Root, read_root, write_root
+from asperity.study.store.root import Root, make_way, read_root, sync_folder, write_root
 
 #: Errors of reading a damaged chunk; which one depends on the codec.
 _DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
@@ -164,7 +163,7 @@ class SweepStore:
             "detail": answers.detail,
         }
         for name in self._of_chunks:
-            durable.make_way(self._file(name, chunk))
+            make_way(self._file(name, chunk))
         for name, array in self.arrays.items():
             array[slices] = values[name].reshape(shape)
         self.checksum[self.grid.place(chunk)] = self._digest(chunk, answers.failed)
@@ -184,7 +183,7 @@ class SweepStore:
         for file in files:
             to_disk(file)
         for folder in self._folders(files):
-            durable.sync_folder(folder)
+            sync_folder(folder)
 
     def _folders(self, files: list[Path]) -> Iterator[Path]:
         """Folders of the files up to those of their arrays, each once, inner folders first."""
@@ -216,11 +215,6 @@ class SweepStore:
 
 def _require_whole(path: Path, root: Root) -> None:
     """Refuse to read a store whose metadata of arrays have changed since they were written."""
-    if root.attributes.get("extending"):
-        raise InputError(
-            f"store must be completely extended, got '{path.name}', whose extension is under way "
-            "or was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
-        )
     if root.damage:
         raise _damaged(path, root.damage)
     for name, described in root.arrays.items():

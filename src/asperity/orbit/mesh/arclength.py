@@ -42,9 +42,9 @@ from asperity.orbit.mesh.newton import (
     Plane,
     moved,
     newton_step,
+    remeshed,
     solve_in_plane,
 )
-from asperity.orbit.mesh.remeshing import remeshed
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues
 from asperity.slider.problem import Problem

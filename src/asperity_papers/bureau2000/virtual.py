@@ -1,4 +1,9 @@
-"""Figures 2 to 5 of the virtual experiment: points, the model's lines, and what the points say."""
+"""A virtual experiment: the paper's protocol, simulated, recorded with noise and read again.
+
+The measured points of Figs. 2 to 5 are not in the text, and nothing here stands for them: these are
+the points that the elasto-plastic law would have made of the same protocol, with error bars from
+the same reading that a laboratory's recordings get, next to the model's lines.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +23,7 @@ from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers
 from asperity_papers.bureau2000.harmonics import elastic_slope
 from asperity_papers.bureau2000.machine import EXT, SLOW, SPEEDS, Float
 from asperity_papers.bureau2000.mean import AIR, VACUUM, velocity_axis
-from asperity_papers.bureau2000.virtual.recordings import (
-    POINT_COLUMNS,
+from asperity_papers.bureau2000.recordings import (
     PRINTED,
     QUANTITIES,
     Series,
@@ -77,12 +81,15 @@ class VirtualFigure:
     Attributes
     ----------
     numbers : FigureNumbers
-        The model's lines, and points with the columns of `POINT_COLUMNS`.
+        The model's lines, and points with the columns ``point_column`` of figures.toml.
+    points : DataFrame
+        The points of `numbers`.
     series : tuple of Series
     recovered : tuple of RecoveredQuantity
     """
 
     numbers: FigureNumbers
+    points: pd.DataFrame
     series: tuple[Series, ...]
     recovered: tuple[RecoveredQuantity, ...]
 
@@ -111,25 +118,19 @@ def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
     KeyError
         If a line has no operating point where a point is.
     """
-    where = (points[name].to_numpy() for name in ("V", "frequency", "epsilon_eff"))
-    at = [_row(lines, V, f, e) for V, f, e in zip(*where, strict=True)]
-    completed = points.copy()
-    steady = lines["mean_friction"] - lines["delta_mu"]
-    for name in QUANTITIES:
-        column = steady if name == "static_friction" else lines[name]
-        completed[f"{name}_model"] = column.loc[at].to_numpy()
-    return completed[list(POINT_COLUMNS)]
-
-
-def _row(lines: pd.DataFrame, V: float, f: float, epsilon: float) -> int:
-    same = (
-        np.isclose(lines["V"], V, rtol=1e-9, atol=0)
-        & (lines["frequency"] == f)
-        & np.isclose(lines["epsilon_eff"], epsilon, rtol=1e-9, atol=1e-12)
+    where = ["V", "frequency", "epsilon_eff"]
+    same = np.all(
+        [np.isclose(points[[n]].to_numpy(), lines[n], rtol=1e-9, atol=1e-12) for n in where[1:]]
+        + [np.isclose(points[["V"]].to_numpy(), lines["V"], rtol=1e-9, atol=0)],
+        axis=0,
     )
-    if not same.any():
+    for row in np.flatnonzero(~same.any(axis=1)):
+        V, f, epsilon = points[where].iloc[row]
         raise KeyError(f"no operating point at {V:g} m/s, {f:g} Hz, {epsilon:g}")
-    return int(lines.index[same][0])
+    at = lines.iloc[same.argmax(axis=1)]
+    at = at.assign(static_friction=at["mean_friction"] - at["delta_mu"])
+    model = {f"{name}_model": at[name].to_numpy() for name in QUANTITIES}
+    return points.assign(**model)[list(WORDS.point_column)]
 
 
 def _over_amplitude(
@@ -168,7 +169,7 @@ def _figure(
         for part in ("value", "uncertainty", "true_value")
     }
     numbers = figure_numbers(PRINTED, name, lines, scalars | slopes, quoted=quoted, points=points)
-    return VirtualFigure(numbers, series, recovered)
+    return VirtualFigure(numbers, points, series, recovered)
 
 
 @cache
@@ -182,21 +183,19 @@ def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
     """Change of the mean against eps, at two velocities."""
     pair = all_series()[:2]
     lines, points = _over_amplitude(readings, pair)
-    drops = [last_point(points, name, "delta_mu") for name in SPEEDS]
-    still = [last_point(points, name, "static_friction") for name in SPEEDS]
-    shares = [ratio(drop, F0) for drop, F0 in zip(drops, still, strict=True)]
-    reads = {
-        f"share, {name}": (-value, sigma, -true_value)
-        for name, (value, sigma, true_value) in zip(SPEEDS, shares, strict=True)
-    }
-    reads["fast over slow"] = ratio(drops[1], drops[0])
+    drops, still = (
+        [last_point(points, name, column) for name in SPEEDS]
+        for column in ("delta_mu", "static_friction")
+    )
+    reads, quoted = {"fast over slow": ratio(drops[1], drops[0])}, {"strongest": drops[0][0]}
+    for name, drop, F0 in zip(SPEEDS, drops, still, strict=True):
+        value, sigma, true_value = ratio(drop, F0)
+        reads[f"share, {name}"] = -value, sigma, -true_value
+        quoted |= {f"drop, {name}": -value, f"bar, {name}": NORMAL * sigma}
     weak = _of(points, SLOW).iloc[0]
-    quoted = {
-        **{f"drop, {name}": -share[0] for name, share in zip(SPEEDS, shares, strict=True)},
-        **{f"bar, {name}": NORMAL * share[1] for name, share in zip(SPEEDS, shares, strict=True)},
+    quoted |= {
         "weakest": weak["delta_mu"],
         "bar of the weakest": NORMAL * weak["delta_mu_uncertainty"],
-        "strongest": drops[0][0],
     }
     return _figure("virtual-02", lines, points, pair, reads, quoted)
 
@@ -206,11 +205,8 @@ def virtual_3(readings: SimulatedPoints) -> VirtualFigure:
     at_120_hz = (one for one in all_series() if one.frequency == PRINTED.numbers.frequency)
     series = tuple(sorted(at_120_hz, key=lambda one: one.velocity))
     amplitudes = PRINTED.numbers["epsilon_figure3"].si_values or ()
-    V, share, overrides = (
-        velocity_axis(PRINTED),
-        abs(series[0].transfer),
-        {"B": state_coefficient()},
-    )
+    V, share = velocity_axis(PRINTED), abs(series[0].transfer)
+    overrides = {"B": state_coefficient()}
     lines = solve_curves(
         PRINTED,
         (FigureCurve(f"eps = {e:g}", EXT, V, e, share, overrides=overrides) for e in amplitudes),
@@ -238,15 +234,13 @@ def _still(rows: pd.DataFrame) -> pd.DataFrame:
     """One point of eps = 0: the mean of all F(0) of a series, and how they differ."""
     F0 = rows["static_friction"]
     stated, scatter = float(np.sqrt(np.mean(rows["static_friction_stated"] ** 2))), F0.std()
-    one = dict.fromkeys(POINT_COLUMNS, np.nan) | {
-        name: rows[name].iloc[0] for name in ("series", "V", "frequency", "seeds")
-    }
-    for name in ("epsilon_set", "epsilon", "epsilon_eff"):
-        one[name] = 0.0
+    one = dict.fromkeys(rows.columns, np.nan)
+    one |= {name: rows[name].iloc[0] for name in ("series", "V", "frequency", "seeds")}
+    one |= dict.fromkeys(("epsilon_set", "epsilon", "epsilon_eff"), 0.0)
     for name in ("mean_friction", "static_friction"):
         one |= {name: F0.mean(), f"{name}_stated": stated, f"{name}_scatter": scatter}
         one[f"{name}_uncertainty"] = max(stated, scatter)
-    return pd.DataFrame([one])[list(rows.columns)]
+    return pd.DataFrame([one])
 
 
 def _slope(rows: pd.DataFrame) -> Read:
@@ -269,22 +263,20 @@ def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
     first, second = (
         [last_point(points, name, column) for name in SPEEDS] for column in ("mu1", "mu2")
     )
-    shares = [ratio(b, a) for a, b in zip(first, second, strict=True)]
     slow = _of(points, SLOW)
     plateau = float(slow["epsilon_eff"].iloc[-1]) * elastic_slope(PRINTED, pair[0].velocity)
-    over = (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau)
     reads = {
-        **{f"mu1, {name}": mu1 for name, mu1 in zip(SPEEDS, first, strict=True)},
         "mu1, fast over slow": ratio(first[1], first[0]),
         "mu2, fast over slow": ratio(second[1], second[0]),
-        **{f"ratio, {name}": share for name, share in zip(SPEEDS, shares, strict=True)},
-        "over plateau": over,
+        "over plateau": (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau),
     }
-    quoted = {
-        f"{what}, {name}": value
-        for name, mu1, share in zip(SPEEDS, first, shares, strict=True)
-        for what, value in (("mu1", mu1[0]), ("bar", NORMAL * mu1[1]), ("ratio", share[0]))
-    }
+    quoted: dict[str, float] = {}
+    for name, mu1, mu2 in zip(SPEEDS, first, second, strict=True):
+        reads |= {f"mu1, {name}": mu1, f"ratio, {name}": ratio(mu2, mu1)}
+        quoted |= {
+            f"mu1, {name}": mu1[0], f"bar, {name}": NORMAL * mu1[1],
+            f"ratio, {name}": mu2[0] / mu1[0],
+        }  # fmt: skip
     return _figure("virtual-04", lines, points, pair, reads, quoted)
 
 
@@ -355,45 +347,39 @@ VIRTUAL: tuple[Callable[[SimulatedPoints], VirtualFigure], ...] = (
 
 def introduction(figures: Sequence[VirtualFigure]) -> str:
     """What is simulated and what is not, in front of the figures."""
-    within, bars = np.sum([covered(f.numbers) for f in figures], axis=0)
     # Figures share series, and the points of eps = 0 have no window.
-    points = pd.concat([_points(f).dropna(subset="window") for f in figures])
+    points = pd.concat([f.points.dropna(subset="window") for f in figures])
     readings = points.drop_duplicates(["series", "epsilon_set"])
-    windows, verdicts = readings["window"], readings["verdict"]
+    within = np.concatenate([_within(f) for f in figures])
     numbers = {
         "runs": len(figures[0].series[0].seeds),
         "normal": NORMAL,
-        "within": within,
-        "bars": bars,
-        "shortest": windows.min(),
-        "longest": windows.max(),
-        "clear": int((verdicts == "ok").sum()),
-        "readings": len(verdicts),
+        "within": within.sum(),
+        "bars": within.size,
+        "shortest": readings["window"].min(),
+        "longest": readings["window"].max(),
+        "clear": int((readings["verdict"] == "ok").sum()),
+        "readings": len(readings),
         "machine": "; ".join(description(figures[0].series[0].frequency)),
         "resonance": PRINTED.contact_resonance,
     }
-    texts = WORDS.section["experiment"].before
-    return "".join(f"<p>{_marked(fill(text, numbers, 'section.experiment'))}</p>" for text in texts)
+    texts = (fill(t, numbers, "section.experiment") for t in WORDS.section["experiment"].before)
+    bold = {"&lt;b&gt;": "<b>", "&lt;/b&gt;": "</b>"}
+    page = "".join(f"<p>{rich(text)}</p>" for text in texts)
+    for escaped, tag in bold.items():
+        page = page.replace(escaped, tag)
+    return page
 
 
-def _points(figure: VirtualFigure) -> pd.DataFrame:
-    assert figure.numbers.points is not None  # every figure of the experiment has them
-    return figure.numbers.points
-
-
-def covered(numbers: FigureNumbers) -> tuple[int, int]:
-    """Number of drawn 95 % intervals that contain the model, and of all of them."""
-    points = numbers.points
-    assert points is not None  # every figure of the experiment has them
-    within = [
-        abs(points[name] - points[f"{name}_model"]) <= NORMAL * points[f"{name}_uncertainty"]
-        for name in _DRAWN[numbers.name]
-    ]
-    return int(sum(holds.sum() for holds in within)), sum(len(holds) for holds in within)
-
-
-def _marked(text: str) -> str:
-    return rich(text).replace("&lt;b&gt;", "<b>").replace("&lt;/b&gt;", "</b>")
+def _within(figure: VirtualFigure) -> np.ndarray:
+    """Whether each drawn 95 % interval contains the model."""
+    points, names = figure.points, _DRAWN[figure.numbers.name]
+    return np.concatenate(
+        [
+            abs(points[name] - points[f"{name}_model"]) <= NORMAL * points[f"{name}_uncertainty"]
+            for name in names
+        ]
+    )
 
 
 def recovered_table(figures: Sequence[VirtualFigure]) -> str:

@@ -8,7 +8,7 @@ gives on the whole grid at once. With slip u = v_pl/V, slider velocity v = u + g
 
 where 1/m = 0 without inertia, d = 0 without damping and 1/s = 0 on rigid asperities, and a prime is
 d/dtheta. A step of the iteration solves the balance for g by Newton's method, a dense system over
-the grid, and advances z and the states of the law as `asperity.orbit.methods.fourier.orbit` does.
+the grid, and advances z and the states of the law as `asperity.orbit.methods.fourier` does.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.algebra.contraction import contracted
+from asperity.algebra.contraction import Equations
 from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
 from asperity.loads import Excitation
-from asperity.orbit.methods.fourier.orbit import (
+from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
     grid,
@@ -97,7 +97,7 @@ class Prepared(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BalanceEquations:
+class BalanceEquations(Equations):
     """The equations of an orbit on a grid, for the solver and for the implicit-function rule.
 
     The parameters are the problem, what the last step of the solver was prepared with, and the
@@ -118,7 +118,7 @@ class BalanceEquations:
 
     def prepare(self, parameters: Parameters, unknowns: BalanceUnknowns) -> tuple[Prepared, Array]:
         """What the solver has prepared, and the steps to take."""
-        return parameters[1:]
+        return parameters[1], parameters[2] + _MORE_STEPS
 
     def linearised(self, problem: Problem, unknowns: BalanceUnknowns) -> Prepared:
         """Inverse of the balance, and the response to changes of the means."""
@@ -204,31 +204,15 @@ class BalanceEquations:
         return new, jnp.stack([leap, *moves, *map(jnp.abs, change)]).max(0)
 
     def residual(
-        self, parameters: Parameters, unknowns: BalanceUnknowns, at: tuple[Prepared, Array]
+        self, parameters: Parameters, unknowns: BalanceUnknowns, at: Prepared
     ) -> BalanceUnknowns:
         """The unknowns minus the result of one iteration step from them."""
-        problem, (prepared, _) = parameters[0], at
+        problem = parameters[0]
         cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.zero_mean)
         gap = self._balance(problem, cycle, slow, unknowns.friction)
-        moved = _times(prepared.inverse, -gap)
-        stepped, _ = self._advance(problem, cycle, unknowns, prepared, moved, lambda x: x)
+        moved = _times(at.inverse, -gap)
+        stepped, _ = self._advance(problem, cycle, unknowns, at, moved, lambda x: x)
         return jax.tree.map(jnp.subtract, unknowns, stepped)
-
-    def solve(
-        self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
-    ) -> BalanceUnknowns:
-        """As in `Equations`, by the contraction that solves for the orbit."""
-
-        def contract(y: BalanceUnknowns) -> BalanceUnknowns:
-            return jax.tree.map(jnp.subtract, y, product(y))
-
-        return contracted(contract, right, at[1] + _MORE_STEPS, points_last=True)
-
-    def solve_transposed(
-        self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
-    ) -> BalanceUnknowns:
-        """As in `Equations`; the transposed system contracts as fast."""
-        return self.solve(product, right, at)
 
     def steady(self, problem: Problem) -> BalanceUnknowns:
         """Steady sliding under the mean load."""

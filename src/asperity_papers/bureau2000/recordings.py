@@ -122,37 +122,7 @@ def description(frequency: float) -> list[str]:
 # --- The protocol, and what is read ---------------------------------------------------------------
 
 #: Quantities of a point; each has a value, two measures of its scatter, and the model's value.
-QUANTITIES = {
-    "mean_friction": "mean of F/W0",
-    "static_friction": "F/W0 without modulation, before and after",
-    "delta_mu": "mean_friction less static_friction",
-    "mu1": "amplitude of the first harmonic of F/W0",
-    "mu2": "amplitude of the second harmonic of F/W0",
-}
-
-#: Columns of the table of points, with unit and meaning.
-POINT_COLUMNS = {
-    "series": "name of the series",
-    "V": "m/s; pulling velocity",
-    "frequency": "Hz; of the load modulation",
-    "epsilon_set": "1; commanded relative amplitude of the load",
-    "epsilon": "1; the same as measured",
-    "epsilon_eff": "1; amplitude that the contacts bear, which is not measured",
-    "seeds": "of the runs: of their noise and of their drift",
-    "window": "s; mean length of what the lock-in has read",
-    "verdict": "gravest verdict of the readings",
-    **{
-        f"{name}{suffix}": f"1; {text.format(meaning)}"
-        for name, meaning in QUANTITIES.items()
-        for suffix, text in {
-            "": "{}, mean over the runs",
-            "_stated": "standard uncertainty that a reading states for itself, rms over the runs",
-            "_scatter": "standard deviation over the runs",
-            "_uncertainty": "the larger of the two, drawn 1.96-fold",
-            "_model": "of the periodic orbit at epsilon_eff; no reading",
-        }.items()
-    },
-}
+QUANTITIES = ("mean_friction", "static_friction", "delta_mu", "mu1", "mu2")
 
 #: Commanded amplitudes; the last three are those of Fig. 3.
 AMPLITUDES = (0.05, 0.1, 0.2, 0.35, 0.5)
@@ -160,7 +130,7 @@ AMPLITUDES = (0.05, 0.1, 0.2, 0.35, 0.5)
 #: each memory length takes four seconds.
 VELOCITIES = (1e-6, 1e-4)
 
-#: Points by the name of the series, a row for each amplitude; all of `POINT_COLUMNS` but the model.
+#: Points by the name of the series, a row for each amplitude; all columns but the model's.
 SimulatedPoints: TypeAlias = Mapping[str, pd.DataFrame]
 
 #: Verdicts from the best to the worst.

@@ -1,0 +1,430 @@
+"""From steady sliding to the requested amplitude, through folds and canards, in batches.
+
+`BranchFollowing` is the method of the search that takes the orbits at the ends of these branches,
+or the reason why a branch ends before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
+from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.mesh.arclength import (
+    ContinuationPoint,
+    ParameterLine,
+    amplitude_line,
+    correct,
+    first_point,
+    turned,
+    usable,
+    weighted_row,
+)
+from asperity.orbit.mesh.mesh import STAGES, Orbit, on_mesh, scheme_for, spread
+from asperity.orbit.mesh.newton import Change, Plane, moved
+from asperity.orbit.methods.collocation import refine
+from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
+from asperity.orbit.solution import Method, SearchOptions, Solution
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+#: Branches that are followed in a call.
+CHUNK = 8
+
+
+class BranchMesh(NamedTuple):
+    """Intervals of a moving mesh, and most steps along a branch on it."""
+
+    intervals: int
+    most_steps: int
+
+
+#: First mesh, and a finer mesh for points without a definite outcome.
+MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
+#: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
+#: round-off in the phase limits it.
+RUNAWAY = 13.0
+
+#: Distance from the requested amplitude below which steps aim at it, and at which it is reached.
+_NEAR, _ARRIVED = 1e-2, 1e-6
+#: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
+_AHEAD = 0.5
+#: A branch counts as returning when it is this far behind its fold (share of the amplitude).
+_BACK = 1e-3
+_NEWTON_STEPS = 10
+#: Distance that the motion of the mesh may cause; shorter steps do not reduce it.
+_NOISE = 0.15
+_FIRST = 0.02
+#: Number of failures after which a step is predicted along the tangent.
+_RESTART = 4
+#: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
+#: and how many times farther the share may get than where that leads.
+_RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
+
+
+def follow_from_steady_sliding(
+    problem: Problem, index: Indices, mesh: BranchMesh
+) -> SteadyBranches:
+    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
+
+    The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
+    before the branch is lost.
+    """
+    line, points = amplitude_line(problem), len(problem.system.V)
+    branches = SteadyBranches(line, _steady_pair(line, points, index, mesh.intervals))
+    follow(branches, np.full(points, _FIRST), rows=index, most=mesh.most_steps)
+    return branches
+
+
+def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: int) -> PointPair:
+    system = line.origin.system
+    orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
+    orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
+    steady = jax.jit(lambda s: s.steady())(system)
+    orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
+    t = np.zeros(points)
+    tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
+    start = ContinuationPoint(orbit, t, tangent, np.zeros_like(orbit.centre))
+    pair = jax.tree.map(np.array, PointPair(orbit, t, start))
+
+    def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
+        return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
+
+    for part, begun in run_chunks(begin, (line, orbit, t), index, CHUNK):
+        put(pair, part, begun)
+    return pair
+
+
+def continues(share: Float, fastest: Float) -> NDArray[np.bool_]:
+    """Branches that neither arrived nor ran away; one that returns may turn again."""
+    left = np.abs(share - 1)
+    # A branch that is about to arrive may exceed the limit a little.
+    fastest = np.where(left < _NEAR, fastest - _AHEAD, fastest)
+    return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
+
+
+class SteadyBranches(Curves):
+    """Branches from steady sliding in the amplitude, predicted from their last two points.
+
+    Attributes
+    ----------
+    line : ParameterLine
+    pair : PointPair
+        The last two points of each branch.
+    span : array, shape (points,)
+        Distance between these two.
+    fold : array, shape (points,)
+        Share of the amplitude at the fold that is farthest from steady sliding, NaN where there
+        was none.
+    farthest : array, shape (points,)
+        Largest share on the branch.
+    fastest : array, shape (points,)
+        Largest exponent of the slip rate of the last orbit.
+    limit : array, shape (points,)
+        Share at which, as they grew at last, pulses are to reach e^`RUNAWAY`; inf where they
+        do not grow.
+    watched_share, watched_exponent : array, shape (points,)
+        Share and exponent from which the present rise of the exponent is counted.
+    """
+
+    control = StepControl(
+        shortest=0.0,
+        longest=3.0,  # in the space of states, phase and share
+        growth=2.0,
+        easy=4,
+        hard=7,
+        sharpest_turn=0.3,
+        farthest=0.8,
+        most_failures=10,
+    )
+
+    def __init__(self, line: ParameterLine, pair: PointPair) -> None:
+        """At steady sliding."""
+        self.line, self.pair = line, pair
+        zero = np.zeros_like(pair.t_before)
+        self.span, self.fold, self.limit = zero + _FIRST, zero + np.nan, zero + np.inf
+        self.farthest, self.fastest = zero.copy(), zero.copy()
+        self.watched_share, self.watched_exponent = zero.copy(), zero.copy()
+
+    @property
+    def share(self) -> Float:
+        """Share of the amplitude reached; about 1 where a branch succeeded."""
+        return self.pair.point.t
+
+    @property
+    def arrived(self) -> NDArray[np.bool_]:
+        """Whether the requested amplitude was reached."""
+        return np.abs(self.share - 1) <= _ARRIVED
+
+    @property
+    def folded(self) -> NDArray[np.bool_]:
+        """Whether the branch was abandoned while it returned from its farthest fold."""
+        with np.errstate(invalid="ignore"):
+            back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
+        return ~self.arrived & back
+
+    @property
+    def end(self) -> Float:
+        """Share before which pulses pass e^`RUNAWAY`; inf where they are not known to."""
+        return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
+
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """Not predicted to pass the requested amplitude; back where a step has passed it.
+
+        After several failures along the secant, along the tangent.
+        """
+        stuck = np.flatnonzero((failures >= _RESTART) & (failures < self.control.most_failures))
+        self.span[stuck] = length[stuck] = np.abs(length[stuck])
+        for part, fresh in run_chunks(straight, (self.pair.point, length), stuck, CHUNK):
+            put(self.pair, part, fresh)
+        t, ratio = self.pair.point.t, length / self.span
+        last, left = t - self.pair.t_before, 1 - t
+        near = (last != 0) & (np.abs(left) < _NEAR)
+        near |= (last > 0) & ((ratio * last > left) | (left < 0))
+        secant = left / np.where(near, last, 1.0)
+        # A step that has just failed is not repeated with the same length.
+        longest = np.where(failures > 0, np.abs(ratio), 2.0)
+        aimed = np.clip(secant, -np.minimum(longest, 1.0), longest)
+        return np.where(near, aimed, ratio) * self.span
+
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Indices, Attempt]]:
+        """Steps on the moving mesh."""
+        advance = partial(moving_step, max_steps=_NEWTON_STEPS)
+        inputs = (self.line, self.pair, length / self.span)
+        for part, step in run_chunks(advance, inputs, rows, CHUNK):
+            miss = np.where(step.miss * step.length < _NOISE, 0.0, step.miss)
+            converged = np.isfinite(step.error)
+            yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)
+
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Update folds, shares and exponents; a branch ends where it arrives or runs away."""
+        step, before = attempt.next, self.pair.point.tangent.t[rows]
+        turned = before * step.next.point.tangent.t[chosen] < 0
+        extremum = np.where(turned, _extremum(self.pair, step, rows, chosen), np.nan)
+        self.fold[rows] = np.fmax(self.fold[rows], extremum)
+        put(self.pair, rows, take(step.next, chosen))
+        self.span[rows], self.fastest[rows] = step.length[chosen], step.fastest[chosen]
+        share = self.share[rows]
+        self.farthest[rows] = np.maximum(self.farthest[rows], share)
+        self._watch(rows, share)
+        return ["" if goes_on else "ended" for goes_on in continues(share, self.fastest[rows])]
+
+    def _watch(self, rows: Indices, share: Float) -> None:
+        """Extrapolate the share to where pulses run away, once they have grown enough."""
+        exponent = self.fastest[rows]
+        rise = exponent - self.watched_exponent[rows]
+        gain = share - self.watched_share[rows]
+        grown = (exponent > _RUNNING) & (rise > _RISE) & (gain > 0)
+        left = np.maximum(RUNAWAY - exponent, 0.0)
+        ahead = share + _CAUTION * left * gain / np.where(grown, rise, 1.0)
+        known = np.where(rise < 0, np.inf, self.limit[rows])
+        self.limit[rows] = np.where(grown, ahead, known)
+        restart = (rise > _RISE) | (rise < 0)
+        self.watched_share[rows] = np.where(restart, share, self.watched_share[rows])
+        self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
+
+
+def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indices) -> Float:
+    """Largest or smallest t between two points, of the cubic through values and directions."""
+    t, slope = pair.point.t[rows], pair.point.tangent.t[rows]
+    t_next = step.next.point.t[chosen]
+    slope_next = step.next.point.tangent.t[chosen]
+    # The parabola of the slope has its zero at x; the area under the slope to there is the rise.
+    # Equal slopes have none, and their result is not used.
+    parted = slope != slope_next
+    x = slope / np.where(parted, slope - slope_next, 1.0)
+    rise = 0.5 * x * slope
+    whole = 0.5 * (slope + slope_next)
+    scale = np.where(np.abs(whole) > 1e-12, (t_next - t) / np.where(whole == 0, 1.0, whole), 0.0)
+    scale = np.where(scale > 0, np.minimum(scale, step.length[chosen]), step.length[chosen])
+    return t + scale * rise
+
+
+class BranchFollowing(Method):
+    """Follows the branch from steady sliding by its arclength, on finer and finer meshes."""
+
+    name = "branch following"
+    choice = "collocation"
+
+    def __init__(self, meshes: tuple[BranchMesh, ...] = MESHES) -> None:
+        """`meshes` are tried in turn, each on the points without a definite outcome."""
+        self.meshes = meshes
+
+    def suits(self, problem: Problem) -> bool:
+        """Any equations and load."""
+        return True
+
+    def candidates(self, solution: Solution) -> Indices:
+        """Points without an orbit, or with one that was lost on every finer mesh."""
+        return np.flatnonzero(_without_orbit(solution))
+
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """As in `Method`; `detail` is the amplitude at which the branch ends."""
+        points = problem.system.V.shape[-1]
+        solution = Solution.unsolved(problem, points, options)
+        definite = np.zeros(points, dtype=bool)
+        for mesh in self.meshes:
+            rows = np.flatnonzero(_without_orbit(solution) & ~definite)
+            if len(rows):
+                attempt = Solution.unsolved(problem, len(rows), options)
+                part = take(problem, rows)
+                definite[rows] = solve_along_branches(part, attempt, options, mesh)
+                solution.merge(rows, attempt)
+                options.progress(int(attempt.converged.sum()))
+        return solution
+
+
+def _without_orbit(solution: Solution) -> NDArray[np.bool_]:
+    lost = (solution.outcome == Outcome.NOT_RESOLVED) & np.isinf(solution.detail)
+    return np.isin(solution.outcome, WITHOUT_ORBIT) | lost
+
+
+def solve_along_branches(
+    problem: Problem, solution: Solution, options: SearchOptions, mesh: BranchMesh
+) -> NDArray[np.bool_]:
+    """Refine the orbits at the ends of the branches, or say why a branch has none.
+
+    Returns
+    -------
+    bool array, shape (points,)
+        Whether the outcome does not depend on the mesh.
+    """
+    points = len(solution.outcome)
+    branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
+    arrived, folded = branch.arrived, branch.folded
+    ran_away = ~arrived & ~folded & (branch.end < 1)
+    amplitude = np.broadcast_to(problem.load.amplitude, (points,))
+    solution.detail[:] = branch.farthest
+    for which, outcome, share in (
+        (folded, Outcome.FOLDED, branch.fold),
+        (ran_away, Outcome.RUNAWAY, branch.end),
+    ):
+        rows = np.flatnonzero(which & (amplitude > 0))
+        solution.outcome[rows] = outcome
+        solution.detail[rows] = share[rows] * amplitude[rows]
+    refine(problem, solution, branch.pair.point.orbit, np.flatnonzero(arrived), options)
+    return arrived | folded | (branch.fastest >= RUNAWAY)
+
+
+#: Newton's method ends and a step is accepted at this change; the error is about its square.
+ACCEPTED = 1e-5
+#: Smallest ratio of the predicted width of an interval to its present width.
+_NARROWEST = 0.3
+
+
+class PointPair(NamedTuple):
+    """Two successive points of a branch, the first without its tangent."""
+
+    before: Orbit
+    t_before: Float
+    point: ContinuationPoint
+
+
+class MovingMeshStep(NamedTuple):
+    """One step on the moving mesh.
+
+    Attributes
+    ----------
+    next : PointPair
+    error, iterations : array, shape (points,)
+        As in `ArclengthStep`.
+    turn : array, shape (points,)
+        Cosine of the angle between the tangents before and after.
+    miss : array, shape (points,)
+        Distance of the new point from the predicted one, in steps.
+    length : array, shape (points,)
+        Distance of the new point from the previous point, for each interval.
+    fastest : array, shape (points,)
+        Largest exponent of the slip rate of the new orbit.
+    """
+
+    next: PointPair
+    error: Float
+    iterations: Float
+    turn: Float
+    miss: Float
+    length: Float
+    fastest: Float
+
+
+def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
+    """Extrapolation by `ratio` times the last step."""
+    before, now = pair.before, pair.point.orbit
+    longer = now.widths + ratio * (now.widths - before.widths)
+    widths = np.maximum(longer, _NARROWEST * now.widths)
+    widths = widths * (2 * np.pi / widths.sum(0))
+    mesh = np.concatenate([np.zeros_like(widths[:1]), np.cumsum(widths, axis=0)])
+    mesh[-1] = 2 * np.pi
+    rises = now.slopes * now.widths
+    rises = rises + ratio * (rises - before.slopes * before.widths)
+    return now.moved(
+        mesh=mesh,
+        centre=now.centre + ratio * (now.centre - before.centre),
+        nodes=now.nodes + ratio * (now.nodes - before.nodes),
+        slopes=rises / np.diff(mesh, axis=0),
+    ), pair.point.t + ratio * (pair.point.t - pair.t_before)
+
+
+def _distance(units: Float, a: Orbit, s: Float, b: Orbit, t: Float) -> Float:
+    """Distance interval by interval, of states, phases and coordinate."""
+    states = (a.centre - b.centre)[:, None] + a.nodes - b.nodes
+    square = ((units[:, None] * states) ** 2).sum(0).mean(0)
+    return np.sqrt(square + ((a.mesh - b.mesh) ** 2).mean(0) + (s - t) ** 2)
+
+
+def relaid(orbit: Orbit, units: Float) -> Orbit:
+    """The orbit on a mesh with intervals of equal length in the space of phase and states.
+
+    Other than a mesh that spreads an error estimate it changes as smoothly as the orbit does, which
+    extrapolation lives on.
+    """
+    widths = orbit.widths
+    rises = widths * np.abs(orbit.slopes).mean(1) * units[:, None]
+    top = np.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
+    local = (np.abs(top) * widths * units[:, None]).max(0)
+    error = (local + 1e-10) ** (1 / (STAGES + 1))
+    for _ in range(2):
+        error = (np.roll(error, 1, 0) + 2 * error + np.roll(error, -1, 0)) / 4
+    length = np.sqrt(widths**2 + (rises**2).sum(0))
+    density = sum(a / a.sum(0) for a in (error, length, widths)) / widths
+    return on_mesh(orbit, spread(orbit.mesh, density, len(widths), smoothings=3))
+
+
+def straight(point: ContinuationPoint, length: Float) -> PointPair:
+    """A pair that extrapolates along the tangent, by the given length."""
+    return PointPair(*moved(point.orbit, point.t, point.tangent, -length), point)
+
+
+def moving_step(
+    line: ParameterLine, pair: PointPair, ratio: Float, *, max_steps: int
+) -> MovingMeshStep:
+    """One step of `ratio` times the last one along each branch."""
+    point = pair.point
+    tangent, units = point.tangent, point.units
+    with np.errstate(all="ignore"):
+        guess, t_guess = _predicted(pair, ratio)
+        plane = Plane(weighted_row(guess, tangent.nodes, units), tangent.t)
+        result = correct(line, guess, t_guess, plane, max_steps=max_steps, tolerance=ACCEPTED)
+        orbit, t = result.orbit, result.t
+        new = relaid(orbit, units)
+        turn = turned(line, new, t, tangent.nodes, tangent.t)
+        step = _distance(units, guess, t_guess, point.orbit, point.t)
+        t_slope = turn.point.tangent.t
+        forward = ratio * (t - point.t) * (tangent.t + t_slope)
+        backward = (tangent.t * t_slope > 0) & (forward < 0)
+        miss = _distance(units, orbit, t, guess, t_guess) / step
+        length = _distance(units, new, t, point.orbit, point.t)
+        fine = usable(new, turn.cosine) & ~backward
+        error = np.where(fine & (result.error <= ACCEPTED), result.error, np.inf)
+        fastest = turn.values.log_slip.max((0, 1))
+    following = PointPair(point.orbit, point.t, turn.point)
+    return MovingMeshStep(following, error, result.steps, turn.cosine, miss, length, fastest)

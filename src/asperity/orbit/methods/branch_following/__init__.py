@@ -1,1 +1,0 @@
-"""An orbit followed from steady sliding to the requested amplitude, through folds."""

@@ -1,1 +1,0 @@
-"""Shooting over one period, for equations that are not stiff but oscillate."""
