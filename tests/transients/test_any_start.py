@@ -144,7 +144,7 @@ def test_compiled_steps_return_however_many_are_rejected(monkeypatch):
             return steps.TrialStep(Y, jnp.asarray(error), jnp.asarray(factor), memory, False, (Y,))
 
         zero, Y = jnp.zeros(()), jnp.zeros(2)
-        limits = steps.LengthLimits(0.999999, 6.0)
+        limits = 0.999999, 6.0
         return jax.jit(
             lambda h: steps.run_steps(
                 system, zero, Y, h, jnp.ones(()), jnp.ones(()), attempt, zero, limits

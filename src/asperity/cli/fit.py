@@ -118,17 +118,13 @@ _THEN = (
 )
 
 
-def _question_options(
-    *further: Any, laws: str | None = None
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
     Parameters
     ----------
     *further : click options
         Of this command alone, which follow those that are needed first.
-    laws : str, optional
-        The laws where none is named.
     """
 
     def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -164,7 +160,7 @@ def _question_options(
 
         first = (
             click.argument("data", nargs=-1, required=True, type=Path),
-            law_options(laws),
+            law_options,
             click.option(
                 "--report",
                 type=Path,
@@ -301,10 +297,7 @@ if its AICc exceeds the lowest by 10 or more.
 
 
 @click.command(epilog=_EPILOG_OF_COMPARE)
-@_question_options(
-    click.option("--windows", hidden=True, metavar="SPANS"),
-    laws="all",
-)
+@_question_options(click.option("--windows", hidden=True, metavar="SPANS"))
 def compare(
     laws: tuple[str, ...],
     fields: dict[str, Any],
@@ -327,7 +320,7 @@ def compare(
     if report is not None:
         require_folder(report, "--report")
     output.require_picture(*(d["file"] for d in fields["data"]))
-    fields["laws"] = laws
+    fields["laws"] = laws or ("all",)
     question = Comparison(**fields)
     with bar("%", raising=False) as update:
 

@@ -117,9 +117,6 @@ Examples:
   asperity measure day1/*.csv --out campaign.csv
   asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
       --conditions "run_k{K N/m}_v{V um/s}" --thresholds bifurcation.csv
-  asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
-      --conditions "run_k{K N/m}_v{V um/s}" --plot campaign.png \\
-      --law rice-ruina --material bureau2000
   asperity measure run_*.csv --stick-slip --set "W0=7 N" --set "M=1 kg" \\
       --conditions "run_k{K N/m}_v{V um/s}" --out campaign.csv --plot campaign.png \\
       --law rice-ruina --material bureau2000

@@ -34,7 +34,8 @@ class Count(click.ParamType):
             return int(value)
         except ValueError:
             option = "" if param is None else param.opts[0]
-            raise InputError(option, "be a whole number", f"'{value}'", "correct it") from None
+            rule = "be a whole number"
+            raise InputError(option, rule, f"'{value}'", "correct the value") from None
 
 
 class FieldOption(click.Option):
@@ -174,43 +175,25 @@ def law_option(
     )
 
 
-def law_options(default: str | None = None) -> Decorator:
-    """``--law``, which may be repeated, and ``--laws``; the command gets `laws`, a tuple of names.
+def law_options(command: Command) -> Command:
+    """``--law``, which may be repeated, and ``--laws``, with commas between names: `laws`."""
 
-    Parameters
-    ----------
-    default : str, optional
-        Of ``--laws``, without either option.
-    """
+    def names(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> Any:
+        parts = (part.strip() for text in texts for part in text.split(","))
+        return tuple(known_place(part) for part in parts if part)
 
-    def with_options(command: Command) -> Command:
-        @wraps(command)
-        def gathered(*, laws: tuple[str, ...], listed: str | None, **others: Any) -> Any:
-            once = not laws or listed is None
-            require(once, "--law", "go without --laws", "both", "they say the same, leave one out")
-            if not laws:
-                texts = (listed or default or "").split(",")
-                laws = tuple(known_place(text.strip()) for text in texts if text.strip())
-            return command(laws=laws, **others)
-
-        result: Command = click.option(
-            "--laws",
-            "listed",
-            metavar="NAMES",
-            help="The same as several --law: a,b,c or all"
-            + (f"; {default} if neither is given." if default else "."),
-        )(gathered)
-        return click.option(
-            "--law",
-            "laws",
-            metavar="NAME",
-            multiple=True,
-            callback=lambda context, option, texts: tuple(map(known_place, texts)),
-            help="Friction law, such as rice-ruina, or one of your own as module:Name or "
-            "file.py:Name; of a comparison, repeatable.",
-        )(result)
-
-    return with_options
+    option = click.option(
+        "--law",
+        "--laws",
+        "laws",
+        metavar="NAME",
+        multiple=True,
+        callback=names,
+        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        "of a comparison, repeatable, also as a,b,c, or all, the default.",
+    )
+    result: Command = option(command)
+    return result
 
 
 def known_place(text: str) -> str:

@@ -69,6 +69,13 @@ class Shell(click.Group):
                     code = _print_error(str(error), _BAD_INPUT)
         except click.Abort as abort:
             code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
+        except click.MissingParameter as error:
+            option, name = error.param, "" if error.param is None else error.param.opts[-1]
+            like = "" if option is None else option.make_metavar(error.ctx or click.Context(self))
+            advice = f"add it, like {name} {like}" if name.startswith("-") else "add it"
+            code = _print_error(
+                str(InputError(name or "argument", "be given", "nothing", advice)), _BAD_INPUT
+            )
         except click.ClickException as error:
             code = _print_error(error.format_message(), _BAD_INPUT)
         sys.exit(code)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.air import AirLayer, transfer_function
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.loads import Modulate
 from asperity.slider import Slider
 from asperity.units import to_si
@@ -59,9 +59,7 @@ class Exciter:
         )
         return cls(hertz, complex(transfer))
 
-    def steps(
-        self, epsilon: float, duration: float, rise: float, velocity: float | None = None
-    ) -> tuple[Modulate, Modulate]:
+    def steps(self, epsilon: float, duration: float, rise: float) -> tuple[Modulate, Modulate]:
         """The applied modulation, and that of the load on the contacts.
 
         Parameters
@@ -70,8 +68,6 @@ class Exciter:
             Applied relative amplitude.
         duration, rise : float
             Seconds; the amplitude rises and falls within `rise` each.
-        velocity : float, optional
-            Pulling velocity (m/s) from now on.
 
         Raises
         ------
@@ -79,12 +75,10 @@ class Exciter:
             If the contacts would be lost.
         """
         size, phase = cmath.polar(self.transfer)
-        if not size * epsilon < 1:
-            raise InputError(
-                f"exciter.epsilon must leave the contacts loaded, got {epsilon:g} of which they "
-                f"bear {size * epsilon:g}; lower it below {1 / size:.3g}"
-            )
+        got = f"{epsilon:g} of which they bear {size * epsilon:g}"
+        advice = f"lower it below {1 / (size or np.inf):.3g}"
+        loaded = size * epsilon < 1
+        require(loaded, "exciter.epsilon", "leave the contacts loaded", got, advice)
         common: dict[str, Any] = {"frequency": self.frequency, "rise": rise, "fall": rise}
-        common["velocity"] = velocity
         applied = Modulate(duration, epsilon, **common)
         return applied, Modulate(duration, size * epsilon, phase=phase, **common)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
 from asperity.recording.trace import Trace
@@ -89,16 +89,11 @@ def loading_recording(
         If a value breaks its rule, or the motion ends before the test does.
     """
     speed = to_si(velocity, "velocity", "loading_recording.velocity")
-    if not 0 < low < high < 1:
-        raise InputError(
-            f"loading_recording.low and high must lie between 0 and 1 and rise, got {low:g} and "
-            f"{high:g}; stay below the threshold of sliding, as 0.2 and 0.6 do"
-        )
-    if cycles < 2:
-        raise InputError(
-            f"loading_recording.cycles must be at least 2, got {cycles}; their scatter is the "
-            "uncertainty"
-        )
+    rule, got = "lie between 0 and 1 and rise", f"{low:g} and {high:g}"
+    advice = "stay below the threshold of sliding, as 0.2 and 0.6 do"
+    require(0 < low < high < 1, "loading_recording.low and high", rule, got, advice)
+    field, advice = "loading_recording.cycles", "their scatter is the uncertainty"
+    require(cycles >= 2, field, "be at least 2", cycles, advice)
     W0 = np.asarray(slider.W0).item()
     stroke = float(slider.law.mu_ss(speed)) * W0 / np.asarray(slider.K).item() / speed
     back, there = (1 - low) * stroke, (high - low) * stroke
@@ -153,11 +148,9 @@ def elastic_length(
         slopes.append(slope)
         lengths.append(np.mean(W[cut]) * (slope - (0.0 if K is None else 1 / K)))
     pairs = np.reshape(lengths, (-1, 2)).mean(1)
-    if pairs.size < 2:
-        raise InputError(
-            f"elastic_length.trace must hold two cycles of loading and unloading at least, got "
-            f"{pairs.size}; record more, or choose the channel of the shear force"
-        )
+    rule = "hold two cycles of loading and unloading at least"
+    advice = "record more, or choose the channel of the shear force"
+    require(pairs.size >= 2, "elastic_length.trace", rule, pairs.size, advice)
     doubt = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
     return ElasticLength(float(pairs.mean()), doubt, pairs, float(1 / np.mean(slopes)))
 

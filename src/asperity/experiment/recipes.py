@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.experiment.motion import recorded_motion
 from asperity.loads import Hold, Programme, ProgrammeStep, Slide
 from asperity.loads.programme.segment import ProgrammeSegment
@@ -36,10 +36,8 @@ class SlideHoldSlide(ProgrammeStep):
 
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """The segments of all holds."""
-        if not len(self.holds):
-            raise InputError(
-                f"{name}.holds must hold a time, got none; give some, like 10 s, 100 s"
-            )
+        advice = "give some, like 10 s, 100 s"
+        require(len(self.holds), f"{name}.holds", "hold a time", "none", advice)
         steps: list[ProgrammeStep] = [Slide(self.sliding)]
         for hold in self.holds:
             steps += [Hold(hold), Slide(self.sliding)]
@@ -65,11 +63,12 @@ class VelocitySteps(ProgrammeStep):
         """One segment for each velocity."""
         slip = to_si(self.slip, "length", f"{name}.slip")
         speeds = [to_si(v, "velocity", f"{name}.velocities") for v in self.velocities]
-        if not (speeds and min(speeds) > 0 and slip > 0):
-            raise InputError(
-                f"{name} must have positive velocities and slip, got {len(speeds)} velocities and "
-                f"{slip:g} m; hold with 'hold 10 s'"
-            )
+        moving, got = (
+            speeds and min([*speeds, slip]) > 0,
+            f"{len(speeds)} velocities and {slip:g} m",
+        )
+        rule, advice = "have positive velocities and slip", "hold with 'hold 10 s'"
+        require(moving, name, rule, got, advice)
         return _laid_out([Slide(slip / v, velocity=v) for v in speeds], level, name)
 
 

@@ -26,6 +26,8 @@ from jax.test_util import check_grads
 
 from asperity.laws.law import Law
 from asperity.parameters import law_parameters
+from asperity.units import KINDS
+from asperity.units.scale import base_units
 
 #: Round-off, with room for the cancellation of terms some 1e3 times the result.
 EXACT = 1e-12
@@ -33,26 +35,9 @@ EXACT = 1e-12
 #: Velocities (m/s) at which the identities are checked.
 SPEEDS = (1e-9, 1e-6, 2e-5, 1e-3)
 
-#: Exponents of (length, time, force) in the units of a parameter.
-_DIMENSIONS = {
-    "dimensionless": (0, 0, 0),
-    "length": (1, 0, 0),
-    "time": (0, 1, 0),
-    "velocity": (1, -1, 0),
-    "frequency": (0, -1, 0),
-    "angular_frequency": (0, -1, 0),
-    "area": (2, 0, 0),
-    "viscosity": (-2, 1, 1),
-    "temperature": (0, 0, 0),
-    "force": (0, 0, 1),
-    "stiffness": (-1, 0, 1),
-    "pressure": (-2, 0, 1),
-    "mass": (-1, 2, 1),
-    "damping": (-1, 1, 1),
-}
-
 #: Units of length, time and force that the unit check changes to, in SI.
-_UNITS = (1e6, 60.0, 1e-3)
+_LENGTH, _TIME, _FORCE = 1e6, 60.0, 1e-3
+_UNITS = {"meter": _LENGTH, "second": _TIME, "kilogram": _FORCE * _TIME**2 / _LENGTH}
 
 #: Slope d mu_ss / d ln v at a velocity (m/s).
 Slope = Callable[[float], float]
@@ -212,8 +197,8 @@ def units(law: Law) -> None:
     """
 
     def converted(value: Any, kind: str) -> Any:
-        dimensions = _DIMENSIONS[kind]
-        return value * np.prod([u**d for u, d in zip(_UNITS, dimensions, strict=True)])
+        _, dimension = base_units(KINDS[kind].si)
+        return value * np.prod([_UNITS.get(name, 1.0) ** n for name, n in dimension])
 
     other = type(law)(
         **{

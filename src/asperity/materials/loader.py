@@ -23,6 +23,13 @@ def packaged() -> Mapping[str, Any]:
     return {f.name.removesuffix(".toml"): f for f in folder.iterdir() if f.name.endswith(".toml")}
 
 
+@cache
+def _packaged_content(name: str) -> dict[str, Any]:
+    """The parsed file of a material that comes with the package; parsing takes milliseconds."""
+    text = packaged()[name].read_text(encoding="utf-8")
+    return parsed_toml(text, "material.file", f"'{name}'")
+
+
 def load_material(name: str | PathLike[str]) -> Material:
     """See `asperity.materials.load`."""
     text = fspath(file_path(name, "material"))
@@ -36,14 +43,7 @@ def load_material(name: str | PathLike[str]) -> Material:
             )
         file, content = toml_content(text, "material.file")
         return Material.of_content({"name": file.stem, **content}, text)
-    try:
-        resource = packaged()[text]
-    except KeyError:
-        raise InputError(
-            "material",
-            "be a known material or the path of a .toml file",
-            f"'{text}'",
-            closest(text, packaged()),
-        ) from None
-    content = parsed_toml(resource.read_text(encoding="utf-8"), "material.file", f"'{text}'")
-    return Material.of_content({"name": text, **content}, text)
+    if text not in packaged():
+        rule = "be a known material or the path of a .toml file"
+        raise InputError("material", rule, f"'{text}'", closest(text, packaged()))
+    return Material.of_content({"name": text, **_packaged_content(text)}, text)

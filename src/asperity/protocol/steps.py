@@ -232,9 +232,10 @@ def _meant(line: str, name: str) -> list[StepForm]:
         if forms:
             return forms
     verbs = sorted({verb for form in FORMS for verb in (form.verb, form.verb.split()[0])})
-    # `ramp` begins two forms, and there is no reason to prefer one of them.
+    # `ramp` begins two forms; of "step velocity" the forms with a velocity may be meant too.
     if words and words[0] in verbs:
-        return [form for form in FORMS if form.verb.split()[0] == words[0]]
+        named = f"{{{words[1]}}}" if len(words) > 1 else "{}"
+        return [f for f in FORMS if f.verb.split()[0] == words[0] or named in f.pattern]
     verbs = [*verbs, "repeat"]
     tried = (" ".join(words[:2]), words[0] if words else "")
     near = [

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.questions.record import Question, Seconds, Span, quantity
 
 Column = str | int
@@ -144,25 +144,17 @@ class Measurement(Question):
 
     @model_validator(mode="after")
     def _consistent(self) -> Measurement:
-        if self.exact_frequency and self.frequency is None:
-            raise InputError(
-                "measure.exact_frequency",
-                f"go with {Argument('measure.frequency')}",
-                "none",
-                "give the frequency or leave it out",
-            )
-        if self.modulated and (self.steps or self.holds):
-            raise InputError(
-                "measure.steps and holds",
-                f"go with {Argument('modulated', value='False')}",
-                "them of a modulated recording",
-                "leave one of them out",
-            )
-        if self.stick_slip and (self.modulated is not None or self.frequency is not None):
-            raise InputError(
-                "measure.stick_slip",
-                f"go without {Argument('measure.modulated')} and {Argument('measure.frequency')}",
-                "both",
-                "leave one out",
-            )
+        frequency, modulated = Argument("measure.frequency"), Argument("measure.modulated")
+        given = self.frequency is not None or not self.exact_frequency
+        rule, advice = f"go with {frequency}", "give the frequency or leave it out"
+        require(given, "measure.exact_frequency", rule, "none", advice)
+        steady = not self.modulated or not (self.steps or self.holds)
+        rule, got = (
+            f"go with {Argument('modulated', value='False')}",
+            "them of a modulated recording",
+        )
+        require(steady, "measure.steps and holds", rule, got, "leave one of them out")
+        alone = self.modulated is None and self.frequency is None
+        rule = f"go without {modulated} and {frequency}"
+        require(alone or not self.stick_slip, "measure.stick_slip", rule, "both", "leave one out")
         return self

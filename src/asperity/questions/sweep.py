@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
-from asperity.errors import InputError, MistakesError
+from asperity.errors import MistakesError, require
 from asperity.questions.fit import Estimation
 from asperity.questions.point import Point
 from asperity.questions.record import Given, Names, Record
@@ -59,23 +59,18 @@ class AxisTable(Record):
         }
         fields = {name for name in type(self).model_fields if getattr(self, name) is not None}
         forms = [form for form in allowed if form.replace("from", "from_") in fields]
-        if len(forms) != 1 or fields - allowed[forms[0]]:
-            shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
-            raise InputError(
-                "axis",
-                "have one of from-to-count, values, zip, cases or draw",
-                shown,
-                "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }",
-            )
+        shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
+        one = len(forms) == 1 and not fields - allowed[forms[0]]
+        rule = "have one of from-to-count, values, zip, cases or draw"
+        like = "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
+        require(one, "axis", rule, shown, like)
         needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
         missing = [name for name in needed if getattr(self, name) is None]
-        if missing:
-            raise InputError(
-                "axis",
-                f"have {' and '.join(needed)} together with {forms[0]}",
-                f"no {' and no '.join(missing)}",
-                "add it",
-            )
+        rule, got = (
+            f"have {' and '.join(needed)} together with {forms[0]}",
+            " and no ".join(missing),
+        )
+        require(not missing, "axis", rule, f"no {got}", "add it")
         return self
 
 
@@ -191,13 +186,9 @@ class Sweep(Point):
     def _settings_of_this_solve(self) -> Sweep:
         for name in ("transient", "fit"):
             wanted, given = self.solve == name, getattr(self, name) is not None
-            if wanted != given:
-                raise InputError(
-                    name,
-                    f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'",
-                    "a table" if given else "nothing",
-                    f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it",
-                )
+            rule = f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'"
+            advice = f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it"
+            require(wanted == given, name, rule, "a table" if given else "nothing", advice)
         return self
 
     @property

@@ -18,10 +18,10 @@ from jax import Array
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, one_kernel, run_steps
+from asperity.transients.steps import AcceptedSteps, TrialStep, one_kernel, run_steps
 
 _SAFETY = 0.9
-_LIMITS = LengthLimits(shrink=0.2, grow=6.0)
+_LIMITS = 0.2, 6.0
 
 #: The method becomes unstable where the product of step and eigenvalue is about 6.1; from this
 #: smaller value on a step counts as limited by stability.

@@ -85,17 +85,16 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     (HoldResponse, Reached)
         Observables of the hold, and the motion at the maximum, for `settle`.
     """
-    steady, still, again = _before_hold(slider, V, hold_time)
-    holding = drive_many(slider, V, still, steady)
-    return _after_hold(slider, V, steady, holding, drive_many(slider, V, again, holding.Y))
+    steady = _steady(slider, V)
+    holding = drive_many(slider, V, Drive(pull=0.0, until=hold_time), steady)
+    reloaded = drive_many(slider, V, Drive(up=1.0, steady=_OVER), holding.Y)
+    return _after_hold(slider, V, steady, holding, reloaded)
 
 
 @jax.jit
-def _before_hold(slider: Slider, V: Array, hold_time: Array) -> tuple[Array, Drive, Drive]:
-    """States of steady sliding, and the drives of hold and reloading."""
-    still = _filled(Drive(pull=0.0, until=hold_time), jnp.ones_like(V))
-    again = _filled(Drive(up=1.0, steady=_OVER), jnp.ones_like(V))
-    return _from_here(QuasiStatic(slider, V, 1.0).steady()), still, again
+def _steady(slider: Slider, V: Array) -> Array:
+    """States of steady sliding with no displacement yet, shape (points, size + 1)."""
+    return _from_here(QuasiStatic(slider, V, 1.0).steady())
 
 
 @jax.jit
@@ -159,17 +158,10 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
 
     Shapes and the second result as of `hold`.
     """
-    start, drive = _before_step(slider, V_before, V)
+    start = _steady(slider, V_before)
+    drive = Drive(up=jnp.where(V_before < V, 1.0, -1.0), steady=_OVER)
     reached = drive_many(slider, V, drive, start)
     return _after_step(slider, V, start, reached), reached
-
-
-@jax.jit
-def _before_step(slider: Slider, V_before: Array, V: Array) -> tuple[Array, Drive]:
-    """States of steady sliding, and the drive after the step."""
-    up = jnp.where(V_before < V, 1.0, -1.0)
-    drive = _filled(Drive(up=up, steady=_OVER), jnp.ones_like(V))
-    return _from_here(QuasiStatic(slider, V_before, 1.0).steady()), drive
 
 
 @jax.jit
@@ -212,8 +204,7 @@ def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> D
     width = SETTLED * jnp.abs(_force(motion, extremum.Y) - level)
     # Where all logarithms are this close to steady sliding the force stays within the width.
     close = jnp.minimum(1e-3, 0.05 * width)
-    drive = Drive(level=level, width=width, runaway=runaway, steady=close)
-    return _filled(drive, jnp.ones_like(V))
+    return Drive(level=level, width=width, runaway=runaway, steady=close)
 
 
 @jax.jit
@@ -226,10 +217,6 @@ def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> Settl
         jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
         jnp.where(over, on.last_Y[:, -1] * length_scale, jnp.nan),
     )
-
-
-def _filled(drive: Drive, one: Array) -> Drive:
-    return Drive(*(jnp.zeros_like(one) + value for value in drive))
 
 
 def _from_here(states: Array) -> Array:

@@ -26,11 +26,11 @@ from asperity.algebra.small_systems import jacobian_columns, product, solve_colu
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, one_kernel, run_steps
+from asperity.transients.steps import AcceptedSteps, TrialStep, one_kernel, run_steps
 
 STAGES = 5
 _SAFETY = 0.9
-_LIMITS = LengthLimits(shrink=0.1, grow=8.0)
+_LIMITS = 0.1, 8.0
 
 _NEWTON_STEPS = 10
 #: Newton's method ends when the estimated error is this share of the tolerance.

@@ -21,6 +21,7 @@ from asperity.transients.events import Event
 from asperity.transients.inputs import MOST_STEPS, checked_integration, first_checkpoint
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
 from asperity.transients.trajectory import (
+    SampleTimes,
     Trajectory,
     planned_rows,
     provenance,
@@ -75,14 +76,13 @@ def integrate_blocks(
     else:
         integration.checkpoint = resume
         times.skip(resume.sampled)
-    writer = _BlockWriter(integration, rows)
-    report = progress or (lambda time, end: None)
-    return _blocks(integration, times, writer, report)
+    return _blocks(integration, times, rows, progress)
 
 
 def _blocks(
-    integration: Integration, times: Any, writer: _BlockWriter, report: Callable
+    integration: Integration, times: SampleTimes, rows: int, progress: Callable | None
 ) -> Iterator[Trajectory]:
+    writer = _BlockWriter(integration, rows)
     last = len(integration.programme.segments) - 1
     for part in integration.segment_parts():
         writer.events += part.events
@@ -99,29 +99,23 @@ def _blocks(
         writer.reached = part.checkpoint
         if over:
             yield writer.block(part)
-        report(end, integration.programme.duration)
+        if progress is not None:
+            progress(end, integration.programme.duration)
 
 
 class _BlockWriter:
     """Collects samples until they fill a block."""
 
     def __init__(self, integration: Integration, rows: int) -> None:
-        self._integration, self._rows = integration, rows
+        self._integration, self._rows, self.room = integration, rows, rows
         motion = integration.motion
         self._scales = float(motion.slider.W0), float(motion.slider.K), float(motion.V)
         self.events: list[Event] = []
         self.reached = integration.checkpoint
         self._sampled = integration.checkpoint.sampled
-        self._clear()
-
-    def _clear(self) -> None:
-        self._columns: list[list[np.ndarray]] = []
-        self._count = 0
-
-    @property
-    def room(self) -> int:
-        """Free samples of the block."""
-        return self._rows - self._count
+        # Before the first sample, no row of each column.
+        self._none = [np.empty(0)] * 6 + [np.empty((0, motion.size))]
+        self._columns = [self._none]
 
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
@@ -136,17 +130,10 @@ class _BlockWriter:
         now = motion_samples(part.system, t, Y)
         # The velocity of a slider that runs away may overflow.
         with np.errstate(over="ignore"):
-            columns = [
-                times,
-                now.force * W0,
-                now.load * W0,
-                now.velocity * V,
-                now.slip * V,
-                Y[-1] * W0 / K,
-                Y[:-1].T,
-            ]
-        self._columns.append(columns)
-        self._count += len(t)
+            speeds = now.velocity * V, now.slip * V
+        forces, place = (now.force * W0, now.load * W0), Y[-1] * W0 / K
+        self._columns.append([times, *forces, *speeds, place, Y[:-1].T])
+        self.room -= len(t)
         # A block that ends within a segment part is resumed from its last sample.
         self.reached = Checkpoint(
             checkpoint.segment, float(t[-1]), Y[:, -1].copy(), ringless=checkpoint.ringless
@@ -156,9 +143,7 @@ class _BlockWriter:
     def block(self, last: SegmentPart | None) -> Trajectory:
         """Samples collected since the last block; empties the buffer."""
         integration = self._integration
-        size = integration.motion.size
-        none = [[np.empty(0)] * 6 + [np.empty((0, size))]]
-        columns = [np.concatenate(c) for c in zip(*(self._columns or none), strict=True)]
+        columns = [np.concatenate(c) for c in zip(*self._columns, strict=True)]
         until = np.inf if last is not None else columns[0][-1]
         trajectory = Trajectory(
             *columns,
@@ -169,7 +154,7 @@ class _BlockWriter:
             provenance=provenance(integration),
         )
         self.events = [e for e in self.events if e.time > until]
-        self._clear()
+        self._columns, self.room = [self._none], self._rows
         return trajectory
 
 

@@ -140,13 +140,6 @@ class TrialStep(NamedTuple):
     record: tuple[Array, ...]
 
 
-class LengthLimits(NamedTuple):
-    """Smallest and largest factor by which a step may change its length."""
-
-    shrink: float
-    grow: float
-
-
 #: Time, states, length and memory -> a trial.
 StepAttempt = Callable[[Array, Array, Array, Any], TrialStep]
 
@@ -168,10 +161,8 @@ class AcceptedSteps(NamedTuple):
 
     def chunk(self, coefficients: Array) -> StepChunk:
         """The chunk, with the polynomials of the steps."""
-        return StepChunk(
-            self.begin, self.length, coefficients, self.taken, self.t, self.Y, self.next_length,
-            self.rejected, self.status, self.doubtful,
-        )  # fmt: skip
+        named = {name: getattr(self, name, coefficients) for name in StepChunk._fields}
+        return StepChunk(**named)
 
 
 def run_steps(
@@ -183,7 +174,7 @@ def run_steps(
     longest: Array,
     attempt: StepAttempt,
     memory: Any,
-    limits: LengthLimits,
+    limits: tuple[float, float],
 ) -> AcceptedSteps:
     """Integrate from `t` towards `end`: at most `STEPS` accepted steps of `_TRIALS` that are tried.
 
@@ -200,7 +191,8 @@ def run_steps(
     attempt : callable
     memory : pytree of arrays
         Passed to the first step.
-    limits : LengthLimits
+    limits : (float, float)
+        Smallest and largest factor by which a step may change its length.
     """
     # Where a slip ends, the logarithm of the velocity changes within times far below the resolution
     # of the clock, over which load and drive stay as they are.
@@ -220,8 +212,8 @@ def run_steps(
         h = jnp.where(cut, target - t, h)
         trial = attempt(t, run.Y, h, run.memory)
         good = trial.error < 1
-        factor = jnp.clip(trial.factor, limits.shrink, limits.grow)
-        factor = jnp.where(jnp.isfinite(trial.error), factor, limits.shrink)
+        factor = jnp.clip(trial.factor, *limits)
+        factor = jnp.where(jnp.isfinite(trial.error), factor, limits[0])
         h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
         # A length of NaN ends the loop, too.
         lost = ~good & ~(h_next > shortest if shortest else t + h_next > t)

@@ -290,6 +290,10 @@ class Trajectory(Drawn):
             return "time", values, {"units": units, "long_name": name, **recorded}
 
         about = {"long_name": "state of the equation of motion", "units": "1"}
+        times, kinds = [e.time for e in self.events], [e.kind for e in self.events]
+        far = self.displacement + self.force / float(self.motion.slider.K)
+        end = "displacement of the far end of the spring"
+        event = {"long_name": "instant and kind of what happens"}
         age = self.age
         aged = {} if age is None else {"age": channel(age, "s", "age of the contacts")}
         data = {
@@ -300,23 +304,10 @@ class Trajectory(Drawn):
             "velocity": channel(self.velocity, "m/s", "velocity of the slider"),
             "slip_velocity": channel(self.slip_velocity, "m/s", "plastic velocity"),
             "displacement": channel(self.displacement, "m", "displacement of the slider"),
-            "load_point_displacement": channel(
-                self.displacement + self.force / float(self.motion.slider.K),
-                "m",
-                "displacement of the far end of the spring",
-                "displacement",
-            ),
+            "load_point_displacement": channel(far, "m", end, "displacement"),
             "states": (("time", "state"), self.states, about),
-            "event_time": (
-                "event",
-                np.array([e.time for e in self.events], float),
-                {"units": "s", "long_name": "time of the event"},
-            ),
-            "event_kind": (
-                "event",
-                np.array([e.kind for e in self.events], dtype=str),
-                {"units": "1", "long_name": "kind of the event"},
-            ),
+            "event_time": ("event", np.array(times, float), event | {"units": "s"}),
+            "event_kind": ("event", np.array(kinds, dtype=str), event | {"units": "1"}),
         }
         coords = {
             "time": channel(self.time, "s", "time", "time"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,34 +50,9 @@ def _file(question: Recording, uploads: Uploads) -> dict[str, Any]:
     return {**question.model_dump(mode="json"), "path": str(upload.path), "name": upload.name}
 
 
-def check_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Mistakes of a protocol with their lines, or its duration, rows and steps."""
-    from asperity.app.api.protocols import checked
-
-    report()
-    protocol, mistakes = checked(argument["text"])
-    if protocol is None:
-        return {"mistakes": mistakes}
-    return {
-        "mistakes": [],
-        "duration": protocol.programme.duration,
-        "rows": protocol.rows,
-        "steps": len(protocol.lines),
-        "records": protocol.setup is not None,
-    }
-
-
 def _place_for_run(question: ProtocolText, uploads: Uploads) -> dict[str, Any]:
     upload = uploads.begin("virtual recording.csv")
     return {"text": question.text, "path": str(upload.path), "id": upload.key, "name": upload.name}
-
-
-def run_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Run a protocol and record it; the recording becomes a file like an uploaded file."""
-    from asperity.app.api.protocols import run
-
-    result = run(argument["text"], Path(argument["path"]), report)
-    return {**result, "id": argument["id"], "name": argument["name"]}
 
 
 ENDPOINTS = (
@@ -93,11 +67,11 @@ ENDPOINTS = (
         seconds=1800, largest=4 * 1024**2, argument=fits.with_files,
     ),
     Job(
-        "data/protocol", ProtocolText, "asperity.app.api.data:check_protocol", lane="protocols",
+        "data/protocol", ProtocolText, "asperity.app.api.protocols:check", lane="protocols",
         seconds=90,
     ),
     Job(
-        "data/run", ProtocolText, "asperity.app.api.data:run_protocol", lane="runs", seconds=600,
+        "data/run", ProtocolText, "asperity.app.api.protocols:run", lane="runs", seconds=600,
         argument=_place_for_run,
     ),
 )  # fmt: skip

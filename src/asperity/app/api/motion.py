@@ -116,7 +116,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     record: dict[str, Any] = {}
     for block in blocks:
         parts.append(block)
-        whole = _joined(parts)
+        whole = Trajectory.joined(parts)
         cycles = stick_slip(whole, V, window) if unstable else None
         record = _record(whole, values, inertia, cycles)
         if block.termination is not None:
@@ -140,21 +140,6 @@ def _duration(values: Mapping[str, float], epsilon: float, rate: float | None) -
         return float(settling)
     period = 1 / values["frequency"]
     return float(np.clip(settling, _FEWEST_PERIODS * period, _MOST_PERIODS * period))
-
-
-class _Whole(NamedTuple):
-    """Columns of the motion so far: time (s), F, W (N), velocity (m/s), displacement (m)."""
-
-    time: Array
-    force: Array
-    load: Array
-    velocity: Array
-    displacement: Array
-
-
-def _joined(parts: list[Trajectory]) -> _Whole:
-    columns = (np.concatenate([getattr(p, n) for p in parts]) for n in _Whole._fields)
-    return _Whole(*columns)
 
 
 def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
@@ -196,7 +181,7 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
 
 
 def _record(
-    whole: _Whole, values: Mapping[str, float], inertia: bool, cycles: Cycles | None
+    whole: Trajectory, values: Mapping[str, float], inertia: bool, cycles: Cycles | None
 ) -> dict[str, Any]:
     """Curves of the motion so far, and what it is."""
     time, W0, V = whole.time, values["W0"], values["V"]

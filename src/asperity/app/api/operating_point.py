@@ -14,11 +14,17 @@ from asperity.app.endpoints import Question
 from asperity.errors import InputError, require
 from asperity.laws import get_law, registered
 from asperity.materials import Material
-from asperity.operating_point import SourcedNumber, known_parameters, point_numbers, respond
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    numbers_for,
+    refuse_foreign,
+    respond,
+    sourced_numbers,
+)
 from asperity.orbit import PeriodicResponse
 from asperity.parameters import obeying, point_parameters
 from asperity.parameters.arguments import one_of
-from asperity.questions.point import Point
 from asperity.units import KINDS
 
 #: A number that is written into a field may lie beyond its slider's ends by this factor, and where
@@ -68,8 +74,9 @@ class OperatingPoint(Question):
         known = point_parameters(get_law(law))
         others = {n for result in registered().values() for n in point_parameters(result)}
         given = {n: v for n, v in self.numbers.items() if n in known or n not in others}
-        material = self.chosen_material().name
-        result = point_numbers(Point(law=law, material=material, parameters=given), "page")
+        refuse_foreign(law, given)
+        offered = sourced_numbers(given, self.chosen_material(), "page", law)
+        result = numbers_for(law, offered)
         for name in given:
             if name in result:
                 self.check_reach(name, result[name].value)

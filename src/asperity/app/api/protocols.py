@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,36 +42,52 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
         line = re.search(r"at line (\d+)", str(error))
         last = text.count("\n") + 1 if "end of document" in str(error) else None
         return None, [{"sentence": str(error), "line": int(line[1]) if line else last}]
+    errors: Sequence[InputError] = list(_files_named(content))
+    if not errors:
+        try:
+            protocol = Protocol.of_content(content)
+            _ = protocol.rows  # what the solver's table says is read here
+            return protocol, []
+        except ProtocolError as error:
+            errors = error.errors
+        except InputError as error:
+            errors = [error]
     lines = _lines(text, content)
-    refused = list(_files_named(content, lines))
-    if refused:
-        return None, refused
-    try:
-        protocol = Protocol.of_content(content)
-        _ = protocol.rows  # what the solver's table says is read here
-        return protocol, []
-    except ProtocolError as error:
-        return None, [{"sentence": str(m), "line": _line_of(m, lines, text)} for m in error.errors]
-    except InputError as error:
-        return None, [{"sentence": str(error), "line": _line_of(error, lines, text)}]
+    return None, [{"sentence": str(e), "line": _line_of(e, lines, text)} for e in errors]
 
 
-def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
-    """Run a protocol, write its recording to `out`, and outline the motion.
+def check(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Mistakes of a protocol with their lines, or its duration, rows and steps."""
+    report()
+    protocol, mistakes = checked(argument["text"])
+    if protocol is None:
+        return {"mistakes": mistakes}
+    return {
+        "mistakes": [],
+        "duration": protocol.programme.duration,
+        "rows": protocol.rows,
+        "steps": len(protocol.lines),
+        "records": protocol.setup is not None,
+    }
+
+
+def run(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Run a protocol, record it, and outline the motion.
 
     Parameters
     ----------
-    text : str
-    out : Path
-        CSV: what the tribometer records, or the motion itself where there is none.
+    argument : mapping
+        ``text``, and ``path``, ``id`` and ``name`` of the recording, which becomes a file like an
+        uploaded one: what the tribometer records, or the motion itself where there is none.
     report : callable
         Called with ``reached`` and ``duration`` (s).
     """
     from asperity.protocol.run import stability_statement
     from asperity.recording.writers import write
 
+    out = Path(argument["path"])
     report(stage="checking")
-    protocol, mistakes = checked(text)
+    protocol, mistakes = checked(argument["text"])
     if protocol is None:
         raise InputError(mistakes[0]["sentence"])
     _check_size(protocol)
@@ -89,6 +105,8 @@ def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
             write(record_run(protocol.setup, motion), out)
     time = shown.time
     return {
+        "id": argument["id"],
+        "name": argument["name"],
         "stopped": done.stopped,
         "stability": stability_statement(protocol) or "",
         "rows": done.rows,
@@ -111,36 +129,19 @@ def _check_size(protocol: Protocol) -> None:
     require(size <= _LARGEST_MOTION, "solver.sampling", rule, size_text(size), advice)
 
 
-def _files_named(content: dict[str, Any], lines: dict[str, int]) -> Iterator[Mistake]:
-    """What would read a file of this machine."""
+def _files_named(content: dict[str, Any]) -> Iterator[InputError]:
+    """Mistakes about what would read a file of this machine."""
     if "folder" in content:
-        yield _mistake(
-            "folder must be left out on the page, got one; write the steps out", "folder", lines
-        )
-    law = content.get("law")
-    if isinstance(law, str) and law not in registered():
-        advice = closest(law, registered())
-        yield _mistake(f"law must be a registered one, got {law[:80]!r}; {advice}", "law", lines)
-    material = content.get("material")
-    if isinstance(material, str) and material and material not in packaged():
-        advice = closest(material, packaged())
-        yield _mistake(
-            f"material must be one of the package's, got {material[:80]!r}; {advice}",
-            "material",
-            lines,
-        )
+        yield InputError("folder", "be left out on the page", "one", "write the steps out")
+    for field, known in (("law", registered()), ("material", packaged())):
+        name = content.get(field)
+        if isinstance(name, str) and name and name not in known:
+            got = repr(name[:80])
+            yield InputError(field, f"be one of {', '.join(known)}", got, closest(name, known))
     for place, step in _steps(content.get("steps"), "step "):
         if "follow" in step.lower():
-            yield _mistake(
-                f"{place} must name no file on the page, got {step[:80]!r}; use asperity run for "
-                "steps that follow a recording",
-                place,
-                lines,
-            )
-
-
-def _mistake(sentence: str, place: str, lines: dict[str, int]) -> Mistake:
-    return {"sentence": sentence, "line": lines.get(place)}
+            advice = "use asperity run for steps that follow a recording"
+            yield InputError(place, "name no file on the page", repr(step[:80]), advice)
 
 
 def _steps(steps: Any, prefix: str) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,8 @@ import { worded } from "./words.js";
 const figures = new Set();
 let printing = false;
 
+/** Time (ms) after which a figure out of sight follows. */
+const REST = 150;
 /** Width (px) of a figure across a sheet of A4. */
 const PRINTED = 680;
 
@@ -91,6 +93,15 @@ export class Figure {
   draw(chart, description = "") {
     this.chart = chart;
     this.description = description;
+    clearTimeout(this.later);
+    const { top, bottom } = this.element.getBoundingClientRect();
+    // What is not in sight can wait until the slider rests.
+    if (this.frames && !printing && (bottom < 0 || top > window.innerHeight)) this.later = setTimeout(() => this.#paint(), REST);
+    else this.#paint();
+  }
+
+  #paint() {
+    const { chart, description } = this;
     const height = this.height * letters();
     this.plot.style.minHeight = `${height}px`;
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
