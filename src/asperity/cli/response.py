@@ -83,10 +83,9 @@ def response(
     stable or not; without inertia by default.
     """
     if stick_slip:
-        alone = not (table or out or output.plot or resume)
-        others = "--table, --out, --resume or --plot"
+        alone, others = not (table or out or resume), "--table, --out or --resume"
         advice = "leave it out, or take asperity.experiment.stick_slip_response with arrays"
-        require(alone, "--stick-slip", "go with one point and alone", others, advice)
+        require(alone, "--stick-slip", "go with one point", others, advice)
         return _stick_slip(point, output)
     if table is None:
         without, advice = not (out or resume), "name it or leave them out"
@@ -160,6 +159,7 @@ def _stick_slip(point: Point, output: Output) -> int:
     from asperity.parameters import MODULATION, point_parameters
     from asperity.slider.named import slider_from
 
+    output.require_picture()
     for name in ("epsilon", "frequency"):
         got = f"{name} = {point.parameters.get(name)}"
         advice = "leave it out, or leave --stick-slip out"
@@ -182,6 +182,8 @@ def _stick_slip(point: Point, output: Output) -> int:
         lambda: _sections(law.name, numbers, str(result.result), shown, output),
         law.name,
     )
+    if result.slips:
+        output.draw(result)
     return 0 if result.slips or result.steady else 1
 
 

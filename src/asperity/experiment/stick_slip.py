@@ -19,7 +19,7 @@ from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn
 from asperity.slider import Motion, Slider, equation_of_motion
 from asperity.slider.problem import flatten
-from asperity.transients.limit_cycle import CycleEnd, limit_cycle
+from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 Float = NDArray[np.float64]
 
@@ -51,6 +51,8 @@ class StickSlip(Labelled, Drawn):
     result : str array
         Sentence on how the motion ends: stick-slip, steady sliding, or why neither.
     slider : Slider
+    cycle : LimitCycle or None
+        Of a single point: the force at any time of a period.
     """
 
     shown = ("period", "drop", "slip_duration", "peak_velocity")
@@ -69,6 +71,7 @@ class StickSlip(Labelled, Drawn):
     stable: NDArray[np.bool_] = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
     slider: Slider
+    cycle: LimitCycle | None = None
 
     def outcomes(self) -> str:
         """How many points there are, and how many have a cycle."""
@@ -154,7 +157,8 @@ def stick_slip_response(
         "stable": _stable(motion),
         "result": of("result", object),
     }
-    return StickSlip(slider=slider, **{name: shaped(a, shape) for name, a in columns.items()})
+    shown = {name: shaped(a, shape) for name, a in columns.items()}
+    return StickSlip(slider=slider, cycle=cycles[0] if len(cycles) == 1 else None, **shown)
 
 
 def _stable(motion: Motion) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from asperity.experiment.stick_slip import StickSlip
     from asperity.orbit import PeriodicResponse
+    from asperity.transients.limit_cycle import LimitCycle
 
 #: Largest number of curves in a panel.
 _MOST_CURVES = 8
@@ -56,25 +57,53 @@ def draw_response(response: PeriodicResponse) -> Figure:
 
 
 def draw_stick_slip_response(response: StickSlip) -> Figure:
-    """Drop, period and largest velocity over the last axis of several points.
+    """The cycle of a single point; drop, period and largest velocity over the last axis of several.
 
     Parameters
     ----------
     response : StickSlip
-        With one or two axes. A point without stick-slip leaves a gap.
+        Of one point, or with one or two axes. A point without stick-slip leaves a gap.
 
     Raises
     ------
     InputError
-        If there is one point only, more than two axes, or too many curves.
+        If a single point has no stick-slip, or there are more than two axes, or too many curves.
     """
+    if response.cycle is not None:
+        return _stick_slip_cycle(response, response.cycle)
     data = response.to_dataset().squeeze()
-    if data.period.ndim == 0:
-        raise InputError(
-            "plot", "have a row of points", "one", "give several velocities, as an array"
-        )
-    _require_rows(data.period.shape, "a row of points", "xarray, from its to_dataset()")
+    _require_rows(data.period.shape, "one point, a row of points", "xarray, from its to_dataset()")
     return _curves(data, response.slider.law.name, _STICK_SLIP)
+
+
+def _stick_slip_cycle(response: StickSlip, cycle: LimitCycle) -> Figure:
+    """Force and displacement of the slider: over a period, and enlarged about its slip."""
+    if not cycle.slips:
+        raise InputError("plot", "show a cycle", cycle.result, "choose another velocity or spring")
+    slider = response.slider
+    V, K, W0 = (float(np.asarray(a).item()) for a in (response.velocity, slider.K, slider.W0))
+    slip, period = cycle.slip_duration, cycle.period
+    figure = new_figure(6.4, 4.2)
+    panels = figure.subplots(2, 2, sharey="row")
+    near = np.linspace(-slip, min(2 * slip, period / 2), 600)
+    whole = np.union1d(np.linspace(-period / 2, period / 2, 600), near)
+    for (above, below), time in zip(panels.T, (whole, near), strict=True):
+        force, drive = cycle.force(time), V * time
+        above.plot(time, force, color=ELASTO_PLASTIC)
+        moved = drive - (force - cycle.peak) * W0 / K
+        below.plot(time, moved * 1e6, color=RICE_RUINA)
+        below.plot(time, drive * 1e6, color=GREY, linestyle="dotted")
+        below.set_xlabel("time from the peak (s)")
+        for panel in (above, below):
+            panel.margins(x=0)
+    panels[0, 0].set_ylabel("$F/W_0$")
+    panels[1, 0].set_ylabel("slider (µm); drive dotted")
+    figure.suptitle(
+        f"{slider.law.name}: V {format_si(V, 'velocity')}, K {format_si(K, 'stiffness')}; "
+        f"drop {cycle.drop:.4g}, period {period:.4g} s, slip {slip:.4g} s",
+        fontsize="small",
+    )
+    return figure
 
 
 def _require_rows(shape: tuple[int, ...], rows: str, other: str) -> None:

@@ -191,17 +191,12 @@ def _options(
     priors = priors_of(question.prior, question.free)
     if question.stiffness_from is not None:
         priors |= {"K": _prior_of_unloading(question, priors, read)}
+    same = ("fixed", "start", "profile", "inertia", "radiation_damping", "starts", "seed")
     return {
-        "fixed": question.fixed,
-        "start": question.start,
+        **{name: getattr(question, name) for name in same},
         "material": None if question.material is None else materials.load(question.material),
         "prior": priors,
-        "profile": question.profile,
-        "inertia": question.inertia,
-        "radiation_damping": question.radiation_damping,
         "runs": run_options(question),
-        "starts": question.starts,
-        "seed": question.seed,
         "progress": progress,
     }
 

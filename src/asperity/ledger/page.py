@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
 
 from asperity._version import __version__
@@ -99,29 +100,22 @@ def build_page(
         for name, (key, content) in parts.items()
     )
     links = "".join(f'<a href="#{key}">{name}</a>' for name, (key, _) in parts.items())
-    style = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<meta name="color-scheme" content="light dark">\n'
-        f"<title>Reproduced: {escape(about.title)}</title>\n<style>\n{style}</style>\n</head>\n"
-        "<body>\n"
-        f"{_header(about, claims)}\n"
-        f'<nav aria-label="Sections">{links}</nav>\n<main>\n{sections}\n</main>\n'
-        f"<footer>Written by asperity {__version__}. Figures (PNG, PDF), their numbers (CSV) and "
-        "the claims (JSON, CSV) are in the folder of this page.</footer>\n</body>\n</html>\n"
+    page, style = (
+        files("asperity.ledger").joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css")
     )
-
-
-def _header(about: About, claims: Sequence[Claim]) -> str:
-    tests = sum(claim.is_test for claim in claims)
-    return (
-        f'<header><p class="kicker">A reproduction</p><h1>{escape(about.title)}</h1>'
-        f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
-        f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
-        f"again from its own equations and numbers. {tests} of them could have come out "
-        f"otherwise; each number leads to its entries:</p>{_tiles(claims)}"
-        f"<p>{escape(_counted_apart(claims))}</p></header>"
+    return Template(page).substitute(
+        title=escape(about.title),
+        authors=escape(about.authors),
+        journal=escape(about.journal),
+        claims=len(claims),
+        tests=sum(claim.is_test for claim in claims),
+        tiles=_tiles(claims),
+        apart=escape(_counted_apart(claims)),
+        style=style,
+        links=links,
+        sections=sections,
+        version=__version__,
     )
 
 

@@ -1,6 +1,6 @@
 """Many recordings measured alike: one table, a row for each amplitude, velocity step and hold.
 
-Files are measured in processes of their own. What is finished is kept beside the output as lines of
+Files are measured in separate processes. Finished rows are kept next to the output as lines of
 JSON, so that an interrupted campaign goes on where it stopped; at the end the table is written as
 CSV or NetCDF. A file that cannot be measured is a row with its reason.
 """
@@ -80,7 +80,7 @@ def run_campaign(
     out : Path
         ``.csv`` or ``.nc``.
     inputs : mapping
-        All that the rows depend on besides the files, as JSON values.
+        All that the rows depend on except the files, as JSON values.
     resume : bool
         Go on after an interruption.
     jobs : int

@@ -58,7 +58,7 @@ def measure_recording(
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
-        Of the modulation, to start from (Hz); found by default.
+        Initial guess of the modulation frequency (Hz); by default the strongest line.
     harmonics : int
         Of a modulated recording.
     window : (float, float), optional
@@ -85,25 +85,9 @@ def measure_recording(
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    fields: dict[str, Any] = {
-        "modulated": modulated,
-        "load": load,
-        "force": force,
-        "frequency": frequency,
-        "exact_frequency": not refine,
-        "harmonics": harmonics,
-        "window": window,
-        "whole_periods": only_whole_periods,
-        "detrend": detrend,
-        "steps": steps,
-        "holds": holds,
-        "stick_slip": stick_slip,
-        "stiffness": stiffness,
-        "velocity": velocity,
-        "mass": mass,
-        "normal_load": normal_load,
-    }
-    question = Question(**fields)
+    # Most arguments are the fields of the question.
+    fields = {name: value for name, value in locals().items() if name in Question.model_fields}
+    question = Question(**fields, exact_frequency=not refine, whole_periods=only_whole_periods)
     trace = recording if isinstance(recording, Trace) else read(recording)
     return answer_measurement(trace, question)[0]
 
@@ -165,8 +149,9 @@ def _either(
     }
 
     def sliding() -> SlidingMeasurement:
-        cuts = {"steps": question.steps, "holds": question.holds}
-        return measure_sliding(trace, **where, **cuts, detrend=question.detrend)
+        return measure_sliding(
+            trace, **where, detrend=question.detrend, steps=question.steps, holds=question.holds
+        )
 
     def slips() -> StickSlipMeasurement:
         numbers = question.stiffness, question.velocity, question.mass, question.normal_load

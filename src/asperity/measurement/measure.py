@@ -268,7 +268,7 @@ def _measured(
         first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
     else:
         first, stop = _given(samples.time, window)
-        # F(0) is that beside the stretch that is read, and not beside a longer one.
+        # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
     if only_whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
@@ -359,7 +359,7 @@ def modulation_line(time: Array, load: Array, near: float | None = None) -> Spec
         for at in np.linspace(0, time.size - _PIECE, _PIECES).astype(int):
             piece = slice(at, at + _PIECE)
             span = float(time[at + _PIECE - 1] - time[at])
-            # A slow modulation that fits no piece is found in the whole.
+            # A slow modulation that fits no piece is searched for in the whole.
             if near is None or near * span > _FEWEST_PERIODS:
                 line = strongest_line(time[piece], load[piece], between=around(near))
                 if line.frequency * span > _FEWEST_PERIODS:
@@ -434,7 +434,7 @@ def _no_modulation(time: Array) -> float:
 
 
 def _settled_level(time: Array, force: Array) -> MeanLevel | None:
-    """The level that the force of a pause settles to; None if that cannot be told."""
+    """The level that the force of a pause settles to; None if it is not determined."""
     settling = settling_from(time, force, _no_modulation(time), 1)
     if settling is None or not settling.possible:
         return mean_level(time, force)

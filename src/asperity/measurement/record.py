@@ -138,7 +138,7 @@ def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], ND
     J = np.array(rows)
     covariance = J @ reading.covariance @ J.T
     if "delta_mu" in names:
-        # The level at constant load has errors of its own, which nothing else shares.
+        # The errors of the level at constant load are independent of all others.
         covariance[1, 1] = measurement.delta_mu_uncertainty**2
     # Phases that may be any have a bound on what is reported of them.
     doubts = [

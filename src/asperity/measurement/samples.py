@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
-from asperity.recording.defects.check import check
+from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.rows import rows_to_avoid, usable_rows
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from scipy.special import stdtrit
 
 Array = NDArray[np.float64]
 
-#: Cosine transforms that say how noisy a mean is; twice the root of twice as many is its own doubt.
+#: Cosine transforms from which the noise of a mean is estimated.
 _COSINES = 8
 _MOST_BLOCKS = 512
 #: Probability at which noise explains that two rates differ.

@@ -134,7 +134,7 @@ def local(time: Array, channels: list[Array], frequency: float) -> BlockSums:
 
 
 def merged(blocks: BlockSums, wanted: int) -> BlockSums:
-    """Neighbouring blocks added up, until there are about so many; a short rest joins the last."""
+    """Sums of neighbouring blocks, about so many; a short remainder joins the last."""
     together = -(-blocks.count.size // wanted)
     if together == 1 and blocks.count[-1] > 0.5 * blocks.count[0]:
         return blocks

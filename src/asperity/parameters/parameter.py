@@ -127,7 +127,7 @@ class Parameter:
         Attributes that lead to it from the equations of an operating point, a
         `asperity.slider.problem.Problem`.
     scale : float
-        What is found there over the parameter: 2 pi for the frequency, as equations have omega.
+        The attribute at `path` over the parameter: 2 pi for the frequency, as equations have omega.
     default : float or None
         Value where none is given; None where one must be.
     label : str

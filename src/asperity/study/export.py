@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
@@ -27,9 +29,9 @@ _FORMATS = (".nc", ".csv", ".parquet")
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
     """Write a store to one file; the suffix of the file chooses the format.
 
-    NetCDF keeps the grid; points that are not computed have fill values. CSV and Parquet have a row
-    for each point of the chunks that are done: the columns of the axes, the outputs, ``outcome``
-    as a word, and ``detail``.
+    NetCDF keeps the grid; points that are not computed are NaN, their outcome -1. CSV and Parquet
+    have a row for each point of the chunks that are done: the columns of the axes, the outputs,
+    ``outcome`` as a word, and ``detail``.
 
     Parameters
     ----------
@@ -68,6 +70,9 @@ def _netcdf(store: SweepStore, file: Path) -> int:
     dataset = dataset_of(store).drop_vars(OF_CHUNKS)
     texts = ("title", "source", "convention", "plan", "plan_text")
     dataset.attrs = {name: str(store.attributes.get(name, "")) for name in texts}
+    # CF: flags have the type of their variable.
+    flags = dataset["outcome"].attrs
+    flags["flag_values"] = np.array(flags["flag_values"], dtype=dataset["outcome"].dtype)
     chunks = {name: {"chunksizes": store.grid.chunks} for name in store.arrays}
     # One variable at a time is in memory.
     dataset.to_netcdf(file, engine="h5netcdf", encoding=chunks)

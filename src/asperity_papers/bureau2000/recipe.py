@@ -27,7 +27,6 @@ from scipy.stats import chi2 as chi_squared
 
 from asperity import InputError
 from asperity.inference import (
-    Fit,
     LockInTable,
     bounded_interval,
     fit,
@@ -151,7 +150,7 @@ def paper_procedure(
     report(0, 4, "steady sliding and bifurcation")
     base = _steady_and_threshold(steady, thresholds, float(material["V0"].si), warnings)
     steps = _SingleFits(base, constants, warnings)
-    numbers: list[RecipeNumber] = [*base.numbers]
+    numbers: list[RecipeNumber] = [*_numbers_of(base)]
     result = partial(RecipeResult, PAPER.name, data=(readings.name, thresholds.name))
     if drop is None:
         warnings.append("no rows have epsilon above 0 and delta_mu: steps 3 to 5 are left out")
@@ -216,7 +215,6 @@ def _rows(
 class _SteadyStateNumbers:
     """mu0, A, B and D0, with the covariance of mu0, ln(B - A), ln A and ln D0."""
 
-    numbers: tuple[RecipeNumber, ...]
     coordinates: Float
     covariance: Float
 
@@ -253,25 +251,17 @@ def _steady_and_threshold(
         start = _start_of_least_squares(steady, log_v, thresholds)
         solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
         covariance = np.linalg.inv(solved.jac.T @ solved.jac)
-        base = _SteadyStateNumbers((), solved.x, covariance)
-        base = replace(base, numbers=_numbers_of(base))
-        finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in base.numbers)
+        base = _SteadyStateNumbers(solved.x, covariance)
+        numbers = _numbers_of(base)
+        finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in numbers)
     except InputError:
         raise
     except (ArithmeticError, ValueError, np.linalg.LinAlgError):
         finite = False
     if not finite:
-        spans = [
-            f"{name} from {values.min():.3g} to {values.max():.3g} {unit}"
-            for name, values, unit in (
-                ("K_over_W0", thresholds.K_over_W0, "1/m"),
-                ("frequency", thresholds.frequency, "Hz"),
-            )
-        ]
         raise InputError(
-            f"{thresholds.name} must have bifurcations from which A, B and D0 follow, got "
-            f"{' and '.join(spans)}, with which that cannot be computed; correct the cells, which "
-            "are in SI"
+            f"{thresholds.name} must have bifurcations from which A, B and D0 follow, got numbers "
+            "with which that cannot be computed; correct the cells, which are in SI"
         )
     dof = solved.fun.size - 4
     if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
@@ -391,11 +381,15 @@ class _SingleFits:
             )
         self.warnings.extend(f"step {step}: {w}" for w in result.warnings)
         estimate = result.parameters[name]
-        shifts = np.array([self._shift(result, name, *ends) for ends in self._moved()])
+
+        def shift(high: Mapping[str, float], low: Mapping[str, float]) -> float:
+            return shift_of_estimates(result, high, low)[name]
+
+        shifts = np.array([shift(*ends) for ends in self._moved()])
         more = []
         for other, (value, source) in earlier.items():
             # To first order, from a change of 1 %.
-            slope = self._shift(result, name, {other: value * 1.01}, {other: value * 0.99})
+            slope = shift({other: value * 1.01}, {other: value * 0.99})
             shifts = shifts + slope / (0.01 * value) * source.shifts[: shifts.size]
             more.append(0.0 if same else slope / (0.01 * value) * source.number.se_own)
         shifts = np.array([*shifts, *more])
@@ -403,12 +397,6 @@ class _SingleFits:
         return _FittedNumber(
             _with_published(name, estimate.value, se, estimate.se, step, how), shifts
         )
-
-    @staticmethod
-    def _shift(
-        result: Fit, name: str, high: Mapping[str, float], low: Mapping[str, float]
-    ) -> float:
-        return shift_of_estimates(result, high, low)[name]
 
     def _moved(self) -> list[tuple[dict[str, float], ...]]:
         """mu0, A, B and D0 one standard deviation up and down each principal axis."""

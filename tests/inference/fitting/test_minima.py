@@ -223,7 +223,7 @@ def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     term = TwoNoises()
     objective = Objective((term,), LAW, unknowns, {})
     near = [(np.array([SECOND - 0.02]), 1.0), (np.array([FIRST + 0.02]), 2.0)]
-    (best, chi2), (other, above) = with_noise(objective, near)[0]
+    (best, chi2), (other, above) = with_noise(objective, near, objective)[0]
     (term,) = objective.terms
     # Under the noise of SECOND, FIRST is a maximum of chi-squared; its likelihood is the higher.
     np.testing.assert_allclose([best[0], other[0]], [FIRST, SECOND], atol=1e-3)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from asperity.recording.defects.check import rows_to_avoid, usable_rows
 from asperity.recording.defects.levels import coarsely_rounded, saturated
-from asperity.recording.defects.rows import rows_to_avoid, usable_rows
 from asperity.recording.defects.sampling import rate_stretches
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 

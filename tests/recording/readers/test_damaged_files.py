@@ -113,11 +113,10 @@ def damaged(content: bytes, rng: np.random.Generator) -> bytes:
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_damaged_file_is_a_recording_or_one_sentence(tmp_path, name, seed):
-    rng = np.random.default_rng([seed, *name.encode()])
+def test_a_damaged_file_is_a_recording_or_one_sentence(tmp_path, name):
+    rng = np.random.default_rng([*name.encode()])
     path = tmp_path / name
-    for _ in range(30):
+    for _ in range(20):
         path.write_bytes(damaged(FILES[name], rng) or b"\0")
         try:
             trace = read(path)
@@ -158,42 +157,6 @@ def test_headings_in_brackets_are_no_json(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(table("[s], [N], [kN]\n", "{t:.3f},{w:.4f},{f:.4f}\n"))
     assert len(read(path, columns={"time": 0})) == ROWS
-
-
-def lacks(path, role):
-    """Why a file has no channel of a role; empty if it has."""
-    try:
-        read(path, rate="100 Hz").channel(role)
-    except InputError as error:
-        return str(error)
-    return ""
-
-
-@pytest.mark.parametrize("compressed", [False, True])
-@pytest.mark.parametrize("seed", range(4))
-def test_what_a_cut_matlab_file_lacks_is_said_to_be_cut(tmp_path, compressed, seed):
-    """Variables of any kind in any order: where no column or the wanted one is lost, the cut is."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(ROWS) / 100
-    variables = {
-        "note": "a rig",
-        "rate": 100.0,
-        "t": t,
-        "W": rng.normal(size=ROWS),
-        "rec": {"x": rng.normal(size=ROWS), "y": rng.normal(size=ROWS)},
-        "F": rng.normal(size=ROWS),
-    }
-    order = rng.permutation(list(variables))
-    file = io.BytesIO()
-    scipy.io.savemat(file, {k: variables[k] for k in order}, do_compression=compressed)
-    raw, path = file.getvalue(), tmp_path / "cut.mat"
-    behind_header, said = 140, []
-    for size in rng.integers(behind_header, len(raw) - 1, 12):
-        path.write_bytes(raw[:size])
-        said += [lacks(path, "W"), lacks(path, "F")]
-    said = [text for text in said if text]
-    assert len(said) > 3
-    assert all("cut" in text for text in said), said
 
 
 def test_a_heading_of_another_width_is_named_where_no_column_is_the_wanted_one(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,8 +18,10 @@ Float = NDArray[np.float64]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
-#: Minima of the search that are nearer than so many standard deviations are followed as one.
+#: Starts that are nearer than so many standard deviations are followed as one.
 _ONE_END = 1.0
+#: Standard deviations of the parameters within which two starts lead to the same minimum.
+_ALLOWED = 5.0
 #: Relative change of the coordinates that ends the way to a minimum of the search.
 _COARSE = 1e-4
 
@@ -29,12 +32,16 @@ def under_drift(objective: Objective) -> Objective:
     return replace(objective, terms=tuple(terms), tolerance=_COARSE)
 
 
-def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimum], bool]:
+def with_noise(
+    objective: Objective, minima: list[Minimum], searched: Objective
+) -> tuple[list[Minimum], bool]:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    Each is followed under the noise that its own residual shows. They are compared by the
-    likelihood, noise included: under the noise of one, which holds its misfit, another is no
-    minimum. The objective takes the noise of the best.
+    From each of the `minima` of `searched`, the objective under a drift, the way goes by that under
+    white noise, and straight on too where the drift does not allow that one. Each is followed under
+    the noise that its own residual shows. They are compared by the likelihood, noise included:
+    under the noise of one, which holds its misfit, another is no minimum. The objective takes the
+    noise of the best.
 
     Returns
     -------
@@ -43,7 +50,15 @@ def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimu
         higher as twice the logarithm of their likelihood is lower.
     bool
     """
-    ends = [_with_own_noise(objective, u) for u in _apart(objective, minima)]
+    starts: list[Float] = []
+    for u, value in minima:
+        white = objective.minimise(u).u
+        # Chi-squared of a drift says how large it is: noise has one a sample.
+        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        starts += [white] if searched.chi2(white) <= allowed else [u, white]
+    ends: list[_End] = []
+    for u in _apart(objective, starts):
+        ends += _with_own_noise(objective, u, ends)
     ends.sort(key=lambda end: end.deviance)
     best = ends[0]
     objective.terms = best.objective.terms
@@ -57,10 +72,10 @@ def with_noise(objective: Objective, minima: list[Minimum]) -> tuple[list[Minimu
     return [Minimum(best.u, chi2), *others], best.agreed
 
 
-def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
-    """Minima without those that the data hardly tell from an earlier one: both lead to one end."""
+def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
+    """Starts without those that the data hardly tell from an earlier one: both lead to one end."""
     kept: list[Float] = []
-    for u, _ in minima:
+    for u in starts:
         _, jacobian = objective.residuals(u)
         if all(float(np.linalg.norm(jacobian @ (u - other))) > _ONE_END for other in kept):
             kept.append(u)
@@ -77,12 +92,15 @@ class _End(NamedTuple):
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, u: Float) -> _End:
-    """Noise and parameters in turn, until the parameters stay where they are."""
+def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> list[_End]:
+    """Noise and parameters in turn, until the parameters stay where they are.
+
+    Empty where they come to an end that is known.
+    """
     objective = replace(objective, terms=tuple(copy(term) for term in objective.terms))
     noisy = objective.terms_of(RunTerm)
     agreed = False
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
         begin = u
         for term in noisy:
             term.update_noise(objective.named(begin))
@@ -90,7 +108,11 @@ def _with_own_noise(objective: Objective, u: Float) -> _End:
         u, value = objective.minimise(begin)
         if not math.isfinite(value):
             break
+        begin, u = objective.ordered(begin), objective.ordered(u)
         _, jacobian = objective.residuals(u)
+        # The first noise holds the misfit of the start.
+        if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
+            return []
         away = jacobian @ (u - begin)
         # chi-squared of the change, under the noise as it is now.
         if agreed := float(away @ away) < _STILL**2:
@@ -98,4 +120,4 @@ def _with_own_noise(objective: Objective, u: Float) -> _End:
     priors = objective.prior_residuals(u)[0]
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
-    return _End(u, deviance, objective, agreed)
+    return [_End(u, deviance, objective, agreed)]

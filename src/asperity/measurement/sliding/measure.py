@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import DRIFTS
-from asperity.lock_in.reference import strongest_line
 from asperity.measurement.samples import about_channels
 from asperity.measurement.series import MeanLevel, block_means, mean_level, steady_from
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
@@ -33,12 +32,9 @@ Array = NDArray[np.float64]
 LIMITS = {
     "load": (0.005, 0.02),
     "drift": (0.02, 0.15),
-    "oscillation": (0.002, 0.02),
     "segments": (0.0, np.inf),
-    "choice": (2.0, np.inf),
     "settling": (0.3, np.inf),
 }
-_LINE = 8.0
 #: Samples on each side that a step needs, and in a hold's surroundings.
 _FEWEST = 16
 
@@ -128,7 +124,7 @@ class SlidingMeasurement(Drawn):
     checks: tuple[Check, ...]
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Mean friction, and what was found."""
+        """Mean friction, and the numbers of segments, steps and holds."""
         friction = self.friction
         lines = [
             SummaryLine("friction", f"{friction.value:.6g} +- {friction.uncertainty:.1g}"),
@@ -319,7 +315,7 @@ def _steps(
             settling = np.inf
             continue
         if min(b - a, c - b) < _FEWEST:
-            unread.append(f"the step at {change.time:.6g} s has too few samples beside it")
+            unread.append(f"the step at {change.time:.6g} s has too few samples on one side")
             settling = np.inf
             continue
         sides = []
@@ -380,8 +376,7 @@ def _checks(
     doubts: list[str],
 ) -> list[Check]:
     checks = []
-    time, friction, borne = signals.time, signals.friction, signals.load
-    mean = max(abs(float(friction.mean())), 1e-300)
+    borne, mean = signals.load, max(abs(float(signals.friction.mean())), 1e-300)
     if borne is not None and borne.size:
         spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
         checks.append(
@@ -402,21 +397,6 @@ def _checks(
             f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean",
         )
     )
-    longest = max(sliding, key=lambda part: part.end - part.steady.start)
-    inside = (time >= longest.steady.start) & (time <= longest.end)
-    if inside.sum() >= 32:
-        line = strongest_line(time[inside], friction[inside])
-        share = line.amplitude / mean
-        checks.append(
-            judged(
-                "oscillation",
-                share,
-                LIMITS["oscillation"],
-                f"the strongest line of steady friction, at {line.frequency:.4g} Hz, is "
-                f"{100 * share:.2g} % of the mean",
-                significant=line.amplitude > _LINE * line.background,
-            )
-        )
     if signals.turned:
         checks.append(
             judged("sign", 1.0, (0.5, np.inf), "friction is recorded as negative, and was turned")
@@ -429,35 +409,17 @@ def _checks(
             "; ".join(doubts) or "the recording can be cut in one way only",
         )
     )
-    return checks + _step_checks(steps)
-
-
-def _step_checks(steps: list[VelocityStep]) -> list[Check]:
-    if not steps:
-        return []
-    open_to_choice = max(steps, key=_openness)
-    number = _openness(open_to_choice)
-    all_changes = [c.change for c in open_to_choice.choices]
-    slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
-    share = slow.settling_slip / slow.choices[0].window
-    return [
-        judged(
-            "choice",
-            number,
-            LIMITS["choice"],
-            f"by the choice of trend and window the change at {open_to_choice.time:.6g} s is "
-            f"{min(all_changes):.3g} to {max(all_changes):.3g}; their spread, which is in the "
-            f"uncertainty, is {number:.2g} times that of noise",
-        ),
-        judged(
-            "settling",
-            share,
-            LIMITS["settling"],
-            f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of the "
-            "slip that can be compared; a slower one cannot be distinguished from the trend",
-        ),
-    ]
-
-
-def _openness(step: VelocityStep) -> float:
-    return step.choice_uncertainty / max(step.noise_uncertainty, 1e-300)
+    if steps:
+        slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
+        share = slow.settling_slip / slow.choices[0].window
+        checks.append(
+            judged(
+                "settling",
+                share,
+                LIMITS["settling"],
+                f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of "
+                "the slip that can be compared; a slower one cannot be distinguished from the "
+                "trend",
+            )
+        )
+    return checks

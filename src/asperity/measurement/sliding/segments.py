@@ -26,8 +26,8 @@ _CELLS = 4000
 _LONGEST = 0.02
 #: Neighbours with a smaller ratio of velocities are one segment; up to the second it is doubtful.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
-#: Of recordings with more samples than this, the lines beside a cut are known better than one
-#: sample is: as well as so many means, of more samples than that.
+#: Of recordings with more samples than this, the lines next to a cut are fitted
+#: to so many means where they hold more samples than the third number.
 _LONG, _MEANS, _MANY = 20_000, 64, 1024
 #: A cut must explain so many standard deviations of a cell's log velocity.
 _SIGNIFICANT = 5.0
@@ -37,9 +37,9 @@ _TRANSITION = 0.05
 _DISTURBANCE = 0.1
 #: A piece of a steady rise or fall with less than this share of both its ends is a ramp.
 _RAMP = 0.15
-#: Unclear changes beside a piece with less than this share of the slip about them are ripple.
+#: Unclear changes next to a piece with less than this share of the slip about them are ripple.
 _RIPPLE = 0.08
-#: A piece beside a larger change, with less than this share of a neighbour and up to this ratio of
+#: A piece next to a larger change, with less than this share of a neighbour and up to this ratio of
 #: its velocity, is the settling of a step.
 _SETTLING, _SETTLING_RATIO = 0.3, 2.0
 #: Pieces of so few cells, of a velocity between those of their neighbours, are transitions too.
@@ -289,7 +289,7 @@ def _without_transitions(
 
 
 def _of_ripple(ratios: Array, path: Array) -> NDArray[np.bool_]:
-    """Changes that are unclear beside a piece with little of the slip at about its velocity."""
+    """Unclear changes next to a piece with little of the slip at about its velocity."""
     unclear = ratios < np.log(_CLEAR_RATIO)
     # Pieces between clear changes are one group.
     group = np.concatenate([[0], np.cumsum(~unclear)])

@@ -19,8 +19,8 @@ from asperity.measurement.samples import (
     shear_channel,
     too_few,
 )
+from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.rows import usable_rows
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class SlidingSignals:
     turned : bool
         Whether the friction was multiplied by -1.
     signs : tuple of Finding
-        What is read with another sign than recorded, besides the friction.
+        Load and shear that are read with the opposite sign.
     left_out : int
         Samples within the window at which something is no number or time does not go on.
     """

@@ -207,7 +207,7 @@ def _transient(
     gain, chosen, amplitudes = -1.0, (0, 1), np.zeros(2)
     for slow in range(1, decays.size):
         for fast in range(slow):
-            # Columns own[slow] and own[slow] - own[fast], which vanish at the step.
+            # Columns wave[slow] and wave[slow] - wave[fast], which vanish at the step.
             ss, sf, ff = gram[slow, slow], gram[slow, fast], gram[fast, fast]
             matrix = np.array([[ss, ss - sf], [ss - sf, ss - 2 * sf + ff]])
             aim = np.array([moment[slow], moment[slow] - moment[fast]])

@@ -1,7 +1,7 @@
 """Slip events of a stick-slip recording: onset, end, forces, drop, creep, each with uncertainty.
 
-Next to each fall the force is a straight line up to the onset, half a cosine down to the end, and
-a straight line again: a slider that slips at constant friction falls so.
+Next to each fall the force is a straight line up to the onset, a slip, and a straight line again. A
+slider at constant friction moves by half a cosine, while the drive goes on.
 """
 
 from __future__ import annotations
@@ -128,10 +128,11 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     for _ in range(_READINGS):
         if not len(falls):
             break
-        events = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading; the others
-        # are read again without it.
-        real = events.drop > least
+        events, visible, farther = _read(time, force, falls)
+        # What a line before and a line after do not confirm is a bend in the loading. Where lines
+        # from farther off are nearer to no drop at all, impulses have tilted those next to the
+        # fall. The others are read again without it.
+        real = (visible > least) & (farther > events.drop / 2)
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
@@ -139,7 +140,8 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     return events if len(falls) else SlipEvents(**none)
 
 
-def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
+def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, Array]:
+    """Events, falls from the highest to the lowest force of each slip, drops by distant lines."""
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -150,25 +152,48 @@ def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     sums = _Sums(force, edges[:-1], peak)
     drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
-    length = np.minimum(length, n).astype(np.intp) + (trough - peak)
+    # The tail of an exponential fall is as long again as its quarters say.
+    length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - length)
     stop = np.minimum(edges[1:], trough + length)
-    onset, end, squares = np.empty(k), np.empty(k), np.empty(k)
-    bounds = peak, trough, first, stop
+    rate = np.zeros(k)
+    if k > 1:
+        # Of the middle half: a slider with inertia bends the force at both ends of the stick.
+        quarter = (peak[1:] - trough[:-1]) // 4
+        _, _, rate[1:] = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
+        rate[0] = rate[1]
+    bounds, rate = (peak, trough, first, stop), np.maximum(rate, 0.0)
     large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
     shape, shift = _shape(
         sums,
         large,
         [b[large] for b in bounds],
+        rate[large],
+        drop[large],
         lambda samples: _of_mean(falls.scatter, samples) / drop[large],
     )
-    for part in np.array_split(np.arange(k), -(-k // _TOGETHER)):
-        onset[part], end[part], squares[part] = _onset_and_end(
-            sums, part, *(b[part] for b in bounds), shape=shape.fall
-        )
+    parts = [
+        _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
+        for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
+    ]
+    onset, end, squares, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
-    return _measured(time, force, scatter, sums, (onset, end), first, stop, (shape.timing, shift))
+    shapes = shape.timing, shift
+    events = _measured(time, force, scatter, sums, (onset, end), first, stop, shapes)
+    # Lines as far from the fall as two of its lengths, where they are as long or longer.
+    away = 2 * (trough - peak)
+    first = np.maximum(edges[:-1], peak - 2 * length)
+    stop = np.minimum(edges[1:], trough + 2 * length)
+    until, since = np.maximum(peak - away, first + 2), np.minimum(trough + away, stop - 2)
+    short = np.minimum(until - first, stop - since) < away
+    (high, rise, *_), (low, other, *_) = sums.line(first, until), sums.line(since, stop)
+    farther = high - low + (rise - other) * away / 4
+    u = np.linspace(0, 1, _BINS)
+    fall = events.drop[:, None] * shape.fall(u)
+    if shape.driven:
+        fall += (rate * (end - onset))[:, None] * (u - 1 + shape.fall(u))
+    return events, np.ptp(fall, axis=1), np.where(short, events.drop, farther)
 
 
 def _onset_and_end(
@@ -179,13 +204,23 @@ def _onset_and_end(
     first: Index,
     stop: Index,
     *,
-    shape: Callable[[Array], Array],
-) -> tuple[Array, Array, Array]:
-    """Onset and end by least squares, on grids that zoom in, and the mean square of residuals."""
+    rate: Array,
+    shape: _Shape,
+) -> tuple[Array, Array, Array, Array]:
+    """Onset and end by least squares, on grids that zoom in.
+
+    Returns
+    -------
+    onset, end : array, (k,)
+    squares : array, (k,)
+        Mean square of all residuals.
+    excess : array, (k,)
+        Mean square of the residuals of the slip less that of those of the lines.
+    """
     length = (trough - peak).astype(float)
     middle = (peak + trough) / 2
-    earliest = np.minimum(np.maximum(first + 3.0, peak - length), peak - 1.0)
-    latest = np.maximum(np.minimum(stop - 3.0, trough + length), trough + 1.0)
+    earliest = np.minimum(np.maximum(first + 3.0, peak - 2 * length), peak - 1.0)
+    latest = np.maximum(np.minimum(stop - 3.0, trough + 2 * length), trough + 1.0)
     span_on = [earliest, np.minimum(middle + length / 4, trough - 0.5)]
     span_end = [np.maximum(middle - length / 4, peak + 0.5), latest]
     grid = np.linspace(0.0, 1.0, _CANDIDATES)
@@ -210,11 +245,15 @@ def _onset_and_end(
         weight = stops - begin
         length_here = np.maximum(off[pair[1]] - on[pair[0]], 0.25)
         u = np.clip(((begin + stops - 1) / 2 - on[pair[0]]) / length_here, 0.0, 1.0)
-        model = low[pair[1]] + shape(u) * (high[pair[0]] - low[pair[1]])
+        fall = shape.fall(u)
+        model = low[pair[1]] + fall * (high[pair[0]] - low[pair[1]])
+        if shape.driven:
+            model += rate[:, None, None, None] * length_here * (u - 1 + fall)
         misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
-        misfit += left[2][:, :, None] + right[2][:, None, :]
+        straight = left[2][:, :, None] + right[2][:, None, :]
+        misfit += straight
         # The end comes after the onset, and the force falls.
         wrong = (off[:, None, :] <= on[:, :, None]) | (low[:, None, :] >= high[:, :, None])
         misfit[wrong] = np.inf
@@ -224,9 +263,16 @@ def _onset_and_end(
         for span, here in ((span_on, onset), (span_end, end)):
             reach = (span[1] - span[0]) / (_CANDIDATES - 1)
             span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
-    freedom = np.maximum(stop - first - 6, 1)
-    squares = misfit.min((1, 2))
-    return onset, end, np.maximum(np.where(np.isfinite(squares), squares, 0.0), 0.0) / freedom
+    squares = np.maximum(np.where(np.isfinite(misfit[rows, i, j]), misfit[rows, i, j], 0.0), 0.0)
+    inside = np.maximum(since[rows, j] - until[rows, i], 1)
+    outside = np.maximum(stop - first - inside - 4, 1)
+    lines = straight[rows, i, j]
+    # Within a bin the slip goes on, which its mean leaves over.
+    change = np.gradient(model[rows, i, j], axis=1)
+    binned = (weight[rows, i, j] * change**2).sum(1) / 12
+    # Onset and end take two degrees of freedom.
+    excess = (squares - lines - binned - (inside - 2) * lines / outside) / inside
+    return onset, end, squares / np.maximum(stop - first - 6, 1), excess
 
 
 def _half_cosine(u: Array) -> Array:
@@ -253,32 +299,49 @@ class _Shape:
 
     The standard uncertainty of onset or end, the larger of both, of a slip of d samples and drop D
     in white noise s is `timing` sqrt(d) s/D samples (inverse of Fisher's information of both). Of
-    correlated noise s sqrt(2/d) is the scatter of means over half of the slip.
+    correlated noise s sqrt(2/d) is the scatter of means over half of the slip. A `driven` shape is
+    that of the slider's displacement, and the spring is loaded during the slip; others are those of
+    the force.
     """
 
     fall: Callable[[Array], Array]
     timing: float
+    driven: bool = False
 
 
-#: How a slider slips on a spring: freely at constant friction, at a constant velocity, and damped.
+#: How a slider slips on a spring: freely at constant friction, without a drive, at a constant
+#: velocity, and damped.
 #: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
-_SHAPES = (_Shape(_half_cosine, 2.65), _Shape(_straight, 2.0), _Shape(_relaxing, 4.97))
+_SHAPES = (
+    _Shape(_half_cosine, 2.65, driven=True),
+    _Shape(_half_cosine, 2.65),
+    _Shape(_straight, 2.0),
+    _Shape(_relaxing, 4.97),
+)
 _DISTANCE = 0.13
 #: Of 26 made recordings the true shapes stand out by 3.4 to 46 standard errors, others by 2.1.
 _CLEAR = 3.0
 
 
 def _shape(
-    sums: _Sums, part: Index, bounds: list[Index], noise: Callable[[Array], Array]
+    sums: _Sums,
+    part: Index,
+    bounds: list[Index],
+    rate: Array,
+    drop: Array,
+    noise: Callable[[Array], Array],
 ) -> tuple[_Shape, float]:
     """The shape of slips, which all fall alike, and what is open of it.
 
     Half a cosine unless the squares of another are smaller by more than `_CLEAR` times the standard
     error of their mean difference. Where noise moves onsets by more than another shape would,
-    squares only say which shape follows the noise: such events do not count. Of shapes that are as
-    good as the one chosen their distance from it counts: of onset or end, over the duration.
+    squares only say which shape follows the noise: such events do not count.
+
+    What is open is the standard error of onset or end, over the duration, since slips fall unlike
+    any shape. A fall between two shapes, by a share x from one, has residuals in proportion to x of
+    the one and to 1 - x of the other: x of the distance between their onsets is the error.
     """
-    fits = [_onset_and_end(sums, part, *bounds, shape=shape.fall) for shape in _SHAPES]
+    fits = [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
     squares = np.array([fit[2] for fit in fits])
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
@@ -286,13 +349,23 @@ def _shape(
     for k in range(1, len(_SHAPES)):
         if _excess((squares[chosen] - squares[k])[certain]) > _CLEAR:
             chosen = k
-    onset, end, _ = fits[chosen]
+    onset, end, *_ = fits[chosen]
+    misfit = np.array([_root(fit[3] / drop**2) for fit in fits])
+    misfit = np.maximum(misfit, np.finfo(float).tiny)
     away = [
-        max(abs(float(np.median((fit[n] - fits[chosen][n]) / (end - onset)))) for n in (0, 1))
+        misfit[chosen]
+        / (misfit[chosen] + misfit[k])
+        * max(abs(float(np.median((fit[n] - fits[chosen][n]) / (end - onset)))) for n in (0, 1))
         for k, fit in enumerate(fits)
-        if k != chosen and not _excess(squares[k] - squares[chosen]) > _CLEAR
+        if k != chosen
     ]
-    return _SHAPES[chosen], float(max(away, default=0.0))
+    return _SHAPES[chosen], max(away)
+
+
+def _root(values: Array) -> float:
+    """Root of a mean of squares, two standard errors above what it is."""
+    error = values.std() / np.sqrt(max(values.size - 1, 1))
+    return float(np.sqrt(max(values.mean() + 2 * error, 0.0)))
 
 
 def _excess(values: Array) -> float:
@@ -322,8 +395,14 @@ def _measured(
     high = left[0] + left[1] * (onset - sums.origin) + sums.level
     low = right[0] + right[1] * (end - sums.origin) + sums.level
     drop = high - low
-    # The end of a line is twice as uncertain as its mean.
+    # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
+    # otherwise, in the mean over the events, is how the stick bends: creep, or a ringing gauge.
     doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
+    half = sums.line(until - (until - first) // 2, until)
+    bend = (half[0] + half[1] * (onset - sums.origin) + sums.level - high).sum()
+    half = sums.line(since, since + (stop - since) // 2)
+    bend -= (half[0] + half[1] * (end - sums.origin) + sums.level - low).sum()
+    doubt = np.hypot(doubt, bend / drop.sum() * drop)
     duration = end - onset
     long = np.maximum(duration, 2.0)
     fisher, shift = timing_of

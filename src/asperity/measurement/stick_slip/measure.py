@@ -45,6 +45,7 @@ GRAVITY = 9.80665
 #: Where suspicious and bad begin.
 LIMITS = {
     "events": (10.0, 3.0),
+    "regime": (0.0, np.inf),
     "sampling": (0.05, 0.5),
     "threshold": (0.1, np.inf),
     "hidden events": (0.05, np.inf),
@@ -430,6 +431,17 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
             "replaced by the median around them",
         ),
     ]
+    open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
+    checks.append(
+        judged(
+            "regime",
+            len(open_),
+            LIMITS["regime"],
+            f"cannot tell what {open_[0].start:.4g} to {open_[0].end:.4g} s is: {open_[0].evidence}"
+            if open_
+            else result.kind,
+        )
+    )
     if not count:
         return checks
     drop = float(np.median(events.drop))

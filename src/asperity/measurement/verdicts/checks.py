@@ -120,7 +120,7 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
 
 
 def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
-    """Whether the mean force settles in the window, and whether it can be told to what.
+    """Whether the mean force settles in the window, and whether its final value is determined.
 
     A settling that ends in the window is part of the reading; a window of the user that holds one
     is none of a steady state all the same. Over a fraction of its time constant a settling is a
@@ -144,7 +144,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
         ) + (
             "what it settles to is read"
             if settling.determined
-            else "what it settles to cannot be told, record a longer stretch"
+            else "its final value is not determined; record a longer stretch"
         )
         seen = chosen_by == "user" or not settling.determined
         return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
@@ -153,7 +153,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
     number = min(away, default=0.0) * length / mean
     sentence = (
         f"over the window the force moves by {percent(number)} of its mean more than without "
-        "modulation: it still settles, to what cannot be told"
+        "modulation: it still settles, and its final value is not determined"
         if number
         else "no settling of the force stands out"
     )

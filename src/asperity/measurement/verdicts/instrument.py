@@ -49,7 +49,7 @@ _PHASES, _FEWEST = 128, 4
 _FILLED = 16
 #: Periods and samples of a mean that the drift is taken from.
 _MEAN_PERIODS, _MEAN_SAMPLES = 2, 64
-#: What models leave of the height of a cycle, besides noise.
+#: Model error of a cycle, as a share of its height.
 _LEFT = 2e-3
 #: Harmonics of a cycle that may be cut off, and of one that is not.
 _CUT, _WHOLE = 4, 40

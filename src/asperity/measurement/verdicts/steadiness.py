@@ -30,7 +30,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "shifting response": (0.07, 0.4),
 }
 
-#: Spectral lines on each side of a line of its own that belong to it if it is not steady.
+#: Spectral lines on each side of a line that are its sidebands if it is not steady.
 _SIDEBANDS = 16
 #: Slow motion of so many times the variance that noise gives it is no noise.
 _EXCESS = 3.0
@@ -61,7 +61,7 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
         count = reading.blocks.count
         slow = reading.residual[:-1, 0, 1].real / count[:-1]
         candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
-    # Above the modulation, harmonics beyond those that are fitted are no oscillations of their own.
+    # Lines at harmonics above those that are fitted belong to the modulation.
     width = 2 / span
     lines = [
         line
@@ -77,7 +77,7 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
 
 
 def left_of_piece(reading: LockInReading, time: Array, values: Array) -> tuple[slice, Array]:
-    """What a fit of its own leaves of a channel in the middle of a window, and where that is."""
+    """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
     return piece, _residual(reading.blocks.basis, time[piece], values[piece])
@@ -92,7 +92,7 @@ def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
 
 
 def _residual(basis: Basis, time: Array, force: Array) -> Array:
-    """What a fit of its own leaves of a piece."""
+    """Residual of a separate fit to a piece."""
     piece = Basis(
         basis.omega,
         basis.harmonics,
@@ -150,7 +150,7 @@ def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
 
 
 def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[float, float]:
-    """Share of a line's amplitude that is beside it; and its power there over that farther off."""
+    """Amplitude of the sidebands over that of the line; their power over that farther off."""
     blocks, basis = reading.blocks, reading.blocks.basis
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
     most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)

@@ -1,8 +1,8 @@
 """Noise of a recording: autoregressive, of an order chosen by the data, and its whitening.
 
 The residual of a fit is a stretch of noise e_t with e_t = sum_k a_k e_(t-k) + s n_t, n_t normal and
-independent. Coefficients are estimated by Burg's method, which gives every lower order besides and
-a stationary process always; the order is that of the lowest AICc, but at least 10 log10 n, since an
+independent. Coefficients are estimated by Burg's method, which also gives every lower order and
+always a stationary process; the order is that of the lowest AICc, but at least 10 log10 n, since an
 order that is too low makes intervals too narrow, and one that is too high costs little. The first
 samples are predicted by the lower orders, so that the likelihood is that of all samples.
 """

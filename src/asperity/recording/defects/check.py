@@ -1,13 +1,17 @@
-"""Checks of a recording: sampling, missing values, saturation. A check never changes a value."""
+"""Checks of a recording: sampling, missing values, saturation; and the rows that can be used.
+
+A check never changes a value.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.recording.defects.levels import saturated
-from asperity.recording.defects.sampling import check_sampling, even_rate
+from asperity.recording.defects.sampling import check_sampling, even_rate, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 
@@ -18,7 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["CHECKED", "check", "even_rate"]
+__all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "usable_rows"]
 
 #: Names of the findings of `check`; a reader has further ones.
 CHECKED = frozenset(
@@ -144,3 +148,49 @@ def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
             f"{values[first]:.6g} where {usual:.6g} is usual, in row {first}.",
         )
     ]
+
+
+def usable_rows(time: Array, columns: Sequence[Array]) -> NDArray[np.bool_]:
+    """Whether all columns are finite and time is later than in every usable row before.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Seconds.
+    columns : sequence of array, shape (n,)
+    """
+    use = np.isfinite(time)
+    for values in columns:
+        use &= np.isfinite(values)
+    latest = np.maximum.accumulate(np.where(use, time, -np.inf))
+    use[1:] &= time[1:] > latest[:-1]
+    return use
+
+
+def rows_to_avoid(
+    time: Array, columns: Sequence[Array], kept: NDArray[np.bool_] | None = None
+) -> NDArray[np.intp]:
+    """Rows that are saturated, stand out, or follow a gap or a row that was left out.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Seconds, rising.
+    columns : sequence of array, shape (n,)
+    kept : array of bool, optional
+        Which rows of the recording these are.
+
+    Returns
+    -------
+    array of int
+        In rising order.
+    """
+    avoided = [gap_rows(time)]
+    if kept is not None:
+        avoided.append(np.flatnonzero(np.diff(np.flatnonzero(kept)) > 1) + 1)
+    for values in columns:
+        avoided.append(spikes(values))
+        for level in saturated(values):
+            # A single largest value is none: saturation stands still.
+            avoided.append(level.rows[1:][np.diff(level.rows) == 1])
+    return np.unique(np.concatenate(avoided))

@@ -131,7 +131,8 @@ def _value(item: Any, path: Path, matlab: bool) -> Any:
     if matlab and item.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
     if h5py.check_ref_dtype(item.dtype) is not None:
-        cells = [item.file[r] if r else None for r in np.asarray(item[()]).reshape(-1, order="F")]
+        references = np.asarray(item[()]).reshape(-1, order="F")
+        cells: list[Any] = [item.file[r] if r else None for r in references]
         known = [_holds_values(c) and h5py.check_ref_dtype(c.dtype) is None for c in cells]
         return [_value(c, path, matlab) if k else None for c, k in zip(cells, known, strict=True)]
     if h5py.check_string_dtype(item.dtype) is not None:

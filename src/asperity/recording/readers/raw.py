@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -66,15 +65,16 @@ class RawColumn:
             )
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class RawRecording:
     """Columns of one length, with what the format says about its clock.
 
     Attributes
     ----------
-    columns : list of RawColumn
+    columns : sequence of RawColumn
         In the order of the file.
-    findings : list of Finding
+    findings : sequence of Finding
         What is wrong with the file itself.
     provenance : dict
         Format, title and layout.
@@ -89,32 +89,22 @@ class RawRecording:
         If columns differ in length, or start and step are no times.
     """
 
-    columns: list[RawColumn]
-    findings: list[Finding] = field(default_factory=list)
+    columns: Sequence[RawColumn]
+    findings: Sequence[Finding] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     start: float = 0.0
     step: float | None = None
 
     def __post_init__(self) -> None:
-        if not all(isinstance(column, RawColumn) for column in self.columns):
-            raise TypeError("columns of a RawRecording are RawColumns")
-        if not all(isinstance(finding, Finding) for finding in self.findings):
-            raise TypeError("findings of a RawRecording are Findings")
         sizes = sorted({column.values.size for column in self.columns})
         if len(sizes) != 1:
             raise InputError(
                 f"RawRecording.columns must be of one length, got {sizes} rows; correct the reader"
             )
-        step: Any = self.step
-        if step is not None and not (isinstance(step, Real) and 0 < float(step) < np.inf):
+        if not (np.isfinite(self.start) and (self.step is None or 0 < self.step < np.inf)):
             raise InputError(
-                f"RawRecording.step must be a positive number of seconds, got {step!r}; correct "
-                "the reader"
-            )
-        start: Any = self.start
-        if not (isinstance(start, Real) and np.isfinite(float(start))):
-            raise InputError(
-                f"RawRecording.start must be a number of seconds, got {start!r}; correct the reader"
+                f"RawRecording.step must be positive and start finite, in seconds, got "
+                f"{self.step} and {self.start}; correct the reader"
             )
 
 

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 #: Bytes searched for the table, first and at most: headers of some megabytes exist.
 _HEADS = (1 << 16, 1 << 22)
-_BUFFER = 1 << 20
 #: Smallest number of complete lines from which the layout is determined.
 _FEWEST_LINES = 8
 #: Beginning of JSON; headings in brackets begin with a letter.
@@ -246,23 +245,6 @@ def _is_empty(values: np.ndarray[Any, Any]) -> bool:
     return values.dtype.kind == "f" and bool(np.isnan(values).all())
 
 
-class _Part(io.RawIOBase):
-    """Bytes of a file from one offset to another, so that headings and a cut row are left out."""
-
-    def __init__(self, file: BinaryIO, start: int, stop: int) -> None:
-        self._file, self._left = file, stop - start
-        file.seek(start)
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        got = self._file.read(min(len(buffer), self._left))
-        buffer[: len(got)] = got
-        self._left -= len(got)
-        return len(got)
-
-
 def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.DataFrame:
     import pandas as pd
 
@@ -298,14 +280,18 @@ def _parse(
         "thousands": {".": ",", ",": "."}[layout.decimal] if layout.grouped else None,
     }
 
+    def rows() -> BinaryIO:
+        """The file from its first row; a copy of its rows where bytes behind them do not count."""
+        end = file.seek(0, io.SEEK_END)
+        file.seek(layout.start)
+        return file if stop == end else io.BytesIO(file.read(stop - layout.start))
+
     def parsed(**more: Any) -> pd.DataFrame:
-        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
-        frame = pd.read_csv(part, **options, **more)
+        frame = pd.read_csv(rows(), **options, **more)
         if isinstance(frame.index, pd.RangeIndex):
             return frame
         # pandas took surplus cells of the first row for row labels, which shifts all columns.
-        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
-        return pd.read_csv(part, index_col=False, **options, **more)
+        return pd.read_csv(rows(), index_col=False, **options, **more)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -314,9 +300,9 @@ def _parse(
         except ValueError:
             caught.clear()
             frame = _parsed_with_texts(parsed, path)
-    rows = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
-    rows = [*range(-layout.longer + 1, 1), *rows]
-    return frame, [_malformed(rows)] if rows else []
+    longer = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
+    longer = [*range(-layout.longer + 1, 1), *longer]
+    return frame, [_malformed(longer)] if longer else []
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ _WORDS = {
     **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
     **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
     **dict.fromkeys(("newton", "newtons"), "N"),
-    **dict.fromkeys(("kilonewton", "kilonewtons"), "kN"),
+    **dict.fromkeys(("kilonewton", "kilonewtons", "kn"), "kN"),
     **dict.fromkeys(("pascal", "pascals"), "Pa"),
     **dict.fromkeys(("megapascal", "megapascals", "mpa"), "MPa"),
     **dict.fromkeys(("hertz", "hz"), "Hz"),
@@ -45,22 +45,10 @@ _WORDS = {
 _PURE = frozenset({"-", "--", "1", ".", "/", "dimensionless", "unitless", "nd", "n/d", "friction"})
 #: Fields that a format leaves empty.
 _EMPTY = frozenset({"", "no_val", "no_info", "none", "n/a", "na", "unknown", "?"})
-#: Units of kinds that pint would misread, or read slowly.
-_DIRECT = {
-    "min": ("time", Decimal(60)),
-    "h": ("time", Decimal(3600)),
-    "mm/min": ("velocity", Decimal(1) / Decimal(60_000)),
-    "um/min": ("velocity", Decimal(1) / Decimal(60_000_000)),
-    "KN": ("force", Decimal(1000)),
-    "cm": ("length", Decimal("0.01")),
-    "cm/s": ("velocity", Decimal("0.01")),
-    "kgf": ("force", Decimal("9.80665")),
-    "gf": ("force", Decimal("0.00980665")),
-    "lbf": ("force", Decimal("4.4482216152605")),
-    "psi": ("pressure", Decimal("6894.757293168361")),
-    "bar": ("pressure", Decimal(100_000)),
-    "%": ("dimensionless", Decimal("0.01")),
-}
+#: Units that a heading may end in, in addition to those that SI values are displayed in.
+_ALSO_USUAL = frozenset(
+    ("min", "h", "mm/min", "um/min", "cm", "cm/s", "kgf", "gf", "lbf", "psi", "bar")
+)
 #: Smallest size of one recorded unit (SI), and one over the largest.
 _SMALLEST = Decimal("1e-100")
 _NUMBERED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s+(\S.*)")
@@ -112,12 +100,12 @@ def understood(text: str) -> Unit | None:
 def usual(text: str) -> Unit | None:
     """Unit of a text if it is a usual unit of laboratories, else None."""
     text = _bare(text)
-    if text.lower() in _PURE:
-        return Unit("dimensionless", Decimal(1))
+    if text.lower() in _PURE or text == "%":
+        return Unit("dimensionless", Decimal("0.01") if text == "%" else Decimal(1))
     # As written first: mPa is no MPa, while nothing but MPa can be meant by mpa.
     for plain in (text, _worded(text)):
-        if plain in _DIRECT:
-            return Unit(*_DIRECT[plain])
+        if plain in _ALSO_USUAL:
+            return _by_pint(plain)
         for kind, spec in KINDS.items():
             for unit, power in spec.ladder:
                 if unit and unit == plain:
