@@ -502,22 +502,16 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
     by_likelihood = [name for name in out if not judged[name].fit.judged_by_chi2]
     if by_likelihood:
         nearest = by_likelihood[0]
-        parts.append(
-            f"{nearest}, the nearest of them, has an AICc {_behind(judged, nearest, best):.3g} "
-            f"above that of {best}, and {EXCLUDED:g} excludes"
-            if len(by_likelihood) > 1
-            else f"its AICc is {_behind(judged, nearest, best):.3g} above that of {best}, and "
-            f"{EXCLUDED:g} excludes"
+        which = (
+            f"{nearest}, the nearest of them, has an AICc" if by_likelihood[1:] else "its AICc is"
         )
+        behind = judged[nearest].fit.aicc - judged[best].fit.aicc
+        parts.append(f"{which} {behind:.3g} above that of {best}, and {EXCLUDED:g} excludes")
     if unknown:
         parts.append(f"{_listed(unknown)} cannot be judged: no fit converged")
     if describes and len(left) > 1:
         parts.append(what_would_tell(judged[left[0]].fit, judged[left[1]].fit))
     return "; ".join(p for p in parts if p) + "."
-
-
-def _behind(judged: Mapping[str, Judged], name: str, best: str) -> float:
-    return judged[name].fit.aicc - judged[best].fit.aicc
 
 
 def _listed(names: Sequence[str]) -> str:

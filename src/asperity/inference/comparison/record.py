@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.evidence import CrossValidation, Evidence
 from asperity.inference.fitting.result import fit_record
 from asperity.outputs.json import plain
 
@@ -22,8 +22,9 @@ def comparison_record(comparison: Comparison) -> dict[str, Any]:
                 "standing": comparison.standing(name).word,
                 "deciding": comparison.standing(name).number,
                 "weight": plain(judged.weight),
-                "evidence": _evidence(judged.evidence),
-                "leave_one_run_out": _cross_validation(judged.cross_validation),
+                "evidence": judged.evidence and plain(asdict(judged.evidence)),
+                "leave_one_run_out": judged.cross_validation
+                and plain(asdict(judged.cross_validation)),
             }
             for name, judged in comparison.laws.items()
         },
@@ -80,26 +81,3 @@ def laws_table(
         (name, *nothing, f"not compared: {why}") for name, why in comparison.not_compared.items()
     ]
     return head, rows
-
-
-def _evidence(result: Evidence | None) -> dict[str, Any] | None:
-    if result is None:
-        return None
-    return {
-        "log": plain(result.log),
-        "standard_error": plain(result.standard_error),
-        "effective_samples": plain(result.effective_samples),
-        "laplace": plain(result.laplace),
-        "failed": result.failed,
-        "prior": result.prior,
-    }
-
-
-def _cross_validation(result: CrossValidation | None) -> dict[str, Any] | None:
-    if result is None:
-        return None
-    return {
-        "log_density": plain(result.log_density),
-        "runs": {name: plain(value) for name, value in result.runs.items()},
-        "message": result.message,
-    }

@@ -64,26 +64,8 @@ def failed_fit(objective: Objective) -> Fit:
         u.name: Estimate(u.name, u.parameter.unit, nan, nan, (nan, nan), (nan, nan), False, u.prior)
         for u in objective.unknowns
     }
-    n = len(estimates)
-    return Fit(
-        law=objective.law.name,
-        converged=False,
-        message="; ".join(dict.fromkeys(term.failure for term in objective.terms)),
-        parameters=estimates,
-        correlation=np.full((n, n), nan),
-        undetermined=(),
-        chi2=nan,
-        dof=0,
-        p_value=nan,
-        log_likelihood=nan,
-        aicc=nan,
-        bic=nan,
-        observables={},
-        residuals=(),
-        optima=(),
-        warnings=(),
-        objective=objective,
-    )
+    message = "; ".join(dict.fromkeys(term.failure for term in objective.terms))
+    return Fit(objective.law.name, False, message, estimates, objective)
 
 
 def described_fit(

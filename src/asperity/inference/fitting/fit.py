@@ -156,57 +156,37 @@ def fit(
         )
     options = runs or RunOptions()
     several = listed_data(data, options)
+    cycles = [d for d in several if isinstance(d, AveragedCycle)]
     holds = [d for d in several if isinstance(d, HealingTable)]
     tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
-
-    cycles = [d for d in several if isinstance(d, AveragedCycle)]
-    if cycles:
-        if len(cycles) < len(several):
+    for some, what in ((cycles, "cycles of stick-slip"), (holds, "tables of holds")):
+        if some and len(some) < len(several):
             raise InputError(
-                "data must be cycles of stick-slip alone or other data, got both; fit them one "
-                "after the other, with the first as the prior of the second"
+                f"data must be {what} alone or other data, got both; fit them one after the "
+                "other, with the first as the prior of the second"
             )
-        objective = _cycle_objective(
-            chosen, cycles, free, fixed=fixed or {}, material=material, prior=prior, start=start
-        )
-        return _fit_alone(objective, seed, starts, progress, profile=profile, simpler=simpler)
-    if holds:
-        if len(holds) < len(several):
-            raise InputError(
-                "data must be tables of holds alone or other data, got both; fit them one after "
-                "the other, with the first as the prior of the second"
-            )
-        objective = _hold_objective(
-            chosen,
-            joined_holds(holds),
-            names,
-            fixed=fixed or {},
-            material=material,
-            prior=prior,
-            start=start,
-            bare=bare,
-        )
-        return _fit_alone(objective, seed, starts, progress, profile=profile, simpler=simpler)
+    numbers: dict[str, Any] = {
+        "fixed": fixed or {},
+        "material": material,
+        "prior": prior,
+        "start": start,
+    }
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
+        motion = {"inertia": inertia, "radiation_damping": radiation_damping}
         return _objective(
-            chosen,
-            table,
-            recordings,
-            names,
-            fixed=fixed or {},
-            material=material,
-            prior=prior,
-            start=start,
-            options=options,
-            motion={"inertia": inertia, "radiation_damping": radiation_damping},
-            bare=bare,
+            chosen, table, recordings, names, options=options, motion=motion, bare=bare, **numbers
         )
 
-    objective = compared(recordings)
+    if cycles:
+        objective = _cycle_objective(chosen, cycles, free, **numbers)
+    elif holds:
+        objective = _hold_objective(chosen, joined_holds(holds), names, bare=bare, **numbers)
+    else:
+        objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
     # Minima of a long recording are looked for in fewer, longer blocks.
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
@@ -218,37 +198,38 @@ def fit(
     agreed = True
     if minima and recordings:
         minima, agreed = with_noise(objective, minima, searched)
-    if not minima or not math.isfinite(minima[0][1]):
+    if not minima or not math.isfinite(minima[0].chi2):
         return failed_fit(objective)
-    if recordings:
-        result = described_fit(objective, minima, profile=profile, described=steps.described)
-        said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
-        said += unusual_numbers(result, recordings)
-        given = (fixed or {}).get("K")
-        shared = "K" in names and len(recordings) > 1
-        if table is None and (given is not None or shared):
-            freed = fit(
-                recordings,
-                law,
-                [n for n in names if n != "K"],
-                fixed={n: v for n, v in (fixed or {}).items() if n != "K"},
-                material=material,
-                prior=prior,
-                start={**(start or {}), **_begun(result, recordings, given)},
-                inertia=inertia,
-                radiation_damping=radiation_damping,
-                runs=runs,
-                starts=1,
-                seed=seed,
-            )
-            if shared:
-                said += contradicted_sharing(result, freed, recordings)
-            else:
-                said += contradicted_stiffness(result, freed, recordings, given)
-        return replace(result, warnings=(*said, *result.warnings))
+    if holds:
+        minima = _with_error_of_residuals(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
-    other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
-    return replace(result, warnings=(*result.warnings, other)) if other else result
+    if not recordings:
+        other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
+        return replace(result, warnings=(*result.warnings, other)) if other else result
+    said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
+    said += unusual_numbers(result, recordings)
+    given = numbers["fixed"].get("K")
+    shared = "K" in names and len(recordings) > 1
+    if table is None and (given is not None or shared):
+        begun = {**(start or {}), **_begun(result, recordings, given)}
+        others = {n: v for n, v in numbers["fixed"].items() if n != "K"}
+        freed = fit(
+            recordings,
+            law,
+            [n for n in names if n != "K"],
+            inertia=inertia,
+            radiation_damping=radiation_damping,
+            runs=runs,
+            starts=1,
+            seed=seed,
+            **{**numbers, "fixed": others, "start": begun},
+        )
+        said += (
+            contradicted_sharing(result, freed, recordings)
+            if shared
+            else contradicted_stiffness(result, freed, recordings, given)
+        )
+    return replace(result, warnings=(*said, *result.warnings))
 
 
 def _hold_objective(
@@ -341,28 +322,13 @@ def _cycle_objective(
     return Objective(terms, law, unknowns, constants, curved=True)
 
 
-def _fit_alone(
-    objective: Objective,
-    seed: int,
-    starts: int,
-    progress: Callable[[int, int], None] | None,
-    *,
-    profile: bool,
-    simpler: Sequence[Fit],
-) -> Fit:
-    """The fit of one kind of data; the error of holds is that of the residuals if none is given."""
-    steps = _Steps(progress, len(objective.unknowns))
-    special = [f.values for f in simpler if f.converged and extends(objective.law, f.objective.law)]
-    minima = minima_of(objective, seed, steps.minimised, drawn=starts, simpler=special)
-    if not minima or not math.isfinite(minima[0].chi2):
-        return failed_fit(objective)
-    if objective.terms_of(HoldTerm):
-        for term in objective.terms_of(HoldTerm):
-            term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
-        objective.forget()
-        best = objective.minimise(minima[0].u)
-        minima = [best, *(Minimum(m.u, objective.chi2(m.u)) for m in minima[1:])]
-    return described_fit(objective, minima, profile=profile, described=steps.described)
+def _with_error_of_residuals(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
+    """Minima for holds, whose error is that of their residuals where none is given."""
+    for term in objective.terms_of(HoldTerm):
+        term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
+    objective.forget()
+    best = objective.minimise(minima[0].u)
+    return [best, *(Minimum(m.u, objective.chi2(m.u)) for m in minima[1:])]
 
 
 class _Steps:

@@ -93,8 +93,7 @@ def minima_of(
         objective.use_search(True)
         minima = _by_few_rows(objective, drawn_starts, special, progress)
         return _with_other_lengths(objective, minima)
-    starts = _best(drawn_starts, chi2)
-    starts = [*special, *starts, *_without_extensions(objective, starts)]
+    starts = [*special, *_best(objective, drawn_starts, chi2)]
     minima = _with_reweighted(objective, _followed(objective, starts, progress))
     if minima and _blocked(objective, minima[0]):
         ends = [end.u for end in distinct(minima)[: _FOLLOWED + 1]]
@@ -108,7 +107,11 @@ def minima_of(
 
 
 def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]:
-    """The given start, and drawn ones."""
+    """The given start, and drawn ones: every third is one of a special case of the law.
+
+    Laws have others as special cases, elasto-plastic Rice-Ruina for lambda = 0: data of the special
+    case have their minimum there, and others away from it.
+    """
     unknowns = objective.unknowns
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
     low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
@@ -117,13 +120,30 @@ def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]
     generator = np.random.default_rng(seed)
     strata = generator.permuted(np.tile(np.arange(drawn), (len(unknowns), 1)), axis=1)
     shares = (strata + generator.random(strata.shape)).T / max(drawn, 1)
-    return [middle, *(low + (high - low) * shares)]
+    starts = [middle, *(low + (high - low) * shares)]
+    extensions = _extensions(objective)
+    for k in range(len(starts) // 2) if extensions else ():
+        special = starts[3 * k + 1].copy()
+        special[extensions[k % len(extensions)]] = _NEARLY_ZERO
+        starts.insert(3 * k + 2, special)
+    return starts
 
 
-def _best(starts: list[Float], chi2: Float) -> list[Float]:
-    """The given start and the best of the others, those with a solution."""
+def _extensions(objective: Objective) -> list[int]:
+    """Coordinates that extend the law, and leave a special case of it where they are zero."""
+    names = [None if u.logarithmic else u.name for u in objective.unknowns]
+    return [i for i, name in enumerate(names) if name in _EXTENSIONS]
+
+
+def _best(objective: Objective, starts: list[Float], chi2: Float) -> list[Float]:
+    """Starts with a solution: the given one, the best others, and the best of each special case."""
     order = dict.fromkeys([0, *np.argsort(chi2).tolist()])
-    return [starts[i] for i in order if math.isfinite(chi2[i])][: _FOLLOWED + 1]
+    solved = [starts[i] for i in order if math.isfinite(chi2[i])]
+    best, others = solved[: _FOLLOWED + 1], solved[_FOLLOWED + 1 :]
+    for i in _extensions(objective):
+        if all(u[i] != _NEARLY_ZERO for u in best):
+            best += [u for u in others if u[i] == _NEARLY_ZERO][:1]
+    return best
 
 
 def _followed(
@@ -157,8 +177,8 @@ def _by_few_rows(
     drawn = drawn[:_WITH_SEARCH]
     coarse = _coarse(objective) or objective
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
-    starts = _best(drawn, screened.chi2_of_many(np.array(drawn), least=_LEAST))
-    starts = [*known, *starts, *_without_extensions(screened, starts)]
+    chi2 = screened.chi2_of_many(np.array(drawn), least=_LEAST)
+    starts = [*known, *_best(objective, drawn, chi2)]
     ends = _followed(coarse, starts, progress, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
     apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]
     ends = _followed(coarse, apart, None, tolerance=_NEARBY, evaluations=_EVALUATIONS)
@@ -167,7 +187,7 @@ def _by_few_rows(
     again = [u for u in known if objective.chi2(u) < lowest]
     if not minima:
         # Another row may have no orbit there, or none that the coarse search reaches.
-        again += _best(drawn, objective.chi2_of_many(np.array(drawn)))
+        again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
     return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
 
 
@@ -310,21 +330,3 @@ def extends(law: type[Law], other: type[Law]) -> bool:
     """Whether a law has the parameters of another and some that extend it, which may be zero."""
     own, others = set(law_parameters(law)), set(law_parameters(other))
     return others < own and own - others <= set(_EXTENSIONS)
-
-
-def _without_extensions(objective: Objective, starts: list[Float]) -> list[Float]:
-    """The best start at which a parameter that extends the law nearly is zero, for each of those.
-
-    Laws have others as special cases, elasto-plastic Rice-Ruina for lambda = 0: data of the special
-    case have their minimum there, and others away from it.
-    """
-    result = []
-    for i, unknown in enumerate(objective.unknowns):
-        if unknown.logarithmic or unknown.name not in _EXTENSIONS or not starts:
-            continue
-        trials = np.array(starts)
-        trials[:, i] = _NEARLY_ZERO
-        chi2 = objective.chi2_of_many(trials)
-        if np.isfinite(chi2).any():
-            result.append(trials[np.argmin(chi2)])
-    return result

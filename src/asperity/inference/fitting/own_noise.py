@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -55,7 +56,9 @@ def with_noise(
         # Chi-squared of a drift says how large it is: noise has one a sample.
         allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
-    ends = [_with_own_noise(objective, u) for u in _apart(objective, starts)]
+    ends: list[_End] = []
+    for u in _apart(objective, starts):
+        ends += _with_own_noise(objective, u, ends)
     ends.sort(key=lambda end: end.deviance)
     best = ends[0]
     objective.terms = best.objective.terms
@@ -89,12 +92,15 @@ class _End(NamedTuple):
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, u: Float) -> _End:
-    """Noise and parameters in turn, until the parameters stay where they are."""
+def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> list[_End]:
+    """Noise and parameters in turn, until the parameters stay where they are.
+
+    Empty where they come to an end that is known.
+    """
     objective = replace(objective, terms=tuple(copy(term) for term in objective.terms))
     noisy = objective.terms_of(RunTerm)
     agreed = False
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
         begin = u
         for term in noisy:
             term.update_noise(objective.named(begin))
@@ -102,7 +108,11 @@ def _with_own_noise(objective: Objective, u: Float) -> _End:
         u, value = objective.minimise(begin)
         if not math.isfinite(value):
             break
+        begin, u = objective.ordered(begin), objective.ordered(u)
         _, jacobian = objective.residuals(u)
+        # The first noise holds the misfit of the start.
+        if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
+            return []
         away = jacobian @ (u - begin)
         # chi-squared of the change, under the noise as it is now.
         if agreed := float(away @ away) < _STILL**2:
@@ -110,4 +120,4 @@ def _with_own_noise(objective: Objective, u: Float) -> _End:
     priors = objective.prior_residuals(u)[0]
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
-    return _End(u, deviance, objective, agreed)
+    return [_End(u, deviance, objective, agreed)]

@@ -109,10 +109,11 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
         Converged.
     runs : sequence of RecordedRun
     """
-    numbers = [(n, fit.values[n], fit.parameters[n].unit) for n in _FAR if n in fit.values]
+    determined = fit.values.keys() - {*fit.undetermined}
+    numbers = [(n, fit.values[n], fit.parameters[n].unit) for n in _FAR if n in determined]
     ranges = dict(_FAR)
     for run in runs:
-        name = next((n for n in (f"K[{run.name}]", "K") if n in fit.values), None)
+        name = next((n for n in (f"K[{run.name}]", "K") if n in determined), None)
         if name is not None:
             numbers.append((f"{name}/W0", fit.values[name] / run.W0, "1/m"))
             ranges[f"{name}/W0"] = _FAR_STIFFNESS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -116,8 +116,10 @@ class Fit(Drawn):
     message : str
         "converged", or why not; all numbers are NaN then.
     parameters : mapping of str to Estimate
+    objective : Objective
+        Data, law and free parameters: the function that was minimised.
     correlation : array, shape (n, n)
-        In the order of `parameters`, of the coordinates of the fit.
+        In the order of `parameters`, of the coordinates of the fit; empty without a fit.
     undetermined : tuple of str
         Parameters of which these data say nothing: their standard error exceeds a factor of e.
     chi2 : float
@@ -134,8 +136,6 @@ class Fit(Drawn):
     optima : tuple of Optimum
         Other minima that the data do not exclude.
     warnings : tuple of str
-    objective : Objective
-        Data, law and free parameters: the function that was minimised.
     outliers : tuple of int
         Rows of the table without which the law describes it, from 0; at most a tenth of them, or
         two of eight and more.
@@ -147,19 +147,19 @@ class Fit(Drawn):
     converged: bool
     message: str
     parameters: Mapping[str, Estimate]
-    correlation: Float
-    undetermined: tuple[str, ...]
-    chi2: float
-    dof: int
-    p_value: float
-    log_likelihood: float
-    aicc: float
-    bic: float
-    observables: Mapping[str, tuple[float, int]]
-    residuals: tuple[Residuals, ...]
-    optima: tuple[Optimum, ...]
-    warnings: tuple[str, ...]
     objective: Objective
+    correlation: Float = field(default_factory=lambda: np.full((0, 0), math.nan))
+    undetermined: tuple[str, ...] = ()
+    chi2: float = math.nan
+    dof: int = 0
+    p_value: float = math.nan
+    log_likelihood: float = math.nan
+    aicc: float = math.nan
+    bic: float = math.nan
+    observables: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    residuals: tuple[Residuals, ...] = ()
+    optima: tuple[Optimum, ...] = ()
+    warnings: tuple[str, ...] = ()
     outliers: tuple[int, ...] = ()
 
     def parts(self, kind: type[T]) -> list[tuple[T, Residuals]]:
