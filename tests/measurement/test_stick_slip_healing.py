@@ -29,7 +29,7 @@ def test_recordings_at_several_velocities_tell_the_growth_of_the_drop() -> None:
 
 def _row(V, K, W0, stick, drop, **others):
     row = {"regime": "regular stick-slip", "checks": "sampling: bad", "V": V, "K": K, "W0": W0}
-    row |= {"stick_duration": stick, "drop": drop, "drop_uncertainty": 1e-4}
+    row |= {"stick_duration": stick, "drop": drop, "drop_uncertainty": 1e-4, "force_before": 0.5}
     return row | {"recurrence": stick, "recurrence_uncertainty": 0.0} | others
 
 
@@ -39,7 +39,7 @@ def test_each_machine_of_a_campaign_tells_the_healing_of_a_law() -> None:
     slider = Slider(law, spring=np.array([[12e3], [36e3]]), load=W0, mass=M)
     cycles = stick_slip_response(slider, velocity=V)
     rows = [
-        _row(V[j], K, W0, cycles.stick_duration[i, j], cycles.drop[i, j])
+        _row(V[j], K, W0, cycles.stick_duration[i, j], cycles.drop[i, j], M=M)
         for j in range(V.size)
         for i, K in enumerate((12e3, 36e3))
     ]
@@ -57,8 +57,16 @@ def test_each_machine_of_a_campaign_tells_the_healing_of_a_law() -> None:
         assert healing.recordings == V.size
         # 2 (B - A): age and velocity at the onset follow that of the drive, and slips overshoot.
         assert healing.drop_per_efold == pytest.approx(0.024, rel=0.15)
-        low, high = healing.b_minus_a
+        (low, high), condition = one.b_minus_a(healing)
         assert low < 0.012 < high
+        # M V^2/W0 = 10 (3e-5)^2/5
+        assert "A D0 above 1.8e-09 m" in condition
+        heavy = StickSlipCampaign.of([row | {"M": 1e8} for row in one.rows]).series[0]
+        (low, _), condition = heavy.b_minus_a(healing)
+        assert np.isnan(low)
+        assert "inertia counts" in condition
+        unknown = StickSlipCampaign.of([row | {"M": None} for row in one.rows]).series[0]
+        assert "M is not known" in unknown.b_minus_a(healing)[1]
     assert "0 recordings are too few" in campaign.series[2].healing().reason
     figure = replace(campaign, model=cycles, modelled=(0, 1)).plot()
     drops, times = figure.axes

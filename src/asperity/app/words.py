@@ -7,38 +7,29 @@ from collections.abc import Mapping
 from asperity.errors import Argument
 
 _LABELS: Mapping[str, str] = {
-    "measure.window": "Window",
-    "measure.detrend": "Drift",
-    "measure.load": "Normal load",
-    "measure.force": "Shear force",
-    "measure.steps": "Velocity steps",
-    "measure.holds": "Holds",
-    "measure.frequency": "Frequency",
-    "measure.trace": "The recording",
-    "lock_in.detrend": "Drift",
-    "lock_in.harmonics": "Harmonics",
-    "lock_in.frequency": "Frequency",
-    "lock_in.load and force": "Normal load and shear force",
-    "lock_in.load": "Normal load",
-    "lock_in.time": "Time column",
-    "measure.exact_frequency": "Take it as exact",
-    "measure.harmonics": "Harmonics",
-    "measure.steps and holds": "Velocity steps and holds",
+    "window": "Window",
+    "slice.start and slice.end": "Window",
+    "detrend": "Drift",
+    "load": "Normal load",
+    "force": "Shear force",
+    "load and force": "Normal load and shear force",
+    "time": "Time column",
+    "steps": "Velocity steps",
+    "holds": "Holds",
+    "steps and holds": "Velocity steps and holds",
+    "frequency": "Frequency",
+    "exact_frequency": "Take it as exact",
+    "harmonics": "Harmonics",
+    "trace": "The recording",
+    "recording.path": "The recording",
     "rate": "Sampling rate",
+    "group": "Group",
     "format": "File format",
     "delimiter": "Delimiter",
     "decimal": "Decimal mark",
-    "read.rate": "Sampling rate",
-    "read.group": "Group",
-    "read.format": "File format",
-    "read.delimiter": "Delimiter",
-    "read.decimal": "Decimal mark",
     "columns": "Role",
     "units": "Unit",
-    "stress_to_force.area": "Area",
-    "read.area": "Area",
-    "recording.path": "The recording",
-    "slice.start and slice.end": "Window",
+    "area": "Area",
     "free": "Free parameters",
     "fixed": "Fixed numbers",
     "laws": "Laws",
@@ -46,6 +37,8 @@ _LABELS: Mapping[str, str] = {
     "fit_rate": "Mean values per second for long recordings",
     "velocities": "Velocities between the steps",
 }
+#: Functions of the library whose arguments are fields of the Data tab.
+_OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
 _ROLES: Mapping[str, str] = {
     "time": "Time column",
     "W": "Normal load",
@@ -64,7 +57,10 @@ def in_labels(argument: Argument) -> str:
         name = name.rpartition(".")[0]
     head, _, field = name.partition(".")
     if head in ("data", "runs") and field:
-        name = field.partition(".")[2] or field
+        head, _, field = (field.partition(".")[2] or field).rpartition(".")
+        name = field
+    elif head in _OF_DATA:
+        name = field
     if name in ("numbers", "fixed", "start") and key:
         label = key
     elif name in ("columns", "Trace.channel") and key:

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import numpy as np
 from jax.typing import ArrayLike
 
-from asperity.branches.bifurcation import LocatedBifurcation, bifurcations_between, polished
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -19,7 +18,14 @@ from asperity.branches.parameters import (
     start_of,
     starting_orbit,
 )
-from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
+from asperity.branches.steps import (
+    BranchFollower,
+    BranchOrbit,
+    LocatedBifurcation,
+    ParameterBranch,
+    bifurcations_between,
+    polished,
+)
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed

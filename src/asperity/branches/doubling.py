@@ -166,7 +166,7 @@ def _alternating(line: ParameterLine, orbit: Orbit, t: NDArray[np.float64]) -> C
         vector = maps[:, :, i, 0] @ vector
     slopes = 2 * np.einsum("nkcmb,cmb->nkmb", equations.response, nodes)
     mesh = np.concatenate([orbit.mesh / 2, np.pi + orbit.mesh[1:] / 2])
-    twice = orbit.moved(
+    twice = orbit._replace(
         mesh=mesh,
         nodes=np.concatenate([orbit.nodes, orbit.nodes], axis=1),
         slopes=2 * np.concatenate([orbit.slopes, orbit.slopes], axis=2),

@@ -54,18 +54,6 @@ class ContinuedParameter:
             return self.start * (self.end / self.start) ** np.asarray(t)
         return self.start + (self.end - self.start) * np.asarray(t)
 
-    def coordinate(self, value: Any) -> Any:
-        """The inverse of `value`."""
-        if self.logarithmic:
-            return np.log(np.asarray(value) / self.start) / np.log(self.end / self.start)
-        return (np.asarray(value) - self.start) / (self.end - self.start)
-
-    def slope(self, t: Any) -> Any:
-        """Derivative of the value by the coordinate."""
-        if self.logarithmic:
-            return self.value(t) * np.log(self.end / self.start)
-        return (self.end - self.start) * np.ones_like(t)
-
 
 def moving_parameter(
     problem: Problem, name: str, span: Any, field: str = "span"

@@ -28,7 +28,6 @@ from asperity.algebra.continuation import (
     StepControl,
     follow,
 )
-from asperity.branches.bifurcation import Kind, bifurcations_between, criterion, kind_of, root_near
 from asperity.branches.continuation import INTERVALS
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -40,7 +39,16 @@ from asperity.branches.parameters import (
     start_of,
     starting_orbit,
 )
-from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
+from asperity.branches.steps import (
+    BranchFollower,
+    BranchOrbit,
+    Kind,
+    ParameterBranch,
+    bifurcations_between,
+    criterion,
+    kind_of,
+    root_near,
+)
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed

@@ -124,10 +124,9 @@ def run(
             def progress(now: SweepProgress) -> None:
                 nonlocal done
                 done = f"{now.points:,} of {now.total:,} points"
-                left = (
-                    f"{now.failed:,} failed, {now.rate:,.0f} points/s, {_time_text(now.left)} left"
-                )
-                update(now.points, now.total, left)
+                label = f"{now.failed:,} failed, {now.rate:,.0f} points/s"
+                left = f", {_time_text(now.left)} left" if math.isfinite(now.left) else ""
+                update(now.points, now.total, label + left)
 
             result = run_sweep(
                 plan,

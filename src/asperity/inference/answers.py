@@ -18,7 +18,7 @@ from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
 from asperity.inference.holds.table import HEALING, HealingTable, read_healing
-from asperity.inference.runs.assembly import RunOptions
+from asperity.inference.runs.assembly import Linear, RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
@@ -36,7 +36,11 @@ Progress = Callable[[int, int], None]
 Reader = Callable[[questions.Data], Trace]
 
 #: Columns of the recording that a trend of the friction over slip takes.
-_TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
+_TRENDS: Mapping[str, tuple[Linear, ...]] = {
+    "none": (),
+    "linear": ("trend",),
+    "quadratic": ("trend", "bend"),
+}
 
 
 #: Sets of data of any kind.
@@ -175,7 +179,7 @@ def _reading(data: questions.Data) -> dict[str, Any]:
 
 def run_options(question: questions.Fit | questions.Comparison) -> RunOptions:
     """How recordings are compared with the motion."""
-    drift = ("drift",) if question.drift else ()
+    drift: tuple[Linear, ...] = ("drift",) if question.drift else ()
     return RunOptions(
         linear=("offset", *_TRENDS[question.trend], *drift),
         initial=question.initial,

@@ -10,14 +10,18 @@ from typing import TYPE_CHECKING
 from asperity._lazy import lazy_names
 
 if TYPE_CHECKING:
-    from asperity.orbit.differentiable import ResponseFunction, response_function
+    from asperity.orbit.differentiable import (
+        ResponseFunction,
+        Sensitivities,
+        response_function,
+        sensitivities,
+    )
     from asperity.orbit.gradient.parametrised import ResponseValues
     from asperity.orbit.gradient.search import KnownOrbits
     from asperity.orbit.outcome import Outcome
     from asperity.orbit.period import Period, over_a_period
     from asperity.orbit.periodic import averaged_response, periodic_response
     from asperity.orbit.response import PeriodicResponse
-    from asperity.orbit.sensitivity import Sensitivities, sensitivities
 
 #: Module of each public name.
 _HOMES = {
@@ -27,12 +31,12 @@ _HOMES = {
     "PeriodicResponse": "response",
     "ResponseFunction": "differentiable",
     "ResponseValues": "gradient.parametrised",
-    "Sensitivities": "sensitivity",
+    "Sensitivities": "differentiable",
     "averaged_response": "periodic",
     "over_a_period": "period",
     "periodic_response": "periodic",
     "response_function": "differentiable",
-    "sensitivities": "sensitivity",
+    "sensitivities": "differentiable",
 }
 
 __all__ = [

@@ -9,6 +9,7 @@ rule at the orbit, whichever method solved for it.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -40,8 +41,9 @@ from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, search_o
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import QuasiStatic
+from asperity.slider import QuasiStatic, Slider
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
+from asperity.slider.problem import checked_problem, flatten
 from asperity.slider.radiating import Radiating
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
@@ -528,3 +530,111 @@ def _derivative(columns: Any, values: ResponseValues) -> ResponseValues:
         logs[..., :states] + 1j * logs[..., states:],
         values.outcome,
     )
+
+
+#: Points that are differentiated at a time, which bounds the memory.
+_BLOCK = 1024
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives at one or many operating points.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency, eta
+        (with radiation damping only), and epsilon or the coefficients of the load.
+    outcome : int array, shape (...)
+        `Outcome` of each point.
+    converged : bool array, shape (...)
+        False where there is no resolved orbit; the derivatives are NaN there.
+    mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
+        d(output)/d(parameter) in SI; phases in rad.
+    log_multipliers : complex array, shape (..., states, parameters)
+        Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
+        with the positive argument comes first.
+    """
+
+    parameters: tuple[str, ...]
+    outcome: NDArray[np.int64]
+    mean_friction: NDArray[np.float64]
+    mu1: NDArray[np.float64]
+    mu2: NDArray[np.float64]
+    phase1: NDArray[np.float64]
+    phase2: NDArray[np.float64]
+    log_multipliers: NDArray[np.complex128]
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether each point was solved."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+
+@typed
+def sensitivities(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: ArrayLike | str | None = None,
+    frequency: ArrayLike | str,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
+) -> Sensitivities:
+    """Derivatives of mean, harmonics and multipliers with respect to every parameter.
+
+    Parameters
+    ----------
+    slider : Slider
+        With a rate-dependent law.
+    velocity, epsilon, frequency, modulation, inertia, radiation_damping
+        As in `periodic_response`; arrays broadcast.
+
+    Returns
+    -------
+    Sensitivities
+
+    Raises
+    ------
+    InputError
+        As `periodic_response`; if the law does not depend on the velocity.
+
+    Notes
+    -----
+    As `response_function`, with the parameters of the slider.
+    """
+    problem, shape = flatten(
+        checked_problem(
+            slider,
+            velocity=velocity,
+            epsilon=epsilon,
+            frequency=frequency,
+            modulation=modulation,
+            inertia=inertia,
+            radiation_damping=radiation_damping,
+        )
+    )
+    model = ResponseFunction.of(ParametrisedProblem.of(problem), harmonics=2, multipliers=True)
+    numbers = model.equations.values(problem)
+    points = int(np.prod(shape, dtype=int))
+    blocks = [
+        model.value_and_jacobian({n: v[i : i + _BLOCK] for n, v in numbers.items()})
+        for i in range(0, points, _BLOCK)
+    ]
+    values, derivatives = jax.tree.map(lambda *parts: np.concatenate(parts), *blocks)
+    columns = [_outputs(values, derivatives[name]) for name in model.parameters]
+    table = np.stack(columns, axis=-1).reshape(*shape, -1, len(columns))
+    return Sensitivities(
+        model.parameters,
+        values.outcome.reshape(shape),
+        *(table[..., i, :].real for i in range(5)),
+        log_multipliers=table[..., 5:, :],
+    )
+
+
+def _outputs(values: ResponseValues, change: ResponseValues) -> NDArray[np.complex128]:
+    """Derivatives of the outputs to one parameter, (points, outputs)."""
+    relative = change.harmonics / values.harmonics
+    growth, turn = relative.real * np.abs(values.harmonics), relative.imag
+    return np.column_stack([change.mean_friction, growth, turn, change.log_multipliers])

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -175,28 +176,19 @@ def find_orbits_on_cores(
     options = {"harmonics": harmonics, "phases": phases, "methods": methods}
     # One thread of XLA for each process; more threads than cores would slow all of them.
     executor = get_reusable_executor(max_workers=workers, env={"NPROC": "1"})
-    waiting: list[tuple[np.ndarray, Any]] = []
+    slices = [np.arange(k, min(k + _SLICE, points)) for k in range(0, points, _SLICE)]
+    problems = [take(problem, index) for index in slices]
     try:
-        for start in range(0, points, _SLICE):
-            index = np.arange(start, min(start + _SLICE, points))
-            waiting.append((index, executor.submit(_search, take(problem, index), options)))
-            if len(waiting) > 2 * workers:  # bounds the results in memory
-                _collect(solution, *waiting.pop(0), progress)
-        while waiting:
-            _collect(solution, *waiting.pop(0), progress)
+        results = executor.map(partial(_search, options=options), problems)
+        for index, result in zip(slices, results, strict=True):
+            # Orbits are not wanted here.
+            for target, values in zip(solution[:-1], result[:-1], strict=True):
+                target[..., index] = values
+            progress(len(index))
     except BaseException:  # Ctrl-C included: the processes must be stopped
         executor.shutdown(wait=False, kill_workers=True)
         raise
     return solution
-
-
-def _collect(
-    solution: Solution, index: np.ndarray, job: Any, progress: Callable[[int], None]
-) -> None:
-    # Orbits are not wanted here.
-    for target, values in zip(solution[:-1], job.result()[:-1], strict=True):
-        target[..., index] = values
-    progress(len(index))
 
 
 def _search(problem: Problem, options: dict[str, Any]) -> Solution:

@@ -175,21 +175,25 @@ class EventDetector:
         if len(dense_output.begin) == 0:
             return [], None
         times = dense_output.refined()
+
+        def crossings(name: str, distance: Distance) -> list[tuple[float, bool]]:
+            return self._crossings(name, distance, times, samples, dense_output)
+
         if self._level is None:
-            slips = self._crossings("slip", self._slip, times, samples, dense_output)
+            slips = crossings("slip", self._slip)
             result = [Event(t, "slip start" if up else "slip end") for t, up in slips]
         else:
-            falls = self._crossings("level", self._above, times, samples, dense_output)
-            extrema = self._crossings("extremum", self._ahead, times, samples, dense_output)
+            falls = crossings("level", self._above)
+            extrema = crossings("extremum", self._ahead)
             result = [Event(t, "fall") for t, up in falls if not up]
             result += [Event(t, "peak" if up else "trough") for t, up in extrema]
         terminations = []
         if self._may_run_away:
-            crossed = self._crossings("runaway", self._runaway, times, samples, dense_output)
+            crossed = crossings("runaway", self._runaway)
             terminations += [
                 Termination("runaway", t) for t, up in crossed if up and t > self._start
             ]
-        reversals = self._crossings("friction", self._friction, times, samples, dense_output)
+        reversals = crossings("friction", self._friction)
         if self._reverses:
             result += [Event(t, "reversal") for t, _ in reversals]
         else:

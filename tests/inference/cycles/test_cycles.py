@@ -9,11 +9,13 @@ from scipy.stats import chi2
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.inference.answers import read_data
 from asperity.inference.cycles.cycle import averaged_cycle
 from asperity.inference.cycles.term import CycleTerm
 from asperity.inference.fitting.fit import fit
 from asperity.laws import RiceRuina
 from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
+from asperity.questions.fit import Fit
 from asperity.recording import Channel, Trace
 from asperity.transients.limit_cycle import limit_cycle
 
@@ -60,6 +62,21 @@ def test_a_level_and_an_instant_do_not_count():
     residuals = CycleTerm(cycle, RiceRuina, FIXED).residuals(TRUTH).values
     moved = CycleTerm(cycle, RiceRuina, FIXED | {"mu0": 0.53}).residuals(TRUTH).values
     np.testing.assert_allclose(moved, residuals, atol=1e-2)
+
+
+def test_files_with_the_drive_bring_their_velocities(tmp_path):
+    """Two velocities in one fit: the displacement of the drive says which is which."""
+    files = []
+    for name, speed in (("slow", 1.0), ("fast", 4.0)):
+        measurement = measured(1)
+        time, force = measurement.time / speed, measurement.friction
+        files.append(tmp_path / f"{name}.csv")
+        head = "t (s),friction,displacement (um)"
+        columns = np.c_[time, force, 1e6 * speed * V * time]
+        np.savetxt(files[-1], columns, "%.8g", ",", header=head, comments="")
+    question = Fit(data=[{"file": file} for file in files], fixed=MACHINE | {"W0": "1 N"})
+    slow, fast = read_data(question)
+    assert pytest.approx((V, 4 * V), rel=1e-6) == (slow.V, fast.V)
 
 
 def test_derivatives_are_those_of_the_residuals():

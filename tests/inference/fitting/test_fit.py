@@ -151,14 +151,6 @@ def test_a_prior_pulls_by_its_weight(readings, pmma):
     assert both.parameters["eps_ratio"].se == pytest.approx(estimate.se / np.sqrt(2), rel=0.03)
 
 
-def test_an_outlier_is_named(readings, pmma):
-    table = readings(7)
-    table.values["mu1"][5] *= 1.5
-    found = fit(table, "elasto-plastic", FREE, material=pmma)
-    assert any("mu1 of row 6" in w for w in found.warnings)
-    assert found.p_value < 0.01
-
-
 def test_the_wrong_laws_are_excluded_and_the_observable_is_named(readings, pmma):
     found = compare(
         readings(8),

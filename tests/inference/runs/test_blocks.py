@@ -79,6 +79,8 @@ def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
     (term,) = by_blocks.objective.terms
     assert term.run.blocks.recorded == 24_000
     assert term.run.time.size < 6_000
+    # The mains are no part of the noise that is left of them.
+    np.testing.assert_allclose(term.run.blocks.lines, [50.0], atol=0.1)
     full = fit(
         recorded(clean + ringing),
         "rice-ruina",
@@ -100,6 +102,7 @@ def test_what_was_averaged_is_said_in_one_sentence(clean, ringing):
     said = RunTerm(cleaned(run), get_law("rice-ruina"), {}).noise["averaged"]
     assert said.startswith("24000 samples are compared as ")
     assert "means over blocks of" in said
+    assert "lines at 50" in said
 
 
 def test_long_blocks_stay_right_with_steps_inside_them(clean):
@@ -130,6 +133,16 @@ def test_blocks_over_a_gap_are_left_out(clean):
     assert not missing.any()
     np.testing.assert_allclose(end - begin, 0.05, rtol=0.02)
     assert (begin[1:] >= end[:-1]).all()
+
+
+def test_mains_are_taken_off_and_motion_is_not(clean):
+    time = np.arange(24_000) / CASE.rate
+    with_mains, without = (reduced(recorded(clean + m), 500.0) for m in (mains(time), 0 * time))
+    assert without.blocks.lines == ()
+    away = with_mains.friction - without.friction
+    # Of an amplitude of 1e-3; the wandering is linear over pieces of 2 s.
+    assert np.sqrt(np.mean(away**2)) < 0.05 * 1e-3 / np.sqrt(2)
+    assert np.abs(away).max() < 1e-4
 
 
 def test_single_samples_far_off_do_not_count(clean, ringing):

@@ -200,8 +200,8 @@ def split_mesh(parts):
 
 def on_mesh(problem, mesh):
     """Mean, c1, c2, trace of the monodromy matrix and log of its determinant."""
-    orbit = Orbit.empty(GAUSS, 2, len(mesh) - 1, 2).moved(mesh=mesh)
-    orbit = orbit.moved(centre=np.asarray(problem.system.steady()))
+    orbit = Orbit.empty(GAUSS, 2, len(mesh) - 1, 2)._replace(mesh=mesh)
+    orbit = orbit._replace(centre=np.asarray(problem.system.steady()))
     result = solve(problem, orbit, 30)
     assert (result.error < ACCEPTED).all()
     read = read_orbit(problem, result.orbit, 2)
@@ -228,7 +228,7 @@ def polynomial_orbit(mesh, power):
     theta = bare.stage_phases
     nodes = np.stack([mesh[:-1] ** power, -mesh[:-1]])
     slopes = np.stack([power * theta ** (power - 1), -np.ones_like(theta)])
-    return bare.moved(nodes=nodes, slopes=slopes)
+    return bare._replace(nodes=nodes, slopes=slopes)
 
 
 THETA = np.sort(np.random.default_rng(7).uniform(0, 2 * np.pi, (40, 3)), axis=0)
@@ -279,7 +279,7 @@ def peaked_orbit(intervals):
     bare = Orbit(mesh, np.zeros((1, 3)), None, None, GAUSS)
     nodes = np.arctan((mesh[:-1] - 4) / 0.1)[None]
     slopes = (0.1 / ((bare.stage_phases - 4) ** 2 + 0.01))[None]
-    return bare.moved(nodes=nodes, slopes=slopes)
+    return bare._replace(nodes=nodes, slopes=slopes)
 
 
 def test_equidistributed_keeps_a_polynomial_orbit():
@@ -354,8 +354,8 @@ def test_newton_keeps_to_the_plane_of_its_guess():
         )
 
     mesh = graded_mesh(PARTS, 2, 0.3)
-    bare = Orbit.empty(GAUSS, 2, PARTS, 2).moved(mesh=mesh)
-    start = solve(line(np.zeros(2))[0], bare.moved(centre=np.asarray(system.steady())), 30).orbit
+    bare = Orbit.empty(GAUSS, 2, PARTS, 2)._replace(mesh=mesh)
+    start = solve(line(np.zeros(2))[0], bare._replace(centre=np.asarray(system.steady())), 30).orbit
     row = normal(2, PARTS, 2)
     result = solve_in_plane(line, start, np.full(2, 0.1), Plane(row, np.ones(2)), max_steps=20)
     assert (result.error < ACCEPTED).all()

@@ -247,7 +247,7 @@ def test_empty_bytes_behind_the_last_row_are_named(tmp_path, planted):
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("", "must hold a recording"),
+        ("", "must hold data"),
         ("Time (s),Load (N)\n", "must hold a table of numbers"),
         ("once upon a time\nthere was a slider\n", "must hold a table of numbers"),
     ],

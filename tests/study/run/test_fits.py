@@ -152,7 +152,7 @@ def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_t
         ("", "fit must be given where solve is 'fit'"),
         ("[fit]\nfree = ['B']", r"fit\.data must name a table of readings"),
         ("[fit]\nfree = ['Bee']\ndata = 'a.csv'", r"fit\.free must be a known name, got 'Bee'"),
-        ("[fit]\nfree = ['B']\ndata = 'b.csv'", "must be a readable table, got .*b.csv"),
+        ("[fit]\nfree = ['B']\ndata = 'b.csv'", "must be a CSV that can be read, got .*b.csv"),
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\nprior = { A = { mean = 1, std = 1 } }",
          r"fit\.prior must be of free parameters, got 'A'"),
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\nstart = 3", "did you mean 'starts'"),

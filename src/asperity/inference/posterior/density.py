@@ -117,8 +117,10 @@ class PriorDensity:
                 log_norm -= math.log(ndtr(z[1]) - ndtr(z[0]))
                 log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
                 log_norm += 0.0 if k.logarithmic else math.log(k.scale)
+        low, high = np.array(ranges).reshape(-1, 2).T
         coordinates = Coordinates(
-            *np.array(ranges).reshape(-1, 2).T,
+            low,
+            high,
             np.array([k.logarithmic for k in unknowns]),
             np.array([k.scale for k in unknowns]),
             np.array([k.prior.mean if k.prior else 0.0 for k in unknowns]),

@@ -7,8 +7,8 @@ lost is what changes within a block. Blocks are therefore as short as the change
 each change of the drive need: the difference of the two halves of a block (a Haar coefficient) is
 compared there with its scatter elsewhere.
 
-Mains and other lines come down as lines of other frequencies, which the autoregression of the noise
-describes as it does those of short recordings.
+Mains and other lines far above the blocks' rate would come down as lines of other frequencies. They
+are taken off before, piece by piece, since mains wander.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from scipy.special import chdtrc
 
 from asperity.errors import InputError
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
+from asperity.recording.defects.lines import find_lines, take_off
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -42,6 +43,9 @@ _AFTER = (1, 2, 4, 8, 16, 32)
 _CHANCE, _LEFT_OUT, _LEVELS = 1e-4, 0.02, 64
 #: A block whose samples do not cover it, by this share, is left out.
 _GAP = 0.05
+#: Least frequency of a line (Hz), and pieces of the drive during a period of it, at most: it may be
+#: the modulation otherwise.
+_LOWEST, _PIECES_PER_PERIOD = 5.0, 0.1
 
 
 def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
@@ -75,18 +79,20 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
         _require_blocks(run, length)
         if all(q == 1 for q in _counts(run, length)):
             return run
+    clean, lines = _without_lines(run)
     doubts = list(run.doubts)
     if length is None:
-        length, complete = _needed(run)
+        length, complete = _needed(clean)
         if not complete:
             doubts.append(
                 f"friction changes within the blocks of {1e3 * length:.3g} ms that it is averaged "
                 "over: the intervals hold, and shorter blocks would narrow them; give a higher "
                 "rate or a shorter window"
             )
-    short = averaged(run, length)
-    # Without blocks every sample is needed.
-    return run if short.blocks is None else replace(short, doubts=tuple(doubts))
+    short = averaged(clean, length)
+    if short.blocks is None:
+        return run  # every sample is needed
+    return replace(short, doubts=tuple(doubts), blocks=replace(short.blocks, lines=lines))
 
 
 def _require_blocks(run: RecordedRun, length: float) -> None:
@@ -249,3 +255,17 @@ def _within(run: RecordedRun, length: float) -> float:
         if chdtrc(max(count, 1), total) < _CHANCE:
             best = max(best, total - count)
     return best
+
+
+def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
+    """The recording without lines of the mains and the like, and their frequencies (Hz)."""
+    pieces = np.sort(np.diff(run.drive.edges))
+    typical = float(pieces[np.searchsorted(np.cumsum(pieces), pieces.sum() / 2)])
+    lowest = max(_LOWEST, 1 / (_PIECES_PER_PERIOD * typical))
+    friction = run.friction.copy()
+    taken: list[float] = []
+    for (a, b), step in zip(run.stretches, _intervals(run), strict=True):
+        for hertz in find_lines(friction[a:b], step, lowest):
+            take_off(friction[a:b], hertz * step)
+            taken.append(hertz)
+    return (replace(run, friction=friction) if taken else run), tuple(sorted(taken))

@@ -58,21 +58,26 @@ class Blocks:
         Samples in a block, of each stretch of one sampling rate.
     recorded : int
         Samples of the recording.
+    lines : tuple of float
+        Lines (Hz) that were taken off the friction before.
     """
 
     edges: Float
     samples: tuple[int, ...]
     recorded: int
+    lines: tuple[float, ...] = ()
 
     @property
     def sentence(self) -> str:
         """What was averaged, for readers."""
         lengths = np.unique(np.round(np.diff(self.edges, axis=1)[:, 0], 9))
         spread = [f"{1e3 * x:.4g}" for x in (lengths[0], lengths[-1])]
+        lines = ", ".join(f"{hertz:.4g}" for hertz in self.lines)
         return (
             f"{self.recorded} samples are compared as {len(self.edges)} means over blocks of "
             + (" or ".join(map(str, sorted(set(self.samples)))))
             + f" ({' to '.join(dict.fromkeys(spread))} ms)"
+            + (f", after lines at {lines} Hz were taken off" if lines else "")
         )
 
 

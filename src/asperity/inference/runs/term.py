@@ -128,6 +128,7 @@ class RunTerm(DataTerm):
             "effective_samples": round(
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
+            "lines_removed": [] if self.run.blocks is None else list(self.run.blocks.lines),
             "outliers": list(self.run.spikes or ()),
             "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,

@@ -22,6 +22,7 @@ from asperity.errors import InputError
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
+from asperity.parameters.columns import readable
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_si
 
@@ -193,13 +194,8 @@ def read_table(
     path = Path(path)
     shown = name or path.name
     require_rereadable(path, "data")
-    try:
+    with readable(path, "data"):
         text = file_content(path).decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not text in UTF-8"
-        raise InputError(
-            f"data must be a readable table, got '{path}': {reason}; give a CSV file"
-        ) from None
     if path.suffix.lower() == ".json":
         return table_of(_given(_reading(shown, text), given), name=shown)
     texts = _cells(shown, text)
@@ -226,7 +222,7 @@ def read_table(
         n: _numbers(shown, n, column) for n, column in texts.items() if n not in _TEXTS
     }
     if _UNIT in texts and "W0" in columns:
-        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT])
+        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT].tolist())
     run = next((texts[n].tolist() for n in _RUN if n in texts), None)
     table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
     return replace(table, row_names=np.array([f"row {i + 1}" for i in np.flatnonzero(kept)]))

@@ -75,6 +75,25 @@ class StickSlipSeries:
         kept = clear & (doubt > 0) & (stick > 0)
         return of_campaign(stick[kept], drop[kept], doubt[kept])
 
+    def b_minus_a(self, healing: StickSlipHealing) -> tuple[tuple[float, float], str]:
+        """95 % interval of B - A, and the condition on which it holds, or why it does not.
+
+        The factors between growth and B - A are those of M V^2 < A D0 W0, at the fastest recording,
+        and K < (B - A) W0/(2 D0): together A > 2 K M V^2/((B - A) W0^2), which is no friction where
+        it exceeds the peak force.
+        """
+        none = float("nan"), float("nan")
+        if healing.reason:
+            return none, healing.reason
+        condition = "where K is below half of the critical stiffness and "
+        energy = self.mass(np.nan) * float(np.nanmax(self.column("V"), initial=-np.inf)) ** 2
+        if not np.isfinite(energy * self.W0):
+            return healing.b_minus_a, f"{condition}M V^2 < A D0 W0: M is not known"
+        least = 2 * self.K * energy / (healing.b_minus_a[1] * self.W0**2)
+        if least > np.nanmax(self.column("force_before"), initial=0.0):
+            return none, f"inertia counts: M V^2 < A D0 W0 would need A above {least:.2g}"
+        return healing.b_minus_a, f"{condition}A D0 above {energy / self.W0:.2g} m (M V^2/W0)"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StickSlipCampaign(Drawn):
@@ -123,7 +142,9 @@ class StickSlipCampaign(Drawn):
         for one in self.series:
             healing = one.healing()
             record = {"K": one.K, "W0": one.W0, **asdict(healing)}
-            records.append(record | {"b_minus_a_interval_95": healing.b_minus_a})
+            interval, condition = one.b_minus_a(healing)
+            record |= {"b_minus_a_interval_95": interval, "b_minus_a_condition": condition}
+            records.append(record)
         return records
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
@@ -139,9 +160,10 @@ class StickSlipCampaign(Drawn):
                 value = f"cannot tell: {healing.reason}"
             lines.append(SummaryLine(one.name, value, "drop per e-fold of stick time"))
             if not healing.reason:
-                low, high = healing.b_minus_a
-                meaning = "where K is below half of the critical stiffness, M V^2 < A D0 W0"
-                lines.append(SummaryLine("B - A", f"{low:.2g} to {high:.2g} (95 %)", meaning))
+                (low, high), condition = one.b_minus_a(healing)
+                value = f"{low:.2g} to {high:.2g} (95 %), {condition}"
+                value = f"cannot tell: {condition}" if np.isnan(low) else value
+                lines.append(SummaryLine("B - A", value))
         return f"StickSlipCampaign, {count} recordings", lines
 
 

@@ -284,7 +284,8 @@ def _tilt(force: Array, peak: Index, trough: Index) -> float:
     fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
     if peak.size < 2:
         return 0.0
-    rise = float(np.median((force[peak[1:]] - force[trough[:-1]]) / (peak[1:] - trough[:-1])))
+    wait = np.maximum(peak[1:] - trough[:-1], 1)
+    rise = float(np.median((force[peak[1:]] - force[trough[:-1]]) / wait))
     return max(np.sqrt(max(rise * fall, 0.0)) - rise, 0.0)
 
 

@@ -128,11 +128,11 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     for _ in range(_READINGS):
         if not len(falls):
             break
-        events, farther = _read(time, force, falls)
+        events, visible, farther = _read(time, force, falls)
         # What a line before and a line after do not confirm is a bend in the loading. Where lines
         # from farther off are nearer to no drop at all, impulses have tilted those next to the
         # fall. The others are read again without it.
-        real = (events.drop > least) & (farther > events.drop / 2)
+        real = (visible > least) & (farther > events.drop / 2)
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
@@ -140,8 +140,8 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     return events if len(falls) else SlipEvents(**none)
 
 
-def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array]:
-    """Events, and their drops by lines from farther off."""
+def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, Array]:
+    """Events, falls from the highest to the lowest force of each slip, drops by distant lines."""
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -162,17 +162,18 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array]:
         quarter = (peak[1:] - trough[:-1]) // 4
         _, _, rate[1:] = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
         rate[0] = rate[1]
-    bounds = peak, trough, first, stop, np.maximum(rate, 0.0)
+    bounds, rate = (peak, trough, first, stop), np.maximum(rate, 0.0)
     large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
     shape, shift = _shape(
         sums,
         large,
         [b[large] for b in bounds],
+        rate[large],
         drop[large],
         lambda samples: _of_mean(falls.scatter, samples) / drop[large],
     )
     parts = [
-        _onset_and_end(sums, part, *(b[part] for b in bounds), shape=shape)
+        _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
         for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
     ]
     onset, end, squares, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
@@ -188,7 +189,11 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array]:
     short = np.minimum(until - first, stop - since) < away
     (high, rise, *_), (low, other, *_) = sums.line(first, until), sums.line(since, stop)
     farther = high - low + (rise - other) * away / 4
-    return events, np.where(short, events.drop, farther)
+    u = np.linspace(0, 1, _BINS)
+    fall = events.drop[:, None] * shape.fall(u)
+    if shape.driven:
+        fall += (rate * (end - onset))[:, None] * (u - 1 + shape.fall(u))
+    return events, np.ptp(fall, axis=1), np.where(short, events.drop, farther)
 
 
 def _onset_and_end(
@@ -198,8 +203,8 @@ def _onset_and_end(
     trough: Index,
     first: Index,
     stop: Index,
-    rate: Array,
     *,
+    rate: Array,
     shape: _Shape,
 ) -> tuple[Array, Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in.
@@ -265,7 +270,8 @@ def _onset_and_end(
     # Within a bin the slip goes on, which its mean leaves over.
     change = np.gradient(model[rows, i, j], axis=1)
     binned = (weight[rows, i, j] * change**2).sum(1) / 12
-    excess = (squares - lines - binned) / inside - lines / outside
+    # Onset and end take two degrees of freedom.
+    excess = (squares - lines - binned - (inside - 2) * lines / outside) / inside
     return onset, end, squares / np.maximum(stop - first - 6, 1), excess
 
 
@@ -303,10 +309,12 @@ class _Shape:
     driven: bool = False
 
 
-#: How a slider slips on a spring: freely at constant friction, at a constant velocity, and damped.
+#: How a slider slips on a spring: freely at constant friction, without a drive, at a constant
+#: velocity, and damped.
 #: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
 _SHAPES = (
     _Shape(_half_cosine, 2.65, driven=True),
+    _Shape(_half_cosine, 2.65),
     _Shape(_straight, 2.0),
     _Shape(_relaxing, 4.97),
 )
@@ -318,7 +326,8 @@ _CLEAR = 3.0
 def _shape(
     sums: _Sums,
     part: Index,
-    bounds: list[Array],
+    bounds: list[Index],
+    rate: Array,
     drop: Array,
     noise: Callable[[Array], Array],
 ) -> tuple[_Shape, float]:
@@ -332,7 +341,7 @@ def _shape(
     any shape. A fall between two shapes, by a share x from one, has residuals in proportion to x of
     the one and to 1 - x of the other: x of the distance between their onsets is the error.
     """
-    fits = [_onset_and_end(sums, part, *bounds, shape=shape) for shape in _SHAPES]
+    fits = [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
     squares = np.array([fit[2] for fit in fits])
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
@@ -342,9 +351,10 @@ def _shape(
             chosen = k
     onset, end, *_ = fits[chosen]
     misfit = np.array([_root(fit[3] / drop**2) for fit in fits])
+    misfit = np.maximum(misfit, np.finfo(float).tiny)
     away = [
         misfit[chosen]
-        / max(misfit[chosen] + misfit[k], 1e-300)
+        / (misfit[chosen] + misfit[k])
         * max(abs(float(np.median((fit[n] - fits[chosen][n]) / (end - onset)))) for n in (0, 1))
         for k, fit in enumerate(fits)
         if k != chosen

@@ -25,7 +25,6 @@ from asperity._jax import jit_large
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.batches import mesh_chunk, run_chunks
-from asperity.orbit.floquet import sorted_logs
 from asperity.orbit.gradient.parametrised import (
     Parameters,
     ParametrisedProblem,
@@ -288,16 +287,10 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
 _IDLE = 600
 
 
-def sorted_multipliers(orbits: MeshOrbits) -> NDArray[np.complex128]:
-    """Logarithms of the multipliers as differentiable responses sort them, (states, points)."""
-    logs = orbits.log_multipliers
-    return np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
-
-
 def values_of(orbits: MeshOrbits, *, multipliers: bool) -> ResponseValues:
     """Response of converged orbits, NumPy arrays."""
     points = len(orbits.mean_friction)
-    logs = sorted_multipliers(orbits) if multipliers else np.zeros((0, points), complex)
+    logs = orbits.log_multipliers if multipliers else np.zeros((0, points), complex)
     outcome = np.full(points, int(Outcome.CONVERGED))
     return ResponseValues(orbits.mean_friction, orbits.harmonics.T, logs.T, outcome)
 
@@ -312,7 +305,7 @@ def derivatives_of(
 ) -> Float:
     """`orbit_derivatives` at the points of `parameters`, in chunks of a fixed size."""
     problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    logs = sorted_multipliers(orbits) if multipliers else None
+    logs = orbits.log_multipliers if multipliers else None
     everyone = np.arange(len(orbits.mean_friction))
     count = len(orbits.harmonics)
 

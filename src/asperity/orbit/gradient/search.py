@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
-from asperity.orbit.floquet import AGREEMENT
+from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
@@ -57,7 +57,8 @@ class MeshOrbits(NamedTuple):
     mean_friction : array, shape (points,)
     harmonics : complex array, shape (count, points)
     log_multipliers : complex array, shape (states, points)
-        Without states after a direct search, which does not resolve them.
+        As `sorted_logs` sorts them; without states after a direct search, which does not resolve
+        them.
     """
 
     orbit: Orbit
@@ -238,6 +239,7 @@ def search_orbits(
         rows = np.flatnonzero(solved)
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
+            logs = np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
             result.add(index[some], orbits._replace(log_multipliers=logs))
         return result
 
@@ -271,6 +273,11 @@ def search_orbits(
 def _idle(_: int) -> None:
     """No report of progress."""
 
+
+# Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses
+# that move along the period with every parameter: Newton's method from a smooth guess does not find
+# them, and continuation takes seconds. The motion itself settles on them in a few periods, if they
+# are stable, as all are that can be measured.
 
 #: Number of periods of a transient, and the largest number of its steps.
 _PERIODS, _MOST_STEPS = 6, 2000

@@ -322,13 +322,3 @@ def quadrature(orbit: Orbit) -> Array:
 def split_observables(problem: Problem, orbit: Orbit, parts: int) -> Observables:
     """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""
     return read_orbit(problem, split(orbit, parts), 1)
-
-
-def piece_map(problem: Problem, piece: Orbit, parts: int) -> tuple[Float, Float]:
-    """Transfer map (n, n, points) over a piece of an orbit, and the logarithm of its scale.
-
-    From maps over the parts that each interval of the piece is cut into.
-    """
-    fine = split(piece, parts)
-    equations = condensed(problem, fine)
-    return scaled_product(transfer_maps(equations.response, fine.widths, fine.scheme.b))

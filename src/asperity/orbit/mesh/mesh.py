@@ -76,18 +76,6 @@ class Orbit(NamedTuple):
         apart, _ = evaluate(self, theta * np.ones(self.centre.shape[1]))
         return self.centre[:, None] + apart
 
-    def piece(self, start: int, stop: int) -> Orbit:
-        """The intervals from `start` to before `stop`."""
-        return self._replace(
-            mesh=self.mesh[start : stop + 1],
-            nodes=self.nodes[:, start:stop],
-            slopes=self.slopes[:, :, start:stop],
-        )
-
-    def moved(self, **parts: Array) -> Orbit:
-        """A copy with the arrays `parts` replaced."""
-        return self._replace(**parts)
-
     @property
     def widths(self) -> Array:
         """Interval widths, shape (intervals, points)."""
@@ -151,12 +139,12 @@ def evaluate(orbit: Orbit, theta: Float) -> tuple[Float, Float]:
 
 def on_mesh(orbit: Orbit, mesh: Float) -> Orbit:
     """The same orbit represented on another mesh."""
-    bare = orbit.moved(mesh=mesh)
+    bare = orbit._replace(mesh=mesh)
     phases = np.concatenate([mesh[None, :-1], bare.stage_phases])
     states, slopes = evaluate(orbit, phases.reshape(-1, phases.shape[-1]))
     count, size = len(mesh) - 1, states.shape[0]
     stages = slopes[:, count:].reshape(size, -1, count, phases.shape[-1])
-    return bare.moved(nodes=states[:, :count], slopes=stages)
+    return bare._replace(nodes=states[:, :count], slopes=stages)
 
 
 def split(orbit: Orbit, parts: int) -> Orbit:

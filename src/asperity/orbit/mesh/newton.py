@@ -205,7 +205,7 @@ def moved(orbit: Orbit, t: Float, change: Change, length: Float) -> tuple[Orbit,
     nodes = orbit.nodes + length * change.nodes
     centre = orbit.centre + nodes[:, 0]
     slopes = orbit.slopes + length * change.slopes
-    return orbit.moved(centre=centre, nodes=nodes - nodes[:, :1], slopes=slopes), (
+    return orbit._replace(centre=centre, nodes=nodes - nodes[:, :1], slopes=slopes), (
         t + length * change.t
     )
 

@@ -321,6 +321,13 @@ ACCEPTED = 1e-5
 _NARROWEST = 0.3
 
 
+# Under slow modulation the orbit follows an unstable state of sliding for part of the period and
+# leaves it in a jump (a canard). Along the branch the jump moves through the period, while the
+# parameter hardly changes. At a fixed phase the states then change strongly; at a fixed interval of
+# a mesh that moves with the orbit they hardly change. The prediction therefore extrapolates the
+# states and the phases of each interval from the last two points.
+
+
 class PointPair(NamedTuple):
     """Two successive points of a branch, the first without its tangent."""
 
@@ -366,7 +373,7 @@ def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
     mesh[-1] = 2 * np.pi
     rises = now.slopes * now.widths
     rises = rises + ratio * (rises - before.slopes * before.widths)
-    return now.moved(
+    return now._replace(
         mesh=mesh,
         centre=now.centre + ratio * (now.centre - before.centre),
         nodes=now.nodes + ratio * (now.nodes - before.nodes),

@@ -211,7 +211,7 @@ def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
     size, points = centre.shape
     bare = Orbit.empty(GAUSS, size, FIRST_MESH, points)
     mesh = graded_mesh(FIRST_MESH, points, _GRADING)
-    guess = bare.moved(mesh=mesh, centre=centre)
+    guess = bare._replace(mesh=mesh, centre=centre)
     result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS)
     if not isinstance(system, QuasiStatic):
         result = solve(problem, inertial_guess(problem, result.orbit), _NEWTON_STEPS)

@@ -7,6 +7,11 @@
 The determinant of the monodromy matrix is compared with Liouville's formula, a quadrature that
 does not use the integrated derivatives. Points that fail a check are left to other methods.
 
+States and their derivatives to the first states are integrated by the explicit method of order 8
+of Dormand and Prince, all operating points in lock step and without step-size control: E. Hairer,
+S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (Springer, 1993),
+section II.5. The derivatives at the end of the period are the monodromy matrix.
+
 The initial guess is the averaged limit of a slider that swings on its asperities. While the joint
 sticks, spring force f and slider obey
 

@@ -144,7 +144,7 @@ def _with_content(file: Path) -> Path:
     if file.stat().st_size == 0:
         raise InputError(
             "recording.path",
-            "hold a recording",
+            "hold data",
             f"'{file.name}', which is empty",
             "copy it again from where it was recorded",
         )

@@ -23,6 +23,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import one_of
+from asperity.parameters.columns import readable
 from asperity.parameters.toml_file import file_content
 from asperity.questions.sweep import FitTable, Sweep
 from asperity.study.outcome import Answers, SweepOutcome
@@ -209,12 +210,8 @@ def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, O
 
 
 def _digest(path: Path) -> str:
-    try:
+    with readable(path, "data"):
         return hashlib.sha256(file_content(path)).hexdigest()
-    except OSError as error:
-        raise InputError(
-            f"data must be a readable table, got '{path}': {error.strerror}; give a CSV file"
-        ) from None
 
 
 @lru_cache(maxsize=256)
