@@ -505,8 +505,8 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
         which = (
             f"{nearest}, the nearest of them, has an AICc" if by_likelihood[1:] else "its AICc is"
         )
-        behind = judged[nearest].fit.aicc - judged[best].fit.aicc
-        parts.append(f"{which} {behind:.3g} above that of {best}, and {EXCLUDED:g} excludes")
+        gap = judged[nearest].fit.aicc - judged[best].fit.aicc
+        parts.append(f"{which} {gap:.3g} above that of {best}, and {EXCLUDED:g} excludes")
     if unknown:
         parts.append(f"{_listed(unknown)} cannot be judged: no fit converged")
     if describes and len(left) > 1:
