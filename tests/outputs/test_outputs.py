@@ -57,6 +57,14 @@ def test_what_is_no_file_is_refused(tmp_path: Path, made) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("made", [a_folder, a_pipe])
+@pytest.mark.parametrize("beside", ["out.csv.partial", "out.csv.partial.json", "out.new.csv"])
+def test_what_is_in_the_way_beside_it_is_refused(tmp_path: Path, made, beside: str) -> None:
+    made(tmp_path / beside)
+    with pytest.raises(InputError, match=f"leave room for '{beside}'"):
+        output_file(tmp_path / "out.csv", "--out")
+
+
 @pytest.mark.parametrize(
     "path", ["", ".", "..", "/", "a\0b", "x" * 300, "no/out.csv", "file/out.csv", "out/", "\ud800"]
 )

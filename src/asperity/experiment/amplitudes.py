@@ -92,13 +92,9 @@ class AmplitudeSeries:
         import xarray
 
         rows = [_row(point) for point in self.points]
-        data: dict[str, Any] = {
-            name: (
-                "epsilon",
-                [row[name] for row in rows],
-                {"units": "rad" if "phase" in name else "1"},
-            )
-            for name in rows[0]
+        data = {
+            name: ("epsilon", np.array([row[name] for row in rows]), {"units": unit})
+            for name, unit in _UNITS.items()
             if all(name in row for row in rows)
         }
         data["verdict"] = ("epsilon", np.array([p.measurement.verdict for p in self.points]), {})
@@ -111,6 +107,25 @@ class AmplitudeSeries:
             "simulated": "yes",
         }
         return xarray.Dataset(data, {"epsilon": ("epsilon", epsilon, about)}, attributes)
+
+
+_UNITS = {
+    "measured_epsilon": "1",
+    "mean_friction": "1",
+    "mean_friction_uncertainty": "1",
+    "static_friction": "1",
+    "delta_mu": "1",
+    "delta_mu_uncertainty": "1",
+    "mu1": "1",
+    "mu1_uncertainty": "1",
+    "phase1": "rad",
+    "phase1_uncertainty": "rad",
+    "mu2": "1",
+    "mu2_uncertainty": "1",
+    "phase2": "rad",
+    "phase2_uncertainty": "rad",
+    "drift": "1",
+}
 
 
 def _row(point: AmplitudePoint) -> dict[str, float]:

@@ -131,17 +131,23 @@ def output_file(
     Raises
     ------
     InputError
-        If the path is a folder, a pipe or a device, if its folder does not exist or cannot be
-        written, or if it is one of the inputs.
+        If the path, or a temporary file next to it, is a
+        folder, a pipe or a device, if its folder does not exist or cannot be written, or if it
+        is one of the inputs.
     """
     target = _resolved(path, name, example)
-    kind = not_a_file(target)
-    if kind:
-        raise InputError(
-            f"{name} must be the name of a file, got '{path}', which is {kind}; "
-            f"add a file name such as '{example}'"
-        )
-    require_short(target, [fresh_name(record_name(target))], name)
+    files = (target, *_temporary_files(target))
+    require_short(target, files, name)
+    for file in files:
+        kind = not_a_file(file)
+        if kind:
+            raise InputError(
+                f"{name} must be the name of a file, got '{path}', which is {kind}; "
+                f"add a file name such as '{example}'"
+                if file == target
+                else f"{name} must leave room for '{file.name}' next to it, got '{path}', where "
+                f"that is {kind}; choose another name, or move what is there"
+            )
     folder = target.parent
     if not folder.is_dir():
         raise InputError(
@@ -213,6 +219,15 @@ def _resolved(path: str | os.PathLike[str], name: str, example: str) -> Path:
             f"write it like '{example}'"
         ) from None
     return target
+
+
+def _temporary_files(target: Path) -> tuple[Path, ...]:
+    """Files that may be written next to the target until it is complete."""
+    if not target.name:
+        return ()
+    partial = unfinished_name(target)
+    record = record_name(target)
+    return partial, record, fresh_name(record), fresh_name(target)
 
 
 def require_short(target: Path, files: Iterable[Path], name: str = "out") -> None:
