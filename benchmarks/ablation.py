@@ -68,9 +68,10 @@ STAGES = (
     Stage("branch following", _finished_by("branch following"), _without("branch following")),
     Stage(
         f"the same on {MESHES[1].intervals} intervals",
-        _finished_by("branch following"),
+        _finished_by("branch following", "frequency path"),
         _coarse_branches(),
     ),
+    Stage("frequency path", _finished_by("frequency path"), _without("frequency path")),
     Stage(
         f"refinement to {collocation.MESHES[-1]} intervals",
         lambda s: s.converged & (s.iterations == collocation.MESHES[-1]),

@@ -27,6 +27,7 @@ from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following import BranchFollowing
 from asperity.orbit.methods.collocation import Collocation
 from asperity.orbit.methods.fourier import Fourier
+from asperity.orbit.methods.frequency_path import FrequencyPath
 from asperity.orbit.methods.series import FourierSeries
 from asperity.orbit.methods.shooting import Shooting
 from asperity.orbit.outcome import (
@@ -78,6 +79,7 @@ METHODS: tuple[Method, ...] = (
     FourierSeries(),
     Collocation(),
     BranchFollowing(),
+    FrequencyPath(),
 )
 
 #: Names that a user may choose.

@@ -43,19 +43,25 @@ class SteadySliding(NamedTuple):
     unloading: Array
 
 
+def perturbation_rate(problem: Problem) -> Array:
+    """Largest rate per radian of a perturbation of steady sliding, mass and damping included."""
+    system, points = problem.system, points_of(problem)
+    steady = jnp.broadcast_to(system.steady(), (system.size, points))
+    at = Excitation(jnp.ones(points))
+    _, columns = jacobian_columns(lambda Y: system.rates(Y, at), steady)
+    return spectral_radius(jnp.stack(columns, axis=1))
+
+
 def steady_sliding_of(problem: Problem) -> SteadySliding:
     """`steady_sliding` of arrays of any length, within a compiled program too."""
     system, load = problem
     sliding = QuasiStatic(system.slider, system.V, system.omega)
     points = points_of(problem)
-    steady = jnp.broadcast_to(sliding.steady(), (sliding.size, points))
-    at = Excitation(jnp.ones(points))
-    _, columns = jacobian_columns(lambda Y: sliding.rates(Y, at), steady)
     harmonic = isinstance(load, Harmonic)
     cycle = load.at(even_phases(2 if harmonic else _PHASES) * jnp.ones(points))
     unloading = jnp.abs(load.epsilon) if harmonic else 1 - jnp.min(cycle.w, axis=0)
     return SteadySliding(
-        spectral_radius(jnp.stack(columns, axis=1)),
+        perturbation_rate(Problem(sliding, load)),
         slip_pulse(sliding, cycle).sharpness,
         unloading * jnp.ones(points),
     )
