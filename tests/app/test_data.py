@@ -7,6 +7,7 @@ import shlex
 import zipfile
 from pathlib import Path
 from statistics import NormalDist
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -619,7 +620,7 @@ def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, bar
     field = page.locator(".by-hand").get_by_label("memory length, with its unit")
     field.fill("0.5 um")
     field.press("Enter")
-    page.wait_for_url(lambda url: "5e-7" in url)
+    page.wait_for_url(lambda url: '"D0":5e-7' in unquote(url))
     again = visit("#" + page.url.split("#", 1)[1])
     again.locator(".by-hand .plot svg").wait_for()
     values = "(all) => all.map((e) => e.type === 'checkbox' ? e.checked : e.value)"

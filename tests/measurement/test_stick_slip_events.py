@@ -168,15 +168,19 @@ def test_a_real_recording_of_paper_on_paper() -> None:
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_onsets_are_as_certain_as_they_say(correlation) -> None:
-    # Long slips: a bin of the search has twelve samples, the onset is known to less than one.
-    truth = saw(5, events=120, cycle=1500, slip=150, noise=0.02, correlation=correlation)
-    _, events = read(truth.force)
-    true, found = matched(truth, events, 0.05)
-    z = (events.onset[found] - truth.onset[true]) / events.timing_uncertainty[found]
-    assert np.mean(np.abs(z) < 1.96) > 0.9
+    # Long slips: a bin of the search has twelve samples, the onset is known to less than one. What
+    # is open of the shape is one error for all slips of a recording: several recordings count.
+    scores, late = [], []
+    for seed in range(5, 11):
+        truth = saw(seed, events=40, cycle=1500, slip=150, noise=0.02, correlation=correlation)
+        _, events = read(truth.force)
+        true, found = matched(truth, events, 0.05)
+        late.append(events.onset[found] - truth.onset[true])
+        scores.append(late[-1] / events.timing_uncertainty[found])
+    assert np.mean(np.abs(np.concatenate(scores)) < 1.96) > 0.9
     # Fisher's information of onset, end and both lines, in white noise: 0.74 samples.
     if not correlation:
-        assert np.std(events.onset[found] - truth.onset[true]) < 1.3 * 0.74 / 2000
+        assert np.std(np.concatenate(late)) < 1.3 * 0.74 / 2000
 
 
 FALLS = {
