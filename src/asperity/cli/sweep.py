@@ -144,8 +144,9 @@ def run(
             f"interrupted with {done} solved; chunks that are done stay in the store, and the "
             "same command goes on from there"
         ) from None
+    counts = ("points", "failed", "solved", "seconds", "memory", "lost")
     output.answer(
-        lambda: {**vars(result), "out": str(result.out)},
+        lambda: {**{name: getattr(result, name) for name in counts}, "out": str(result.out)},
         lambda: _section(
             ("points", f"{result.points:,}"),
             ("failed", f"{result.failed:,}"),

@@ -64,7 +64,9 @@ class Whole:
     def __init__(self, folder: Path) -> None:
         self.plan, self.store = folder / "plan.toml", folder / "whole.zarr"
         self.plan.write_text(PLAN, encoding="utf-8")
-        call("sweep", self.plan, "--out", self.store)
+        made = json.loads(call("sweep", self.plan, "--out", self.store, "--json").stdout)
+        assert [*made] == ["points", "failed", "solved", "seconds", "memory", "lost", "out"]
+        assert made["points"] == made["solved"] == POINTS
         self.content = content_of(self.store, True)
         assert content_of(self.store, False) == self.content
         self.files = sorted(
