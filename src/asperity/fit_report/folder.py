@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from asperity._version import __version__
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.fit_report.bands import bands_of
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, Posterior
@@ -87,10 +87,8 @@ def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> 
     InputError
         If the fit has not converged, or the folder cannot be written.
     """
-    if not fit.converged:
-        raise InputError(
-            f"fit must have converged for a report, got '{fit.message}'; correct that first"
-        )
+    rule = "have converged for a report"
+    require(fit.converged, "fit", rule, f"'{fit.message}'", "correct that first")
     with written_folder(folder, "report") as staging:
         more = {"posterior": posterior.record()} if posterior else {}
         record = json.dumps({**fit_record(fit), **more}, indent=2)

@@ -12,7 +12,7 @@ from numbers import Real
 from types import ModuleType
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
 from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind, Uncertainty
 from asperity.ledger.sentences import fill
@@ -68,11 +68,8 @@ def find_checks(module: ModuleType) -> dict[str, Check]:
             if getattr(value, "__module__", None) != part.__name__:
                 continue  # imported, not defined, in this module
             for claim, arguments in getattr(value, _MARK, ()):
-                if claim in checks:
-                    raise InputError(
-                        f"checks.{claim} must be computed by one function, got two; "
-                        "remove one of the marks"
-                    )
+                rule, advice = "be computed by one function", "remove one of the marks"
+                require(claim not in checks, f"checks.{claim}", rule, "two", advice)
                 checks[claim] = _bound(value, arguments)
     return checks
 
@@ -206,24 +203,18 @@ def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Clai
 def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
     """The computed numbers that the rule of the entry judges, in the order of the check."""
     if not isinstance(computed, Mapping):
-        raise InputError(
-            f"the check of '{entry.id}' must be a function that returns numbers by name, got "
-            f"{shown(computed)}; return {{'name': number}}"
-        )
+        rule, got = "be a function that returns numbers by name", shown(computed)
+        raise InputError(f"the check of '{entry.id}'", rule, got, "return {'name': number}")
     for name, value in computed.items():
         if not isinstance(value, str) and not (isinstance(value, Real) and math.isfinite(value)):
-            raise InputError(
-                f"checks must compute finite numbers, got {value!r} for '{name}' of "
-                f"'{entry.id}'; correct the check"
-            )
+            got = f"{value!r} for '{name}' of '{entry.id}'"
+            raise InputError("checks", "compute finite numbers", got, "correct the check")
     numbers = {name: float(v) for name, v in computed.items() if not isinstance(v, str)}
     patterns = entry.judged or (_FORMULA if entry.rule.is_formula else ("*",))
     for pattern in entry.judged:
         if not any(fnmatchcase(name, pattern) for name in numbers):
-            raise InputError(
-                f"{entry.id}.judged must name numbers of its check, got '{pattern}'; "
-                f"{closest(pattern, numbers)}"
-            )
+            rule = "name numbers of its check"
+            raise InputError(f"{entry.id}.judged", rule, f"'{pattern}'", closest(pattern, numbers))
     return {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)}
 
 
@@ -378,15 +369,11 @@ def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
 def _check_pairs(entries: Sequence[Entry], checks: Mapping[str, Check]) -> None:
     ids = {entry.id for entry in entries}
     for name in sorted(ids - set(checks)):
-        raise InputError(
-            f"checks must compute every claim of claims.toml, got none for '{name}'; "
-            f'mark a function with @check("{name}")'
-        )
+        rule, got = "compute every claim of claims.toml", f"none for '{name}'"
+        raise InputError("checks", rule, got, f'mark a function with @check("{name}")')
     for name in sorted(set(checks) - ids):
-        raise InputError(
-            f"claims.toml must hold every claim that is computed, got none for '{name}'; "
-            "add [[claim]] with that id"
-        )
+        rule = "hold every claim that is computed"
+        raise InputError("claims.toml", rule, f"none for '{name}'", "add [[claim]] with that id")
 
 
 Standing: TypeAlias = Literal["holds", "holds at the central values", "undecided", "does not hold"]

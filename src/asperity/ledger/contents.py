@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import Field
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
 from asperity.ledger.sentences import names_in
 from asperity.parameters.toml_file import parsed_toml
@@ -53,18 +53,16 @@ class RuleWords(Record):
             If the rule is unknown or a number of it is missing or unknown.
         """
         if self.accept not in rules.RULES:
-            raise InputError(
-                f"{claim}.rule.accept must be a rule of the ledger, got '{self.accept}'; "
-                f"{closest(self.accept, (*rules.RULES, 'formula', 'undecided'))}"
-            )
+            rule = "be a rule of the ledger"
+            advice = closest(self.accept, (*rules.RULES, "formula", "undecided"))
+            raise InputError(f"{claim}.rule.accept", rule, f"'{self.accept}'", advice)
         make, names = rules.RULES[self.accept]
         values = []
         for name in names:
             value = getattr(self, name)
             if value is None:
-                raise InputError(
-                    f"{claim}.rule.{name} must be given for '{self.accept}', got nothing; add it"
-                )
+                rule = f"be given for '{self.accept}'"
+                raise InputError(f"{claim}.rule.{name}", rule, "nothing", "add it")
             values.append(rules.number(value, numbers, f"{claim}.rule.{name}"))
         return make(*values, self.what)
 
@@ -228,8 +226,8 @@ def read_contents(file: Traversable) -> Contents:
 def _check_names(contents: Contents, file: str) -> None:
     ids = [entry.id for entry in contents.claim]
     for name in ids:
-        if ids.count(name) > 1:
-            raise InputError(f"{file}: claim.id must be unique, got '{name}' twice; rename one")
+        got = f"'{name}' twice"
+        require(ids.count(name) <= 1, f"{file}: claim.id", "be unique", got, "rename one")
     quantities = {u.quantity for u in contents.uncertainty}
     references = [
         *((f"{e.id}.depends_on", "an uncertainty", e.depends_on, quantities)
@@ -241,7 +239,5 @@ def _check_names(contents: Contents, file: str) -> None:
     ]  # fmt: skip
     for where, what, names, known in references:
         for name in (name for name in names if name not in known):
-            raise InputError(
-                f"{file}: {where} must name {what} of the file, got '{name}'; "
-                f"{closest(name, known)}"
-            )
+            rule = f"name {what} of the file"
+            raise InputError(f"{file}: {where}", rule, f"'{name}'", closest(name, known))

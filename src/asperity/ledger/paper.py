@@ -30,7 +30,7 @@ from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
 from asperity import materials
-from asperity.errors import InputError, closest, code_of_others
+from asperity.errors import InputError, closest, code_of_others, require
 from asperity.ledger.claims import (
     Claim,
     Headline,
@@ -158,10 +158,8 @@ class Paper:
             return
         figures = getattr(module, "FIGURES", None)
         if not isinstance(figures, Sequence) or not all(callable(f) for f in figures):
-            raise InputError(
-                f"{where} must have FIGURES, a tuple of functions, or sections, got "
-                f"{shown(figures)}; write FIGURES = (first_figure,)"
-            )
+            rule = "have FIGURES, a tuple of functions, or sections"
+            raise InputError(where, rule, shown(figures), "write FIGURES = (first_figure,)")
         yield (_guarded_section(Section("figures", "Figures", tuple(figures)), where),)
 
 
@@ -170,10 +168,9 @@ def available() -> dict[str, str]:
     papers: dict[str, str] = {}
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         if papers.setdefault(point.name, point.value) != point.value:
-            raise InputError(
-                f"paper must have a name that no other has, got '{point.name}' of {point.value} "
-                f"and of {papers[point.name]}; rename one of the entry points"
-            )
+            rule = "have a name that no other has"
+            got = f"'{point.name}' of {point.value} and of {papers[point.name]}"
+            raise InputError("paper", rule, got, "rename one of the entry points")
     return papers
 
 
@@ -186,18 +183,13 @@ def find_paper(name: str | None = None) -> Paper:
         If there is no such paper, or no paper is installed.
     """
     papers = available()
-    if not papers:
-        raise InputError(
-            f"a paper must be installed, got no entry point of the group {GROUP}; install asperity "
-            "again, which brings its papers along"
-        )
+    advice = "install asperity again, which brings its papers along"
+    require(papers, "a paper", "be installed", f"no entry point of the group {GROUP}", advice)
     if name is None:
         name = next(iter(papers))
     if name not in papers:
-        raise InputError(
-            f"paper must be one of the papers that are installed, got '{name}'; "
-            f"{closest(name, papers)}"
-        )
+        rule = "be one of the papers that are installed"
+        raise InputError("paper", rule, f"'{name}'", closest(name, papers))
     return Paper(name, papers[name])
 
 

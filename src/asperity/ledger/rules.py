@@ -168,7 +168,5 @@ def number(value: float | str, numbers: Mapping[str, float], place: str) -> floa
         return WORDS[value]
     if value in numbers:
         return numbers[value]
-    raise InputError(
-        f"{place} must be a number, a word of the rules or one of the paper's numbers, got "
-        f"'{value}'; {closest(value, {**WORDS, **numbers})}"
-    )
+    rule = "be a number, a word of the rules or one of the paper's numbers"
+    raise InputError(place, rule, f"'{value}'", closest(value, {**WORDS, **numbers}))
