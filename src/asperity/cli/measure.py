@@ -278,9 +278,9 @@ def measure(
 
 
 def _amplitudes(recording: Path, source: Source, question: Question, output: Output) -> int:
-    from asperity.cli.measurement_text import amplitude_sections
     from asperity.measurement.campaign import modulated_rows
     from asperity.measurement.from_file import modulated_parts
+    from asperity.measurement.report import amplitude_sections
     from asperity.recording.readers.from_file import read_source
 
     rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
@@ -295,9 +295,9 @@ def _one(
     recording: Path, source: Source, question: Question, events: Path | None, output: Output
 ) -> int:
     from asperity._version import __version__
-    from asperity.cli.measurement_text import measured_sections
     from asperity.measurement.from_file import answer_measurement
     from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.report import measured_sections
     from asperity.measurement.stick_slip import catalogue
     from asperity.outputs import output_files
     from asperity.recording.readers.from_file import read_source
@@ -408,9 +408,9 @@ def _campaign(
 ) -> int:
     import os
 
-    from asperity.cli.measurement_text import healing_section
     from asperity.cli.progress import bar
     from asperity.measurement.campaign import run_campaign
+    from asperity.measurement.report import healing_section
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
     from asperity.measurement.stick_slip.threshold import write_thresholds
