@@ -203,9 +203,8 @@ def read_words(file: Traversable, kind: type[Words]) -> Words:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            str(file), "be a readable text", type(error).__name__, "write the words there"
-        ) from None
+        rule = "be a readable text"
+        raise InputError(str(file), rule, type(error).__name__, "write the words there") from None
     return kind.of_content(parsed_toml(text, file.name, f"'{file}'"), str(file))
 
 
