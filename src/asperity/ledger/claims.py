@@ -314,18 +314,35 @@ def judge_claims(
     central = model(numbers)
     claims = []
     for entry in contents.claim:
-        claims.append(judge(entry, checks[entry.id](central), stated))
+        claims.append(judge(entry, computed_numbers(entry, checks, central, numbers), stated))
         report(1)
     if not sensitivity:
         return claims
     varied: dict[str, list[Sensitivity]] = {entry.id: [] for entry in contents.claim}
     for uncertainty in contents.uncertainty:
         resting = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
-        ends = [model(altered(numbers, end)) for end in (uncertainty.low, uncertainty.high)]
+        ends = [altered(numbers, end) for end in (uncertainty.low, uncertainty.high)]
+        models = [model(end) for end in ends]
         for entry in resting:
-            numbers_there = [judged_numbers(entry, checks[entry.id](end)) for end in ends]
+            numbers_there = [
+                judged_numbers(entry, computed_numbers(entry, checks, *at))
+                for at in zip(models, ends, strict=True)
+            ]
             varied[entry.id].append(_sensitivity(entry, uncertainty, numbers_there, stated))
     return [replace(claim, sensitivity=tuple(varied[claim.id])) for claim in claims]
+
+
+def computed_numbers(
+    entry: Entry, checks: Mapping[str, Check], model: Any, numbers: Material
+) -> Computed:
+    """The numbers of a claim, by its formulas or by its check."""
+    if not entry.values:
+        return checks[entry.id](model)
+    printed = printed_numbers(numbers)
+    return {
+        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}")
+        for name, formula in entry.values.items()
+    }
 
 
 def _sensitivity(
@@ -348,13 +365,21 @@ def _text(end: Mapping[str, float]) -> str:
 
 
 def printed_numbers(numbers: Material) -> dict[str, float]:
-    """The paper's single values in SI, and the ends of its ranges as NAME.low and NAME.high."""
+    """The paper's single values in SI, and as NAME.low and so on parts of its other numbers.
+
+    ``low`` and ``high`` are the ends of a range, ``first`` and ``last`` those of a list of values,
+    and ``uncertainty`` is that of a value.
+    """
     stated = {
         name: number.si for name, number in numbers.numbers.items() if number.value is not None
     }
     for name, number in numbers.numbers.items():
         if number.si_range is not None:
             stated[f"{name}.low"], stated[f"{name}.high"] = number.si_range
+        if number.si_values:
+            stated[f"{name}.first"], *_, stated[f"{name}.last"] = number.si_values
+        if number.si_uncertainty is not None:
+            stated[f"{name}.uncertainty"] = number.si_uncertainty
     return stated
 
 
@@ -367,7 +392,7 @@ def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
 
 
 def _check_pairs(entries: Sequence[Entry], checks: Mapping[str, Check]) -> None:
-    ids = {entry.id for entry in entries}
+    ids = {entry.id for entry in entries if not entry.values}
     for name in sorted(ids - set(checks)):
         rule, got = "compute every claim of claims.toml", f"none for '{name}'"
         raise InputError("checks", rule, got, f'mark a function with @check("{name}")')

@@ -5,9 +5,10 @@ NAME = "package". It holds
 
 - ``claims.toml``: what the paper is, its claims in words, their rules and kinds, its conclusions
   and the ends of its published uncertainties (`asperity.ledger.contents`);
-- ``checks``, a module or package: one function a claim, marked with `asperity.ledger.check`, from
-  the paper's numbers to computed numbers by name. A function ``model`` there, if any, turns the
-  paper's numbers into what the checks are given, so that they can share what is computed once;
+- ``checks``, a module or package: one function for each claim without formulas (``values``),
+  marked with `asperity.ledger.check`, from the paper's numbers to computed numbers by name. A
+  function ``model`` there, if any, turns the paper's numbers into what the checks are given, so
+  that they can share what is computed once;
 - ``figures.toml``: titles, captions and alternative texts of its figures, and what is drawn;
 - ``figures``, a module or package: ``FIGURES``, functions that return a
   `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of
