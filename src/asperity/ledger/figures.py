@@ -195,10 +195,8 @@ class FigureWords(Record):
     def draw(self, numbers: FigureNumbers) -> Figure:
         """The picture; the style must be active."""
         if self.plot is None:
-            raise InputError(
-                f"figures.{numbers.name} must say what is drawn, got no plot; add "
-                f"[[{numbers.name}.plot.panel]]"
-            )
+            advice = f"add [[{numbers.name}.plot.panel]]"
+            raise InputError(f"figures.{numbers.name}", "say what is drawn", "no plot", advice)
         return self.plot.figure(numbers.data, numbers.numbers, numbers.points)
 
 

@@ -7,17 +7,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING
 
-from asperity._version import __version__
 from asperity.ledger.claims import Claim, Headline
 from asperity.ledger.markup import embedded_png, rich, table
 from asperity.ledger.points import RULE, CurveComparison
 from asperity.ledger.sentences import fill, names_in
 from asperity.materials import Number, citation
+from asperity.outputs.tables import html_page
 
 if TYPE_CHECKING:
     from asperity.ledger.contents import About, SummaryWords
@@ -94,29 +92,20 @@ def build_page(
         "Parameters": ("parameters", _parameters(paper)),
         "Sources": ("sources", _sources(about)),
     }
-    sections = "\n".join(
-        f'<section id="{key}" aria-labelledby="{key}-head"><h2 id="{key}-head">{name}</h2>\n'
-        f"{content}\n</section>"
-        for name, (key, content) in parts.items()
+    head = (
+        f'<p class="kicker">A reproduction</p><h1>{escape(about.title)}</h1>'
+        f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
+        f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
+        "again from its own equations and numbers. "
+        f"{sum(claim.is_test for claim in claims)} tests of them could have come out otherwise; "
+        f"each number leads to its entries:</p>{_tiles(claims)}"
+        f"<p>{escape(_counted_apart(claims))}</p>"
     )
-    links = "".join(f'<a href="#{key}">{name}</a>' for name, (key, _) in parts.items())
-    page, style = (
-        files("asperity.ledger").joinpath(name).read_text(encoding="utf-8")
-        for name in ("page.html", "page.css")
+    footer = (
+        " Figures (PNG, PDF), their numbers (CSV) and the claims (JSON, CSV) are in the folder of "
+        "this page."
     )
-    return Template(page).substitute(
-        title=escape(about.title),
-        authors=escape(about.authors),
-        journal=escape(about.journal),
-        claims=len(claims),
-        tests=sum(claim.is_test for claim in claims),
-        tiles=_tiles(claims),
-        apart=escape(_counted_apart(claims)),
-        style=style,
-        links=links,
-        sections=sections,
-        version=__version__,
-    )
+    return html_page(f"Reproduced: {about.title}", head, parts, footer)
 
 
 def _agreement(agreement: Sequence[CurveComparison]) -> str:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import pandas as pd
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.ledger.figures import Observable, PaperFigure
 from asperity.ledger.recipe import read_columns
 from asperity.units import to_si
@@ -107,11 +107,9 @@ def read_points(path: Path) -> pd.DataFrame:
         if not point["y_err"] > 0:
             what = f"{point['y_err']:g}"
             raise InputError(f"{where}: y_err", "be positive", what, "give the standard error of y")
-        if not point["source"]:
-            raise InputError(
-                f"{where}: source", "say where the point comes from", "nothing",
-                "name the table, the recording or the figure that was digitised",
-            )  # fmt: skip
+        rule = "say where the point comes from"
+        advice = "name the table, the recording or the figure that was digitised"
+        require(point["source"], f"{where}: source", rule, "nothing", advice)
     return points
 
 
@@ -197,17 +195,13 @@ def _row(
     curve = table[table["curve"] == point["series"]]
     if curve.empty:
         known = [str(one) for one in table["curve"].unique()]
-        raise InputError(
-            f"{where}: series", f"be a curve of {point['figure']}", f"'{point['series']}'",
-            closest(point["series"], known),
-        )  # fmt: skip
+        rule, got = f"be a curve of {point['figure']}", f"'{point['series']}'"
+        raise InputError(f"{where}: series", rule, got, closest(point["series"], known))
     x = float(to_si(point["x"], observable.kind, f"{where}: x", require_unit=True))
     at = curve[observable.x].to_numpy(float)
     if not at.min() <= x <= at.max():
-        raise InputError(
-            f"{where}: x", f"lie on the curve, from {at.min():g} to {at.max():g} (SI)", f"{x:g}",
-            "leave the point out",
-        )  # fmt: skip
+        rule = f"lie on the curve, from {at.min():g} to {at.max():g} (SI)"
+        raise InputError(f"{where}: x", rule, f"{x:g}", "leave the point out")
     model = float(CubicSpline(at, curve[observable.column].to_numpy(float))(x))
     residual = (point["y"] - model) / point["y_err"]
     law = str(curve["law"].iloc[0])

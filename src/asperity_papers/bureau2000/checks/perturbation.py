@@ -50,12 +50,6 @@ def inertial_pulsation(machine: Machine) -> Numbers:
     return {"sqrt(K/M)": float(cf.inertial_pulsation(point))}
 
 
-@check("contrast")
-def contrast(machine: Machine) -> Numbers:
-    p = machine.numbers
-    return {"(B - A)/A": (p.B - p.A) / p.A}
-
-
 @check("critical-pulsation-number")
 def critical_pulsation_number(machine: Machine) -> Numbers:
     point = machine.small_modulation(machine.velocities[1])
@@ -99,12 +93,6 @@ def inertia_negligible(machine: Machine) -> Numbers:
         )
         changes[name] = float(heavy / light) - 1
     return changes
-
-
-@check("velocity-gain")
-def velocity_gain(machine: Machine) -> Numbers:
-    mu0, (low, high) = machine.numbers.mu0, machine.ends_of("A")
-    return {"mu/A": mu0 / machine.numbers.A, "low": mu0 / high, "high": mu0 / low}
 
 
 @check("perturbation-out-of-reach")
