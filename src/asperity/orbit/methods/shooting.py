@@ -1,4 +1,4 @@
-"""Shooting: Newton's method on a coarse division of the period, and refinement of the orbit.
+"""Shooting: Newton's method on the states at theta = 0.
 
 1. Newton's method from the averaged limit, on a coarse division of the period.
 2. The orbit on finer divisions, each with twice the steps of the one before, until mean, harmonics
@@ -25,7 +25,6 @@ friction of the contacts, then gives f and the states of the law.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -37,7 +36,7 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import dormand_prince_8
-from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns
+from asperity.algebra.small_systems import jacobian_columns, solve_columns
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import Indices, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
@@ -136,14 +135,14 @@ _DIVISIONS = (
 #: arrays share cache lines.
 _CHUNK, _FEW = 240, 24
 
-#: Newton steps on the coarse division, the largest change of an exponent in one, and the change
-#: below which its square is small enough to go on.
-_NEWTON_STEPS, _LARGEST_CHANGE, _NEAR = 12, 3.0, 2e-2
+#: Newton steps on a division, and the largest change of an exponent in one.
+_NEWTON_STEPS, _LARGEST_CHANGE = 12, 3.0
+#: Newton change on the coarse division below which its square is small enough to go on, and largest
+#: ones where a finer division is compared with the next, and where it is the finer of two.
+_NEAR, _CLOSED, _ACCEPTED = 2e-2, 1e-6, 1e-9
 #: Chord steps on a finer division, which shrink a change by a hundred and more, and the change
 #: below which there need be no further one.
 _CHORDS, _NEARLY_CLOSED = 4, 1e-5
-#: Largest remaining Newton change: where two divisions are compared, and on the finer one.
-_CLOSED, _ACCEPTED = 1e-6, 1e-9
 #: Agreement of two divisions, relative; the finer one is then good to 2e-6 / 2^8.
 _AGREEMENT = 2e-6
 #: Agreement of the determinant with Liouville's formula, a check of the finer division alone.
@@ -173,130 +172,115 @@ class Shooting(Method):
         rows = np.argsort(relaxation, kind="stable")
         for divisions in _DIVISIONS:
             chosen = rows[relaxation[rows] <= divisions.fastest]
-            if len(chosen):
-                _Refinement(problem, solution, options, divisions, guess.copy()).run(chosen)
+            _refine(problem, solution, options, divisions, guess.copy(), chosen)
             rows = rows[~solution.converged[rows]]
         return solution
 
 
-class _Refinement:
-    """The orbits of some points on finer and finer divisions; arrays have points last."""
+def _refine(
+    problem: Problem,
+    solution: Solution,
+    options: SearchOptions,
+    divisions: _Divisions,
+    first: Float,
+    rows: Indices,
+) -> None:
+    """Solve the points that divisions resolve, on finer and finer ones until two agree.
 
-    def __init__(
-        self,
-        problem: Problem,
-        solution: Solution,
-        options: SearchOptions,
-        divisions: _Divisions,
-        guess: Float,
-    ) -> None:
-        size, points = guess.shape
-        self.problem, self.solution = problem, solution
-        self.options, self.divisions = options, divisions
-        self.first = guess
-        self.inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
-        # Results on the previous division; NaN where the orbit did not close.
-        self.numbers = np.full((1 + options.harmonics, points), np.nan + 0j)
-        self.logs = np.full((size, points), np.nan + 0j)
-
-    def run(self, rows: Indices) -> None:
-        """Refine the orbits of `rows` from the coarse division to the first two that agree."""
-        rows = self._near_orbits(rows)
-        for count in self.divisions.finer:
-            rows, left = self._closed(rows, count), []
-            for members, reached in self._passes(rows, count):
-                resolved = self._compare(members, reached, count)
-                good = ~resolved & np.isfinite(reached.step).all(0)
-                self.first[:, members[good]] += reached.step[:, good]
-                left.append(members[good])
-            rows = _joined(left)
-
-    def _steps(self, count: int) -> Steps:
-        return period_steps(count, self.divisions.grading, self.options.harmonics)
-
-    def _passes(self, rows: Indices, count: int) -> Iterator[tuple[Indices, PeriodIntegration]]:
-        """Integrate `rows` on `count` steps; the inverse is kept for chord steps."""
-        solve = partial(newton_pass, steps=self._steps(count))
-        for members, reached in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
-            self.inverse[..., members] = reached.inverse
-            yield members, reached
-
-    def _near_orbits(self, rows: Indices) -> Indices:
-        """Newton's method on the coarse division; returns the rows that it brings near an orbit."""
-        near = []
+    Parameters
+    ----------
+    problem : Problem
+    solution : Solution
+        Receives orbits.
+    options : SearchOptions
+    divisions : _Divisions
+    first : array, shape (size, points)
+        Guess of the first states; changed.
+    rows : array of int
+        In the order in which they are solved.
+    """
+    size, points = first.shape
+    inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
+    # Results on the previous division; NaN before the first.
+    numbers = np.full((1 + options.harmonics, points), np.nan + 0j)
+    logs = np.full(first.shape, np.nan + 0j)
+    limits = (_NEAR, _CLOSED, *[_ACCEPTED] * len(divisions.finer))
+    for count, limit in zip((divisions.coarse, *divisions.finer), limits, strict=False):
+        steps = period_steps(count, divisions.grading, options.harmonics)
+        if limit < _NEAR:
+            rows = _chords(problem, first, inverse, rows, steps)
+        unresolved = []
         for _ in range(_NEWTON_STEPS):
             far = []
-            for members, reached in self._passes(rows, self.divisions.coarse):
-                leap = reached.leap
-                good = np.isfinite(leap) & np.isfinite(reached.step).all(0)
-                damping = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(leap[good], 1e-300))
-                self.first[:, members[good]] += damping * reached.step[:, good]
-                near.append(members[good & (leap < _NEAR)])
-                far.append(members[good & (leap >= _NEAR)])
-            rows = _joined(far)
-        return _joined(near)
-
-    def _closed(self, rows: Indices, count: int) -> Indices:
-        """Chord steps on a finer division; returns the rows whose orbits they close."""
-        solve, closed = partial(chord_step, steps=self._steps(count)), []
-        for _ in range(_CHORDS):
-            far = []
-            inputs = (self.problem, self.first, self.inverse)
-            for members, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
-                good = np.isfinite(change)
-                self.first[:, members[good]] = start[:, good]
-                closed.append(members[change < _NEARLY_CLOSED])
-                far.append(members[good & (change >= _NEARLY_CLOSED)])
-            rows = _joined(far)
-        return _joined(closed)
-
-    def _compare(
-        self, members: Indices, reached: PeriodIntegration, count: int
-    ) -> NDArray[np.bool_]:
-        """Compare with the division before; writes the points that agree and returns which do."""
-        zero = np.zeros(len(members))
-        observables = Observables(
-            reached.mean_friction,
-            reached.harmonics,
-            reached.monodromy,
-            zero,
-            reached.log_determinant,
-            np.full_like(reached.monodromy, np.nan),
-            zero,
-            self.first[:, members],
-        )
-        numbers, logs = observables.numbers, observables.log_multipliers
-        determinant = np.linalg.det(np.moveaxis(reached.monodromy, -1, 0))
-        with np.errstate(all="ignore"):
-            liouville = np.abs(determinant * np.exp(-reached.log_determinant) - 1)
-        resolved = (reached.change <= _ACCEPTED) & (liouville <= _LIOUVILLE)
-        resolved &= response_gap(self.numbers[:, members], numbers) <= _AGREEMENT
-        resolved &= multiplier_gap(self.logs[:, members], logs) <= _AGREEMENT
-        self.numbers[:, members] = np.where(reached.change <= _CLOSED, numbers, np.nan)
-        self.logs[:, members] = logs
-        kept = np.flatnonzero(resolved)
-        rows = members[kept]
-        if len(rows):
-            self.solution.store(rows, take(observables, kept), logs[:, kept])
-            self._sample(rows, count)
-            self.solution.iterations[rows] = count
-            self.options.progress(len(rows))
-        return resolved
-
-    def _sample(self, rows: Indices, count: int) -> None:
-        phases = self.options.phases
-        if phases:
-            solve = partial(
-                shot_waveform,
-                steps=self._steps(count),
-                count=count,
-                grading=self.divisions.grading,
-                phases=phases,
-            )
-            for members, samples in run_chunks(
-                solve, (self.problem, self.first), rows, _chunk(rows)
+            for members, reached in run_chunks(
+                partial(newton_pass, steps=steps), (problem, first), rows, _chunk(rows)
             ):
-                self.solution.waveform[..., members] = samples
+                inverse[..., members] = reached.inverse
+                finite = np.isfinite(reached.leap) & np.isfinite(reached.step).all(0)
+                closed = np.flatnonzero(finite & (reached.change <= limit))
+                at, agreed = members[closed], np.zeros(len(closed), bool)
+                if limit < _NEAR:
+                    observed = take(reached.observables, closed)
+                    agreed = _agreed(observed, numbers[:, at], logs[:, at])
+                    agreed &= reached.change[closed] <= _ACCEPTED
+                    numbers[:, at], logs[:, at] = observed.numbers, observed.log_multipliers
+                    kept = np.flatnonzero(agreed)
+                    solution.store(at[kept], take(observed, kept))
+                    solution.iterations[at[kept]] = count
+                    options.progress(len(kept))
+                    _sample(problem, solution, first, at[kept], steps, divisions.grading)
+                shortened = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(reached.leap, 1e-300))
+                first[:, members[finite]] += (shortened * reached.step)[:, finite]
+                unresolved.append(at[~agreed])
+                far.append(members[finite & (reached.change > limit)])
+            rows = _joined(far)
+        rows = _joined(unresolved)
+
+
+def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps: Steps) -> Indices:
+    """Chord steps with the matrices of a coarser division, in place; the rows left finite."""
+    solve, nearly = partial(chord_step, steps=steps), []
+    for _ in range(_CHORDS):
+        far = []
+        inputs = (problem, first, inverse)
+        for members, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
+            good = np.isfinite(change)
+            first[:, members[good]] = start[:, good]
+            nearly.append(members[change < _NEARLY_CLOSED])
+            far.append(members[good & (change >= _NEARLY_CLOSED)])
+        rows = _joined(far)
+    return _joined([*nearly, rows])
+
+
+def _agreed(
+    observed: Observables, numbers: NDArray[np.complex128], logs: NDArray[np.complex128]
+) -> NDArray[np.bool_]:
+    """Which points have the numbers of the division before, and Liouville's determinant."""
+    determinant = np.linalg.det(np.moveaxis(observed.monodromy, -1, 0))
+    with np.errstate(all="ignore"):
+        liouville = np.abs(determinant * np.exp(-observed.log_determinant) - 1)
+    agreed = response_gap(numbers, observed.numbers) <= _AGREEMENT
+    agreed &= multiplier_gap(logs, observed.log_multipliers) <= _AGREEMENT
+    return np.asarray(agreed & (liouville <= _LIOUVILLE))
+
+
+def _sample(
+    problem: Problem,
+    solution: Solution,
+    first: Float,
+    rows: Indices,
+    steps: Steps,
+    grading: float,
+) -> None:
+    """Write the waveforms of the points `rows`, if any are wanted."""
+    phases = solution.waveform.shape[1]
+    if not phases:
+        return
+    solve = partial(
+        shot_waveform, steps=steps, count=int(steps.number), grading=grading, phases=phases
+    )
+    for members, samples in run_chunks(solve, (problem, first), rows, _chunk(rows)):
+        solution.waveform[..., members] = samples
 
 
 def _chunk(rows: Indices) -> int:
@@ -322,16 +306,27 @@ class Steps(NamedTuple):
 
 
 class PeriodIntegration(NamedTuple):
-    """Result of an integration over the period from given initial states."""
+    """Result of an integration over the period from given initial states.
 
-    step: Array  # (size, points): Newton's, to be added to the first states
-    leap: Array  # (points,): what it does to the slip exponent and logarithmic states
-    change: Array  # (points,): what it does to these and to the velocity; inf if the slider sticks
-    inverse: Array  # (size, size, points): of 1 less the monodromy matrix
-    monodromy: Array  # (size, size, points)
-    log_determinant: Array  # of the monodromy matrix, by Liouville's formula
-    mean_friction: Array
-    harmonics: Array  # complex, (harmonics, points)
+    Attributes
+    ----------
+    observables : Observables
+        Of an orbit if the period closes.
+    step : array, shape (size, points)
+        Newton's, to be added to the first states.
+    leap : array, shape (points,)
+        What it does to the slip exponent and logarithmic states.
+    change : array, shape (points,)
+        What it does to these and to the velocity; inf if the slider sticks.
+    inverse : array, shape (size, size, points)
+        Of 1 less the monodromy matrix.
+    """
+
+    observables: Observables
+    step: Array
+    leap: Array
+    change: Array
+    inverse: Array
 
 
 def period_steps(count: int, grading: float, harmonics: int) -> Steps:
@@ -390,17 +385,7 @@ def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
 def chord_step(
     problem: Problem, start: Array, inverse: Array, *, steps: Steps
 ) -> tuple[Array, Array]:
-    """One chord step: first states, and the change as in `PeriodIntegration`.
-
-    Parameters
-    ----------
-    problem : Problem
-    start : array, shape (size, points)
-        First states.
-    inverse : array, shape (size, size, points)
-        `PeriodIntegration.inverse` of orbits close by.
-    steps : Steps
-    """
+    """First states, and the change as in `PeriodIntegration`, by its `inverse` of orbits nearby."""
 
     def body(k: Array, flow: Any) -> Any:
         return _advance(problem, steps, k, flow)
@@ -438,26 +423,25 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
     (end, monodromy), spectrum, trace, slips = jax.lax.fori_loop(
         0, steps.number, body, ((start, identity), *nothing, jnp.ones(points, dtype=bool))
     )
-    inverse = _stacked(inverse_points([list(row) for row in identity - monodromy]))
+    inverse = solve_columns(identity - monodromy, identity)
     step = (inverse * (end - start)[None]).sum(1)
     leap, change = _changes(problem, start, step)
     constant, _ = problem.system.force_split(start, jnp.zeros_like(start), problem.load.at(0.0))
     cosine, sine = jnp.split(spectrum[1:], 2)
-    return PeriodIntegration(
-        step,
-        leap,
-        # An interface that sticks for part of the period has kinks, which no high order resolves.
-        jnp.where(slips, change, jnp.inf),
-        inverse,
-        monodromy,
-        2 * jnp.pi * trace,
+    zero = jnp.zeros_like(trace)
+    observables = Observables(
         constant + spectrum[0],
         2 * jax.lax.complex(cosine, sine),
+        monodromy,
+        zero,
+        2 * jnp.pi * trace,
+        jnp.full_like(monodromy, jnp.nan),
+        zero,
+        start,
     )
-
-
-def _stacked(matrix: Matrix) -> Array:
-    return jnp.stack([jnp.stack(row) for row in matrix])
+    # An interface that sticks for part of the period has kinks, which no high order resolves.
+    change = jnp.where(slips, change, jnp.inf)
+    return PeriodIntegration(observables, step, leap, change, inverse)
 
 
 def _trace(problem: Problem, theta: Array, states: Array) -> Array:
