@@ -12,15 +12,8 @@ of Dormand and Prince, all operating points in lock step and without step-size c
 S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (Springer, 1993),
 section II.5. The derivatives at the end of the period are the monodromy matrix.
 
-The initial guess is the averaged limit of a slider that swings on its asperities. While the joint
-sticks, spring force f and slider obey
-
-    dv/dtheta = m (f - w g - d v),      dg/dtheta = s v - c (g - <g>),
-
-g = F_i/W, m the mobility, d the damping, s the strain, c a mean relaxation by slip. Under
-w = 1 + eps cos(theta) the harmonics of g = f G follow from a three-term recurrence, whose minimal
-solution is a continued fraction. The averaged limit under the load 1/G, which asks the same
-friction of the contacts, then gives f and the states of the law.
+The initial guess is the averaged limit of a slider that swings on its asperities, as that of
+`asperity.orbit.methods.balance`, with a mean relaxation by slip.
 """
 
 from __future__ import annotations
@@ -41,6 +34,7 @@ from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import Indices, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
+from asperity.orbit.methods.balance import LEAST_SWING, SWING_ORDERS, elastic_swing
 from asperity.orbit.observables import Observables, response_gap, waveform_of
 from asperity.orbit.solution import Float, Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
@@ -48,11 +42,8 @@ from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 from asperity.theory.averaged import averaged_limit
 
-#: Samples of the load for the averaged limit, and harmonics of G.
-_NODES, _HARMONICS = 48, 12
-
-#: G below this is beyond a resonance with the modulation itself, where the start means nothing.
-_LEAST = 0.2
+#: Samples of the load for the averaged limit.
+_NODES = 48
 
 
 @jit_large
@@ -66,12 +57,15 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     w, velocity = at.w * points, jnp.zeros((_NODES, 1))
     softening = _softening(problem, points)
     if isinstance(load, Harmonic):
-        swing, velocity_swing = _elastic_swing(problem, system.strain * softening, theta)
-        usable = (swing > _LEAST).all(0)
+        relaxing = 1j * SWING_ORDERS[:, None] + system.strain * softening
+        drag = 1j * SWING_ORDERS[:, None] / system.mobility + system.damping
+        swing, waves = elastic_swing(load, drag * relaxing / system.strain, 1.0, theta)
+        usable = (swing > LEAST_SWING).all(0)
         # Without inertia the joint carries z / (w + l): the load under which that is z G / (1 + l).
         ratio = quasi_static.compliance_ratio
         w = jnp.where(usable, (1 + ratio) / jnp.where(usable, swing, 1.0) - ratio, w)
-        velocity = jnp.where(usable, velocity_swing, 0.0)
+        moving = (waves * relaxing[:, None]).real.sum(0) / system.strain
+        velocity = jnp.where(usable, moving, 0.0)
     centre = averaged_limit(quasi_static, at._replace(w=w), np.full(_NODES, 1 / _NODES)).centre
     Y = jnp.stack(centre)[:, None]
     force = quasi_static.force(Y, Excitation(points)) + 0 * w
@@ -93,25 +87,6 @@ def _softening(problem: Problem, points: Array) -> Array:
     steady = jnp.broadcast_to(system.steady(), (system.size, len(points)))
     carried = jnp.zeros_like(steady).at[system.mechanical.index("friction")].set(1.0)
     return jax.jvp(lambda Y: system.log_slip(Y, Excitation(points)), (steady,), (carried,))[1]
-
-
-def _elastic_swing(problem: Problem, relaxation: Array, theta: np.ndarray) -> tuple[Array, Array]:
-    """G and the part of v/V that follows f, over f, at the phases `theta`, (nodes, points)."""
-    system, half = problem.system, 0.5 * problem.load.epsilon
-    ratios: list[Array] = []  # of a harmonic to the one before, highest first
-    last = jnp.zeros_like(relaxation, dtype=complex)
-    for n in range(_HARMONICS, 0, -1):
-        inertia = (1j * n / system.mobility + system.damping) * (1j * n + relaxation)
-        last = -half / (1 + inertia / system.strain + half * last)
-        ratios.append(last)
-    harmonic = 1 / (1 + 2 * half * last.real) + 0j
-    swing, velocity = harmonic.real, 0.0
-    for n, ratio in enumerate(reversed(ratios), 1):
-        harmonic = harmonic * ratio
-        wave = 2 * harmonic * np.exp(1j * n * theta)
-        swing = swing + wave.real
-        velocity = velocity + ((1j * n + relaxation) * wave).real
-    return swing, velocity / system.strain
 
 
 class _Divisions(NamedTuple):
