@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from asperity.figures.style import save_picture, style
-from asperity.ledger import Claim, FigureNumbers, find_paper
-from asperity.ledger.page import Plate, PlateGroup, build_page
+from asperity.ledger import Claim, FigureNumbers, Section, find_paper
+from asperity.ledger.page import build_page
 from asperity_papers.bureau2000.figures import SCHEMATICS
 
 WIDTHS = (390, 800, 1400)
@@ -31,17 +31,14 @@ def claims(paper):
 def address(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     paper = find_paper("bureau2000")
+    shown = [paper.words.figure(FigureNumbers(n, pd.DataFrame()), {}) for n in SCHEMATICS]
+    (folder / "figures").mkdir()
     with style():
-        plates = [
-            Plate(
-                paper.words.figure(FigureNumbers(name, pd.DataFrame()), {}),
-                save_picture(draw(), folder / name)[0], (f"{name}.png",),
-            )
-            for name, draw in SCHEMATICS.items()
-        ]  # fmt: skip
-    group = PlateGroup("figures", "Figures", "", plates, "")
+        for name, draw in SCHEMATICS.items():
+            save_picture(draw(), folder / "figures" / name)
     found = claims(paper)
-    text = build_page(paper, [group], found, paper.headlines(found))
+    sections = [(Section("figures", "Figures", ()), shown)]
+    text = build_page(paper, folder, sections, found, paper.headlines(found))
     (folder / "index.html").write_text(text, encoding="utf-8")
     return (folder / "index.html").as_uri()
 
