@@ -370,7 +370,7 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
         "posterior": True, "chains": 2, "draws": 100, "seed": 7,
     }  # fmt: skip
     sent = []
-    whole = {"asked": fits.Fitted.model_validate(asked).model_dump(), "files": []}
+    whole = {"question": fits.Fitted.model_validate(asked).model_dump(), "files": []}
     result = fits.fit(whole, lambda **message: sent.append(message))
     assert {"draws": 50, "of": 800} in sent
     assert result["posterior"]["seed"] == 7
@@ -518,11 +518,11 @@ def steps(stepped, tmp_path):
         "laws": ["rice-ruina"], "free": ["A", "B", "D0"], "material": "bureau2000",
         "runs": [{"recording": "0" * 32, "window": [0.5, 2.75]}],
     }  # fmt: skip
-    return {"asked": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
+    return {"question": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
 
 
 def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
-    asked = fits.Fitted(**steps["asked"])
+    asked = fits.Fitted(**steps["question"])
     (data,) = fits._data(asked, steps["files"], tmp_path)
     (run,) = read_data(questions.Fit(data=[data]), fits._read)
     direct = asp.inference.recorded_run(steps["files"][0]["path"], window=(0.5, 2.75))
@@ -533,12 +533,12 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
 
 
 def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monkeypatch):
-    steps["asked"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
+    steps["question"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
     more = {
         "fit_rate": "2 Hz", "gauge": "50 Hz", "fixed": {"W0": "10 N"}, "drift": True,
         "prior": {"K": "0.2+-0.01 N/um"}, "trend": "quadratic",
     }  # fmt: skip
-    page = fits.Fitted(**steps["asked"], **more)
+    page = fits.Fitted(**steps["question"], **more)
     command = shlex.split(fits._fit_command(page, ["steps.csv"]))
     asked = []
     monkeypatch.setattr(
@@ -571,8 +571,8 @@ def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monk
     ],
 )
 def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, word):
-    steps["asked"] |= asked
-    steps["asked"]["runs"][0] |= run
+    steps["question"] |= asked
+    steps["question"]["runs"][0] |= run
     with pytest.raises(InputError, match=" must ") as refused:
         fits.fit(steps, lambda **message: None)
     assert word in str(refused.value)
@@ -635,6 +635,6 @@ def number(text):
 
 
 def test_a_fit_needs_a_recording_that_was_sent(ask, steps):
-    answer = ask("data/fit", steps["asked"])
+    answer = ask("data/fit", steps["question"])
     assert answer.status == 400
     assert "recording must be" in answer.json["error"]

@@ -171,7 +171,7 @@ def keys(dataset: xarray.Dataset) -> list[Any]:
     if "critical_stiffness" in dataset:
         entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
     if not dataset["converged"].values.all():
-        entries.append(Patch(label="no response found", **_FAILED))
+        entries.append(Patch(label="no response", **_FAILED))
     return entries
 
 

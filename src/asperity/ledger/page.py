@@ -135,7 +135,7 @@ def _kind(name: str) -> str:
 def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
     ends = "; ".join(rich(f"{u.quantity}: {u.note}") for u in paper.contents.uncertainty)
     varied = (
-        "\n<p>Numbers that rest on uncertain quantities are computed at the ends of the "
+        "\n<p>Numbers that follow from uncertain quantities are computed at the ends of the "
         f"uncertainties too ({ends}).</p>"
     )
     return (
@@ -206,8 +206,8 @@ def _links(names: Sequence[str], claims: dict[str, Claim]) -> str:
 
 
 def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:
-    rows = [(rich(h.claim), rich(h.found), _standing(h) + _basis(h, claims)) for h in headlines]
-    heads = {"The paper concludes": "statement", "Found here": "computed", "Holds?": "verdict"}
+    rows = [(rich(h.claim), rich(h.result), _standing(h) + _basis(h, claims)) for h in headlines]
+    heads = {"The paper concludes": "statement", "Computed here": "computed", "Holds?": "verdict"}
     return (
         "<h3>The paper’s conclusions</h3>"
         f"{table(heads, rows, 'Conclusions of the paper', 'ledger brief')}"

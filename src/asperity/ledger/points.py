@@ -325,7 +325,7 @@ class MeasuredPoints:
         if not self.compared:
             return []
         rows = pd.concat(self.compared, ignore_index=True)
-        head = [f"points of {self.name} beside the curves of the figures", RULE]
+        head = [f"points of {self.name} and the curves of the figures", RULE]
         save_table(rows, folder / "data" / "points.csv", header=head, columns=POINT_COLUMNS)
         compared = comparisons(rows)
         record = {
