@@ -28,7 +28,7 @@ def planted(**changes) -> xarray.Dataset:
     attrs = {"x": "epsilon", "y": "K", "x_scale": "linear", "y_scale": "log"}
     coords = {
         "epsilon": ("epsilon", eps, units),
-        "K": ("K", K, {"units": "N/m", "long_name": "K"}),
+        "K": ("K", K, {"units": "N/m", "long_name": "stiffness of the pulling spring"}),
     }
     return xarray.Dataset({k: v for k, v in data.items() if v is not None}, coords, attrs)
 
@@ -80,5 +80,5 @@ def test_axes_are_labelled_in_readable_units() -> None:
     assert axis_unit(planted()["K"]) == (1e3, "N/mm")
     with style():
         figure = draw_map(planted())
-    assert figure.axes[0].get_ylabel() == "spring stiffness $K$ (N/mm)"
+    assert figure.axes[0].get_ylabel() == "stiffness of the pulling spring $K$ (N/mm)"
     assert figure.axes[0].get_ylim() == (100.0, 300.0)
