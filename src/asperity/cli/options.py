@@ -99,7 +99,7 @@ def field_option(
         A second name of the option.
     """
     names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
-    # Click takes an option that is said to be no switch for one whose value may be left out.
+    # With is_flag=False Click takes an option for one whose value may be left out.
     look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
     kind = Count() if metavar == "N" else None
     return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)

@@ -77,8 +77,8 @@ def _section(result: RecipeResult) -> Section:
     rows = []
     for name, r in result.numbers.items():
         here = f"{r.value:.4g} +- {r.se:.2g} {r.unit}".rstrip()
-        if r.upper_limit is not None:
-            here = f"below {r.upper_limit:.3g} (95 %)"
+        if r.upper_limit_95 is not None:
+            here = f"below {r.upper_limit_95:.3g} (95 %)"
         paper = ""
         if r.published is not None:
             paper = f"{r.published:.4g}"

@@ -102,7 +102,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
             return run_figure(*_motions(fits, 0))
         if fit.objective.terms_of(LockInTerm):
             return laws_figure(*_predictions(fits, 0))
-    rule = "be asked of laws compared on a recording or a table of readings"
+    rule = "have laws compared on a recording or a table of readings"
     got = "another kind of data or no fit"
     raise InputError("plot", rule, got, "plot the residuals of the fits yourself")
 

@@ -320,10 +320,10 @@ def judge_claims(
         return claims
     varied: dict[str, list[Sensitivity]] = {entry.id: [] for entry in contents.claim}
     for uncertainty in contents.uncertainty:
-        resting = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
+        affected = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
         ends = [altered(numbers, end) for end in (uncertainty.low, uncertainty.high)]
         models = [model(end) for end in ends]
-        for entry in resting:
+        for entry in affected:
             numbers_there = [
                 judged_numbers(entry, computed_numbers(entry, checks, *at))
                 for at in zip(models, ends, strict=True)
@@ -412,7 +412,7 @@ class Headline:
     ----------
     claim : str
         Conclusion of the paper.
-    found : str
+    result : str
         Summary of the computation.
     standing : str
         "holds": every claim is reproduced, at the ends of all published uncertainties too.
@@ -424,7 +424,7 @@ class Headline:
     """
 
     claim: str
-    found: str
+    result: str
     standing: Standing
     claims: tuple[str, ...]
 
@@ -448,7 +448,7 @@ def headlines(words: Sequence[HeadlineWords], claims: Sequence[Claim]) -> list[H
     return [
         Headline(
             claim=conclusion.statement,
-            found=fill(conclusion.found, computed, "headline.found"),
+            result=fill(conclusion.result, computed, "headline.result"),
             standing=_standing([ledger[name] for name in conclusion.claims]),
             claims=conclusion.claims,
         )

@@ -153,14 +153,14 @@ class HeadlineWords(Record):
     Attributes
     ----------
     statement : str
-    found : str
+    result : str
         Result; ``{id}`` stands for the computed text of that claim.
     claims : tuple of str
         Ids of the claims whose verdicts decide.
     """
 
     statement: str
-    found: str
+    result: str
     claims: tuple[str, ...]
 
 
@@ -238,7 +238,7 @@ def _check_names(contents: Contents, file: str) -> None:
         *(("summary.sentences", "claims", names_in(sentence), ids)
           for words in contents.summary for sentence in words.sentences),
         *(("headline.claims", "claims", h.claims, ids) for h in contents.headline),
-        *(("headline.found", "claims", names_in(h.found), ids) for h in contents.headline),
+        *(("headline.result", "claims", names_in(h.result), ids) for h in contents.headline),
     ]  # fmt: skip
     for where, what, names, known in references:
         for name in (name for name in names if name not in known):

@@ -92,10 +92,7 @@ def rounds_to(stated: float, last_digit: float, what: str = "the value") -> Acce
 
 def about(stated: float, what: str = "the value") -> AcceptanceRule:
     """Within 5 %."""
-    return AcceptanceRule(
-        f"{what} within {100 * ABOUT:g} % of {stated:g}",
-        lambda value: abs(value / stated - 1) <= ABOUT + _TIE,
-    )
+    return within(stated, ABOUT, what)
 
 
 def within(stated: float, tolerance: float, what: str = "the value") -> AcceptanceRule:

@@ -308,9 +308,9 @@ def _mistakes(
         (limit,) = reported["ctx"].values()
         rule = f"be {limits[reported['type']]} {limit:g}"
         return (InputError(field, rule, value, "correct the value"),)
-    said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    text = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
-        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said
+        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), text
     )
     return (InputError(field, f"be {rule}", value, "correct the value"),)
 

@@ -147,7 +147,9 @@ def _solved(
                 mistakes[int(members[k])] = _mistake(law, point, cells)
         for k, mistake in mistakes.items():
             results[sound[k]] = mistake
-    return answers, [mine or str(told) for mine, told in zip(results, answers.result, strict=True)]
+    return answers, [
+        mistake or str(reason) for mistake, reason in zip(results, answers.result, strict=True)
+    ]
 
 
 def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, ...]]:

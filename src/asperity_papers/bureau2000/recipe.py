@@ -181,7 +181,7 @@ def paper_procedure(
 def _limited(number: RecipeNumber) -> RecipeNumber:
     """With the upper end of the 95 % interval of a number that is not negative."""
     limit = bounded_interval(number.value, number.se, _LEVEL, 0.0, math.inf)[1]
-    return replace(number, upper_limit=limit)
+    return replace(number, upper_limit_95=limit)
 
 
 def _rows(

@@ -203,7 +203,7 @@ def _element_python(changes: Mapping[str, float]) -> str:
 
 def _figure(name: str) -> TabFigure:
     observables = WORDS.figures[name].observables
-    x, rows = observables[0].x, [o.column for o in observables]
+    x, rows = next(iter(observables.values()))[1].x, list(observables)
     return TabFigure(
         x=x,
         rows=rows,

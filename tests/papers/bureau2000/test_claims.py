@@ -273,9 +273,9 @@ def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncert
 def test_headlines_follow_from_verdicts(claims):
     def standing(*names, sensitivity=()):
         own = [replace(claims[n], depends_on=(), sensitivity=sensitivity) for n in names]
-        words = HeadlineWords(statement="x", found="{mu1-order}", claims=names)
+        words = HeadlineWords(statement="x", result="{mu1-order}", claims=names)
         (found,) = headlines([words], [*own, claims["mu1-order"]])
-        assert found.found == claims["mu1-order"].computed
+        assert found.result == claims["mu1-order"].computed
         return found.standing
 
     reproduced, failed = "rice-ruina-mu1-linear-in-V", "inertia-negligible-elastic"

@@ -17,7 +17,7 @@ from asperity.recording.roles import ROLES
 
 
 class Recording(Question):
-    """A file that was sent, how to read and to measure it, and the names in what is said of it."""
+    """A file that was sent, how to read and to measure it, and the names in its sentences."""
 
     recording: str
     source: Source = Field(default_factory=Source)
