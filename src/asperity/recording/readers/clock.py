@@ -101,8 +101,8 @@ def _from_first_column(
             Argument("columns", "time"),
             "be a column",
             f"none among {listed(map(repr, values))} that is named like time",
-            f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or say which column "
-            f"it is, like {Argument('columns', 'time', first)}",
+            f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or, if one of them "
+            f"is time, its name with {Argument('columns', 'time', '...')}",
         )
     clock = _from_column(first, values, units)
     assumed = Finding(
