@@ -66,7 +66,6 @@ ROLES: Mapping[str, Role] = {
         "",
         "t time xvalue",
         "time timestamp elapsed zeit zeitstempel messzeit temps tempo tiempo tijd",
-        weak="date datetime datum fecha data uhrzeit heure hora ora clock",
         without="delay constant konstante",
         kinds="time",
     ),
