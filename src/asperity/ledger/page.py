@@ -257,11 +257,7 @@ def _counted_apart(claims: Sequence[Claim]) -> str:
 
 #: Filters: name in addresses, and what they show.
 _FILTERS = (
-    ("all", "all"),
-    ("reproduced", "reproduced"),
-    ("misprint", "misprint"),
-    ("differs", "differs"),
-    ("undecided", "undecided"),
+    *((name, name) for name in ("all", *VERDICT_TEXTS)),
     ("apart", "fits, arithmetic, identities"),
 )
 
