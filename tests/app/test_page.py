@@ -205,9 +205,9 @@ def test_a_port_that_is_taken_is_told(server):
 def test_without_the_extra_there_is_a_sentence(monkeypatch):
     from click.testing import CliRunner
 
-    from asperity.app import server
-
-    monkeypatch.setattr(server, "_PACKAGES", ("no_such_package_anywhere",))
+    for name in [name for name in sys.modules if name.startswith(("asperity.app", "uvicorn"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
     result = CliRunner().invoke(main, ["serve"])
     assert result.exit_code == 2
     assert "make app in a clone" in result.stderr
