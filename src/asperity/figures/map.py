@@ -160,7 +160,7 @@ def axis_unit(side: xarray.DataArray) -> tuple[float, str]:
 
 def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
     """Meaning, symbol and unit of a quantity."""
-    known = {**OUTPUTS, **INTERFACE, **DRIVE, **MACHINE}.get(str(side.name))
+    known: Any = {**OUTPUTS, **INTERFACE, **DRIVE, **MACHINE}.get(str(side.name))
     # Matplotlib has no names for these bars.
     letters = "" if known is None else re.sub(r"\\[lr]vert ?", "|", known.symbol)
     symbol = f" ${letters}$" if letters else ""

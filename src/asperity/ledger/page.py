@@ -81,7 +81,7 @@ def build_page(
         f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
         f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
         "again from its own equations and numbers. "
-        f"{sum(claim.is_test for claim in claims)} tests of them could have come out otherwise; "
+        f"{sum(claim.is_test for claim in claims)} of them could have come out otherwise; "
         f"each number leads to its entries:</p>{_tiles(claims)}"
         f"<p>{escape(_counted_apart(claims))}</p>"
     )
@@ -257,11 +257,7 @@ def _counted_apart(claims: Sequence[Claim]) -> str:
 
 #: Filters: name in addresses, and what they show.
 _FILTERS = (
-    ("all", "all"),
-    ("reproduced", "reproduced"),
-    ("misprint", "misprint"),
-    ("differs", "differs"),
-    ("undecided", "undecided"),
+    *((name, name) for name in ("all", *VERDICT_TEXTS)),
     ("apart", "fits, arithmetic, identities"),
 )
 

@@ -10,7 +10,6 @@ from asperity.air import (
     NormalContact,
     bessel_ratio,
     mindlin_length_ratio,
-    normal_length,
     shear_viscosity_ratio,
 )
 from asperity.ledger import check
@@ -28,15 +27,6 @@ def only_fitting_parameter(machine: Machine) -> Mixed:
     p = machine.numbers
     fitted = [n for n in ("A", "B", "D0", "lambda", "transmission") if p[n].kind == "fitted"]
     return {"fitted": len(fitted), "names": " and ".join(fitted)}
-
-
-@check("normal-length-of-roughness")
-@check("normal-length")
-def length_of_the_contacts(machine: Machine) -> Numbers:
-    """The unrounded length: the stated 0.4 um has one digit."""
-    p = machine.numbers
-    length = float(normal_length(p.lambda_, p.lambda_over_lambda_z))
-    return {"lambda_z": length, "over the roughness": length / p.roughness}
 
 
 def _contact(machine: Machine) -> NormalContact:
