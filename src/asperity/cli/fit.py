@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import field_option, law_options, output_options, settings_of
+from asperity.cli.options import (
+    field_option,
+    law_options,
+    output_options,
+    parameter_name,
+    settings_of,
+)
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.report import Output, say
 from asperity.cli.words import fields_as_options
@@ -118,6 +124,11 @@ _THEN = (
 )
 
 
+def _with_name(prior: str) -> str:
+    name, equals, value = prior.partition("=")
+    return f"{parameter_name(name.strip())}={value}" if equals else prior
+
+
 def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
@@ -153,9 +164,11 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
                     "data": [{"file": path, "source": source, **of_run} for path in data],
                     "fixed": settings_of(fixed, "--fix"),
                     "start": settings_of(start, "--start"),
-                    "prior": prior,
+                    "prior": [_with_name(text) for text in prior],
                     **{n: v for n in _FIELDS if (v := others.pop(n, None)) is not None},
                 }
+                if "free" in fields:
+                    fields["free"] = ",".join(map(parameter_name, fields["free"].split(",")))
                 return command(fields=fields, **others)
 
         first = (
