@@ -27,13 +27,13 @@ from asperity.inference.runs.steps import (
     Free,
     arranged,
     integrated,
-    law_fields,
     with_values,
 )
 from asperity.laws import Law
+from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening
-from asperity.slider import Slider
 from asperity.slider.motion import Motion
+from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
 
 Float = NDArray[np.float64]
@@ -60,8 +60,8 @@ def run_equations(
     inertia, radiation_damping : bool
         What counts in the equation of motion.
     """
-    numbers = dict.fromkeys(law_fields(law).values(), jnp.ones(()))
-    slider = Slider(law(**numbers), spring=1.0, load=1.0, mass=float(inertia))
+    numbers = dict.fromkeys(law_parameters(law), jnp.ones(()))
+    slider = slider_from(law, numbers | {"K": 1.0, "W0": 1.0, "M": float(inertia)})
     # An array: as a number it would be part of the compiled program.
     V, eta = jnp.asarray(float(velocity)), 1.0 if radiation_damping else None
     return equation_of_motion(slider, V, 1.0, inertia=inertia, eta=eta)
