@@ -169,7 +169,7 @@ def fit(
                 "other, with the first as the prior of the second"
             )
     numbers = _Given(fixed or {}, material, prior, start)
-    motion = {"inertia": inertia, "radiation_damping": radiation_damping}
+    motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
         return _objective(

@@ -248,9 +248,8 @@ class Whitened:
         low, high, *_ = self.coordinates
         for k, *ends in zip(self.objective.unknowns, low, high, strict=True):
             if k.prior is not None:
-                known = k.prior
-                numbers = {"mean": known.mean, "sd": known.sd, "source": known.source}
-                result[k.name] = {"kind": "normal", **numbers}
+                known: dict[str, Any] = {n: getattr(k.prior, n) for n in ("mean", "sd", "source")}
+                result[k.name] = {"kind": "normal", **known}
             else:
                 kind = "uniform in the logarithm" if k.logarithmic else "uniform"
                 a, b = (float(k.to_value(end)) for end in ends)

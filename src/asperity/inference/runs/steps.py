@@ -324,8 +324,5 @@ def _combined(weights: Float, rates: Sequence[Array]) -> Array:
 
 def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
     """The equation of motion with other numbers of the law and the slider."""
-    slider = slider_from(type(motion.slider.law), values)
-    numbers: dict[str, Any] = {"slider": slider} | (
-        {"eta": values["eta"]} if "eta" in values else {}
-    )
-    return replace(motion, **numbers)
+    damping: dict[str, Any] = {name: values[name] for name in ("eta",) if name in values}
+    return replace(motion, slider=slider_from(type(motion.slider.law), values), **damping)

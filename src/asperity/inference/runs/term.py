@@ -120,7 +120,7 @@ class RunTerm(DataTerm):
         self._after_changes = (1.0, 1.0)
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
         none = np.zeros(0)
-        self.models = [Autoregression(none, max(np.mean(s**2) / 2, 1e-300)) for s in steps]
+        self.models = [Autoregression(none, max(float(np.mean(s**2)) / 2, 1e-300)) for s in steps]
         self._prepare()
 
     @property

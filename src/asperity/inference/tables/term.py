@@ -85,7 +85,7 @@ class LockInTerm(DataTerm):
     ) -> None:
         self.table, self.law = table, law
         self.name, self.observables = table.name, table.observables
-        self.motion = {"inertia": inertia, "radiation_damping": radiation_damping}
+        self.motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
         self.fixed = {
             n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
         }
@@ -258,7 +258,7 @@ class LockInTerm(DataTerm):
         )
         derivatives, zero = {}, np.zeros(self.table.rows)
         # Nothing depends on a parameter of other data.
-        none = values._replace(mean_friction=zero, harmonics=np.zeros((zero.size, 2), complex))
+        none: Any = Prediction(zero, zero, np.zeros((zero.size, 2), complex))
         for name in free:
             source, factor = ("epsilon", applied) if name == "eps_ratio" else (name, 1.0)
             slope = slopes.get(source, none)
@@ -396,7 +396,7 @@ class _CompiledResiduals:
     """Residuals of a table within compiled programs."""
 
     law: type[Law]
-    motion: tuple[tuple[str, bool], ...]
+    motion: tuple[tuple[str, Any], ...]
     search: bool
 
     def __call__(self, values: Mapping[str, Array], data: tuple[dict[str, Any], Weights]) -> Array:
