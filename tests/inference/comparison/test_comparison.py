@@ -296,7 +296,8 @@ def test_the_command_leaves_outliers_out(made, tmp_path, start):
 def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     """Its noise is estimated from what a law leaves: chi-squared is that of noise for every law."""
     run = next(runs_of(CASES["holds"], 1))
-    found = compare(run, ["rice-ruina", "ruina-slip"], ["A", "B", "D0"], evidence=False)
+    laws = ["rice-ruina", "ruina-slip"]
+    found = compare(run, laws, ["A", "B", "D0"], evidence=False, starts=8)
     assert found.best == "rice-ruina"
     (out,) = [j for j in found.laws.values() if j.excluded]
     lower = found.laws["rice-ruina"].fit.log_likelihood - out.fit.log_likelihood
