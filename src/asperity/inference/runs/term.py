@@ -112,7 +112,7 @@ class RunTerm(DataTerm):
         # In a list, which copies share: whatever the noise, the motion takes as many steps.
         self._room = [ROOMS[0]]
         self.motion = run_equations(
-            law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
+            law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
         self._columns = _linear_columns(run, linear)
