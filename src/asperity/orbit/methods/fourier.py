@@ -58,7 +58,10 @@ _LOOKED_AT = slice(1, None, 3)
 
 
 class FourierOrbit(NamedTuple):
-    """A `PeriodicOrbit` on the grid theta = tau + g sin(tau), one array for each state.
+    """An orbit on the grid theta = tau + g sin(tau), one array for each state.
+
+    A zero-mean part of 1e-9 of the mean keeps its digits, and hundreds of points fit into the cache
+    of a core; `asperity.orbit.mesh.mesh.Orbit` is for orbits that are steep.
 
     Attributes
     ----------
