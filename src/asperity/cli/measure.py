@@ -283,6 +283,7 @@ def _one(
     recording: Path, source: Source, question: Question, events: Path | None, output: Output
 ) -> int:
     from asperity._version import __version__
+    from asperity.cli.progress import waiting
     from asperity.measurement.from_file import answer_measurement
     from asperity.measurement.record import modulated_record, sliding_record
     from asperity.measurement.report import measured_sections
@@ -293,9 +294,10 @@ def _one(
     if events is not None:
         catalogue.check_catalogue(events)
         output_files({"--events": events}, inputs={"recording": recording})
-    trace = read_source(recording, source)
     result: Any
-    result, why = answer_measurement(trace, question)
+    with waiting(f"reading and measuring {recording.name}"):
+        trace = read_source(recording, source)
+        result, why = answer_measurement(trace, question)
     say(why)
     record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
     if hasattr(result, "regimes"):

@@ -97,6 +97,7 @@ def response(
 
 
 def _point(point: Point, output: Output) -> int:
+    from asperity.cli.progress import waiting
     from asperity.laws import get_law
     from asperity.operating_point import point_numbers, respond
     from asperity.parameters import OUTPUTS
@@ -104,7 +105,8 @@ def _point(point: Point, output: Output) -> int:
     output.require_picture()
     numbers = point_numbers(point, "command line")
     values = {name: number.value for name, number in numbers.items()}
-    result = respond(get_law(point.law), values)
+    with waiting("compiling the law's equations, kept for the next call"):
+        result = respond(get_law(point.law), values)
     if not result.converged:
         if output.as_json:
             output.answer(lambda: _record(result, numbers), list, point.law)
