@@ -156,9 +156,11 @@ def events_record(measurement: StickSlipMeasurement) -> list[dict[str, Any]]:
 def means(measurement: StickSlipMeasurement) -> dict[str, float]:
     """Number, means and spreads (standard deviations) of the events, as a campaign's row has them.
 
-    Uncertainties of means are from the spread: they count events as independent.
+    Uncertainties of means are from the spread: they count events as independent. All slips of a
+    recording may fall unlike the shape that is fitted: durations have that error in common.
     """
     events = measurement.events
+    common = np.sqrt(2.0) * float(np.median(events.timing_uncertainty)) if len(events) else 0.0
     row: dict[str, float] = {"events": len(events)}
     for name in ("drop", "recurrence", "stick_duration", "slip_duration"):
         values = column(measurement, name)
@@ -168,7 +170,9 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
             row |= {
                 name: float(np.mean(values)),
                 f"{name}_spread": spread,
-                f"{name}_uncertainty": spread / math.sqrt(values.size),
+                f"{name}_uncertainty": math.hypot(
+                    spread / math.sqrt(values.size), common * name.endswith("_duration")
+                ),
             }
     stiffness, doubt = measurement.stiffness_from_slope
     machine = measurement.machine

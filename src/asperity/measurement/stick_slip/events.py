@@ -178,7 +178,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     ]
     onset, end, squares, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
     # The usual residual, as correlated as the noise that detection has seen.
-    scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
+    scatter = falls.scatter * (np.sqrt(np.median(squares)) / falls.scatter[0] or 1.0)
     shapes = shape.timing, shift
     events = _measured(time, force, scatter, sums, (onset, end), first, stop, shapes)
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
@@ -314,9 +314,9 @@ class _Shape:
 #: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
 _SHAPES = (
     _Shape(_half_cosine, 2.65, driven=True),
-    _Shape(_half_cosine, 2.65),
     _Shape(_straight, 2.0),
     _Shape(_relaxing, 4.97),
+    _Shape(_half_cosine, 2.65),
 )
 _DISTANCE = 0.13
 #: Of 26 made recordings the true shapes stand out by 3.4 to 46 standard errors, others by 2.1.
@@ -346,7 +346,7 @@ def _shape(
     long = np.maximum(fits[0][1] - fits[0][0], 2.0)
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
     chosen = 0
-    for k in range(1, len(_SHAPES)):
+    for k in range(1, len(_SHAPES) - 1):
         if _excess((squares[chosen] - squares[k])[certain]) > _CLEAR:
             chosen = k
     onset, end, *_ = fits[chosen]
@@ -399,24 +399,25 @@ def _measured(
     # otherwise, in the mean over the events, is how the stick bends: creep, or a ringing gauge.
     doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
     half = sums.line(until - (until - first) // 2, until)
-    bend = (half[0] + half[1] * (onset - sums.origin) + sums.level - high).sum()
+    creeps = (half[0] + half[1] * (onset - sums.origin) + sums.level - high).sum()
     half = sums.line(since, since + (stop - since) // 2)
-    bend -= (half[0] + half[1] * (end - sums.origin) + sums.level - low).sum()
-    doubt = np.hypot(doubt, bend / drop.sum() * drop)
+    rings = (half[0] + half[1] * (end - sums.origin) + sums.level - low).sum()
+    rise = high - np.concatenate([high[:1] - drop[:1], low[:-1]])
+    doubt = np.hypot(doubt, creeps / rise.sum() * rise - rings / drop.sum() * drop)
     duration = end - onset
     long = np.maximum(duration, 2.0)
     fisher, shift = timing_of
     timing = fisher / np.sqrt(2.0) * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0])
     timing = np.hypot(long * np.hypot(timing, shift), _SAMPLING)
-    rates = np.hypot(left[1], right[1])
-    doubt = np.hypot(doubt, rates * timing)
+    doubt = np.hypot(doubt, (np.abs(left[1]) + np.abs(right[1])) * timing)
     # Sticks: from the end of one event to the onset of the next.
     stick = np.full(k, np.nan)
     stick[1:] = onset[1:] - end[:-1]
     slope, slope_doubt, creep, creep_doubt = (np.full(k, np.nan) for _ in range(4))
     if k > 1:
-        a = np.ceil(end[:-1]).astype(np.intp)
-        b = np.maximum(((end[:-1] + onset[1:]) / 2).astype(np.intp), a + 2)
+        quarter = (onset[1:] - end[:-1]) / 4
+        a = np.ceil(end[:-1] + quarter).astype(np.intp)
+        b = np.maximum((onset[1:] - quarter).astype(np.intp), a + 2)
         b = np.minimum(b, n)
         centre, mean, slope[1:] = _lines(force, a, b)
         count = (b - a).astype(float)
