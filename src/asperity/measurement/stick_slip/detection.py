@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,29 +179,19 @@ class _Averages:
     def __init__(self, force: Array, noise: Noise) -> None:
         self.force, self._noise = force, noise
         self._total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-        self._means: dict[int, tuple[Array, int]] = {}
-        self._falls: dict[tuple[int, float, float], tuple[Index, Index]] = {}
+        self.means, self.falls = cache(self._means), cache(self._falls)
 
-    def means(self, octave: int) -> tuple[Array, int]:
+    def _means(self, octave: int) -> tuple[Array, int]:
         """Means over 2^octave samples, and the samples from one to the next."""
-        if octave not in self._means:
-            width = 1 << octave
-            hop = max(1, width // 4)
-            first, last = self._total[:-width:hop], self._total[width::hop]
-            self._means[octave] = (last - first) / width, hop
-        return self._means[octave]
+        width = 1 << octave
+        hop = max(1, width // 4)
+        return (self._total[width::hop] - self._total[:-width:hop]) / width, hop
 
-    def falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
+    def _falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
         """Peaks and troughs of means, without those at the ends of the recording.
 
         `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
         """
-        key = octave, scatter, tilt
-        if key not in self._falls:
-            self._falls[key] = self._computed(*key)
-        return self._falls[key]
-
-    def _computed(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
         means, hop = self.means(octave)
         if tilt:
             means = means + tilt * hop * np.arange(means.size)

@@ -356,7 +356,8 @@ def _shape(
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
     chosen = 0
     for k in range(1, len(_SHAPES) - 1):
-        if _excess((squares[chosen] - squares[k])[certain]) > _CLEAR:
+        better = (squares[chosen] - squares[k])[certain]
+        if better.size > 1 and better.mean() > _CLEAR * better.std(ddof=1) / np.sqrt(better.size):
             chosen = k
     onset, end, *_ = fits[chosen]
     misfit = np.array([_root(fit[3] / drop**2) for fit in fits])
@@ -375,13 +376,6 @@ def _root(values: Array) -> float:
     """Root of a mean of squares, two standard errors above what it is."""
     error = values.std() / np.sqrt(max(values.size - 1, 1))
     return float(np.sqrt(max(values.mean() + 2 * error, 0.0)))
-
-
-def _excess(values: Array) -> float:
-    """Mean over its standard error; NaN of fewer than two values."""
-    if values.size < 2:
-        return float("nan")
-    return float(values.mean() / max(values.std(ddof=1) / np.sqrt(values.size), 1e-300))
 
 
 def _measured(
@@ -483,14 +477,9 @@ def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
     reach = np.broadcast_to(width[:, None] / 2, places.shape)
 
     def mean(low: Array, high: Array) -> Array:
-        return (_at(total, high) - _at(total, low)) / (high - low)
+        first, last = (np.interp(at + 0.5, np.arange(total.size), total) for at in (low, high))
+        return np.asarray((last - first) / (high - low))
 
     # Means over the halves before and after a place lie half a width apart.
     rate = (mean(places - reach, places) - mean(places, places + reach)) / reach
     return np.where(end - onset < 2.0, drop, rate.max(1))
-
-
-def _at(values: Array, places: Array) -> Array:
-    places = np.clip(places + 0.5, 0, values.size - 1)
-    low = np.minimum(places.astype(np.intp), values.size - 2)
-    return np.asarray(values[low] + (places - low) * (values[low + 1] - values[low]))
