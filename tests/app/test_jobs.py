@@ -15,13 +15,14 @@ COMPOSITE = Path(__file__).parents[2] / "examples" / "composite_law.py"
 
 
 @pytest.fixture
-def with_jobs(monkeypatch):
+def with_jobs(monkeypatch, tmp_path):
     """Call a coroutine function with `Jobs` whose workers know `unruly_jobs`."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=":")
 
     def run(work):
         async def whole():
-            jobs = Jobs(preload="unruly_jobs", laws=(f"{COMPOSITE}:Composite",))
+            laws = (f"{COMPOSITE}:Composite",)
+            jobs = Jobs(preload="unruly_jobs", laws=laws, folder=tmp_path)
             try:
                 return await work(jobs)
             finally:
@@ -38,23 +39,15 @@ async def messages(jobs, job, client="a", **options):
     return [m async for m in jobs.run(client, JOB + job, {"x": 1}, **options)]
 
 
-def test_workers_know_the_laws_that_the_server_was_given(with_jobs):
+def test_workers_know_laws_and_the_folder_that_the_server_was_given(with_jobs, tmp_path):
+    """What a killed worker leaves in the folder is removed by the server."""
+
     async def work(jobs):
-        return await messages(jobs, "laws")
+        return [(await messages(jobs, job))[-1]["result"] for job in ("laws", "place")]
 
-    (*_, last) = with_jobs(work)
-    assert {"rice-ruina", "composite"} <= set(last["result"])
-
-
-def test_a_worker_that_is_killed_leaves_its_files_to_the_server(with_jobs, tmp_path):
-    async def work(jobs):
-        jobs = Jobs(preload="unruly_jobs", folder=tmp_path)
-        try:
-            return await messages(jobs, "place")
-        finally:
-            await jobs.close()
-
-    assert with_jobs(work)[-1]["result"] == str(tmp_path)
+    laws, place = with_jobs(work)
+    assert {"rice-ruina", "composite"} <= set(laws)
+    assert place == str(tmp_path)
 
 
 def test_a_job_that_takes_too_much_is_ended(with_jobs):

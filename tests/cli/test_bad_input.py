@@ -87,14 +87,19 @@ def test_a_missing_option(asperity) -> None:
             "measure",
             "time (s),displacement (um),shear force (N)",
             [
-                "a second channel, the normal load, is missing: choose one of displacement, give",
+                "no column named like a normal load; give a constant one, like",
                 '--channel "load = 1200 N", or name F/W, like --column "friction=mu"',
             ],
         ),
         (
             "measure",
-            "time (s),displacement (um),normal force (N)",
-            ["a second channel, the shear force, is missing: choose one of displacement, or name"],
+            "time (s),horiz. load (N),vert. load (N)",
+            ['named like a normal load; choose one of horiz. load, vert. load, like --load "horiz'],
+        ),
+        (
+            "measure",
+            "time (s),Normal load (kg),Friction (kg)",
+            ["got 'Friction', a mass; say what its unit is, like --unit \"Friction=kgf\""],
         ),
         (
             "measure",

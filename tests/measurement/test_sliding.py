@@ -73,6 +73,14 @@ def test_friction_is_the_ratio_of_force_and_load() -> None:
     check(found)
     assert found.load.value == pytest.approx(STRESS, rel=1e-4)
     assert found.load_unit == "Pa"
+    exchanged = measure_sliding(
+        recorded(time, slip=slip, normal_stress=friction * load, shear_stress=load)
+    )
+    assert "are their columns exchanged?" in exchanged.checks[1].sentence
+    small = measure_sliding(
+        recorded(time, slip=slip, normal_stress=1e-3 * load, shear_stress=friction * load)
+    )
+    assert (small.checks[0].name, small.checks[0].verdict) == ("friction", "bad")
     assert found.verdict == "ok"
 
 

@@ -185,7 +185,7 @@ def test_channels_go_by_name_by_heading_and_by_role(rng):
         trace.channel("displacement")
     chosen = Trace(time, channels, roles={"displacement": "LP displacement"})
     assert np.array_equal(chosen.channel("slip").values, load * 2e-6)
-    with pytest.raises(InputError, match="must name a channel, got none like 'friction'"):
+    with pytest.raises(InputError, match="no column named like a friction coefficient; "):
         trace.channel("friction")
 
 

@@ -21,7 +21,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from asperity.app.api import TABS, catalogue
-from asperity.app.endpoints import Answer, Job, Upload, asked
+from asperity.app.endpoints import Answer, Job, Upload, question_in
 from asperity.app.jobs.processes import Jobs
 from asperity.app.jobs.threads import Lane, Preparation
 from asperity.app.security import BODY_LIMIT, Guard, body_too_slow, sentence
@@ -129,7 +129,7 @@ def build(
 
 def _answer(endpoint: Answer, lane: Lane) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
-        question = await asked(request, endpoint.question)
+        question = await question_in(request, endpoint.question)
         client = f"{endpoint.path} {_client(request)}"
         return _json(await lane.run(client, lambda: to_json(endpoint.answer(question))))
 
@@ -163,7 +163,7 @@ def _upload(endpoint: Upload, uploads: Uploads) -> Callable[[Request], Any]:
 
 def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
-        question = await asked(request, endpoint.question)
+        question = await question_in(request, endpoint.question)
         if endpoint.check is not None:
             endpoint.check(question)
         argument = question.model_dump()

@@ -110,7 +110,7 @@ class Upload:
     seconds: float = 900.0
 
 
-async def asked(request: Request, kind: type[Question]) -> Any:
+async def question_in(request: Request, kind: type[Question]) -> Any:
     """The question that a request holds.
 
     Raises

@@ -83,6 +83,18 @@ def _in_log(unit: str) -> Iterator[Callable[[int, int, str], None]]:
     yield show
 
 
+@contextmanager
+def waiting(doing: str) -> Iterator[None]:
+    """Say on a terminal what is done, where it takes long and has no parts to count."""
+    timer = threading.Timer(_SILENT, click.echo, [f"asperity: {doing} ..."], {"err": True})
+    if sys.stderr.isatty():
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
 INTERRUPTED = 130
 MESSAGE = "interrupted; nothing was written"
 

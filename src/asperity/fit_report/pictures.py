@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.figures.style import new_figure, style
 from asperity.fit_report.bands import Series, bands_of
 from asperity.inference import Fit, LockInTable
@@ -151,16 +151,13 @@ def draw_fit(fit: Fit) -> Figure:
     InputError
         If the fit has not converged, or is one of another kind of data.
     """
-    if not fit.converged:
-        raise InputError(f"plot must have a fit that converged, got one with: {fit.message}")
+    require(fit.converged, "plot", "have a fit that converged", f"one with: {fit.message}")
     for recording, _ in fit.parts(RunTerm):
         return run_figure(recording.run, {fit.law: recording.fitted_friction(fit.values)})
     for table, _ in fit.parts(LockInTerm):
         return data_figure(table.table, bands_of(fit, table, None))
-    raise InputError(
-        "plot must have a fit to a recording or a table of readings, got another kind of "
-        "data; plot its residuals yourself"
-    )
+    rule = "have a fit to a recording or a table of readings"
+    raise InputError("plot", rule, "another kind of data", "plot its residuals yourself")
 
 
 def svg(figure: Figure) -> str:

@@ -303,7 +303,7 @@ def _measured(
         checks.periods(reading),
         checks.signal(reading),
         checks.contact(reading),
-        checks.friction(reading),
+        checks.friction(reading.mean_friction),
         steadiness.leakage(reading),
         steadiness.steady_load(reading, time, load_values),
         steadiness.steady_response(reading),

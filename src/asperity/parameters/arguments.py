@@ -16,6 +16,7 @@ from types import GenericAlias, NoneType, UnionType
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.errors import InputError, InputTypeError, closest
 from asperity.parameters.parameter import obeying
@@ -104,9 +105,16 @@ class _OtherTypeError(Exception):
     """A value that an annotation does not allow."""
 
 
+def _origin_and_parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    # NumPy's NDArray and ArrayLike are named aliases on Python 3.12 and later.
+    kind = getattr(get_origin(kind) or kind, "__value__", kind)
+    return get_origin(kind) or kind, get_args(kind)
+
+
 def _taken(value: Any, kind: Any, name: str) -> Any:
-    origin, parts = get_origin(kind) or kind, get_args(kind)
-    if kind is Any or complex in parts:  # of ArrayLike: who converts it to SI knows what may stand
+    origin, parts = _origin_and_parts(kind)
+    # Of ArrayLike, alone or among others: who converts it to SI knows what may stand.
+    if kind is Any or kind is ArrayLike or complex in parts:
         return value
     if origin in (Union, UnionType):
         for part in parts:
@@ -166,7 +174,7 @@ _WORDS: Mapping[Any, str] = {
 
 
 def _words(kind: Any) -> str:
-    origin, parts = get_origin(kind) or kind, get_args(kind)
+    origin, parts = _origin_and_parts(kind)
     if origin in (Union, UnionType):
         return " or ".join(dict.fromkeys(map(_words, parts)))
     if origin is Annotated:

@@ -84,8 +84,8 @@ ROLES: Mapping[str, Role] = {
         "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
         "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
         "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
-        "shear shr tangential tangentielle tangenziale tangencial lateral laterale traction tau τ "
-        "reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
+        "shear shr tangential tangentiel tangentielle tangenziale tangencial lateral laterale "
+        "traction tau τ reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
         "tangentialkraft cisaillement taglio cizalla cortante",
         weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
         "reibung",
@@ -102,9 +102,9 @@ ROLES: Mapping[str, Role] = {
     ),
     "displacement": _role(
         "slip,position",
-        "x u d s slip lvdt weg gleitweg",
-        "disp displ displacement slip position weg gleitweg verschiebung deplacement spostamento "
-        "desplazamiento",
+        "x u d s slip lvdt weg gleitweg loadpoint lp lpd",
+        "disp displ displacement slip position stroke weg gleitweg verschiebung deplacement "
+        "spostamento desplazamiento",
         without="rate velocity vel speed geschwindigkeit",
         kinds="length",
     ),
@@ -119,7 +119,8 @@ ROLES: Mapping[str, Role] = {
     ),
 }
 
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[Α-Ωα-ω]+|\d+")
+# The load point, as in "LPdisp", is a word for itself.
+_WORD = re.compile(r"LP(?![A-Z])|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[Α-Ωα-ω]+|\d+")
 
 
 def words(name: str) -> list[str]:
@@ -179,45 +180,63 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
     """
     if name in chosen:
         return chosen[name]
-    if name in kinds:
-        return name
     role = role_of(name)
     if role is not None and role in chosen:
         return chosen[role]
-    same = [k for k in kinds if k.lower() == name.lower()]
+    same = [k for k in kinds if k.lower() == name.lower() and _may_be(role, kinds[k])]
+    if name in same:
+        return name
     fitting = same or (candidates(role, kinds) if role else [])
     if len(fitting) == 1:
         return fitting[0]
+    field = Argument("Trace.channel", role or name)
     if fitting:
         raise InputError(
-            Argument("Trace.channel", role or name),
+            field,
             "name one channel",
             f"several, {' or '.join(map(repr, fitting))}",
             f"choose when reading, like {Argument('columns', role or name, fitting[0])}",
         )
+    if role is None or not kinds:
+        advice = closest(name, kinds) if kinds else "the recording has no column besides time"
+        raise InputError(field, "name a channel", f"none like '{name}'", advice)
+    for other, kind in kinds.items():
+        if kind is not None and candidates(role, {other: None}):
+            unit = Argument("units", other, "kgf" if kind == "mass" else "...")
+            raise InputError(
+                field,
+                f"be a {' or '.join(sorted(ROLES[role].kinds))}",
+                f"'{other}', a {kind}",
+                f"say what its unit is, like {unit}, or choose another column",
+            )
     raise InputError(
-        Argument("Trace.channel", role or name),
-        "name a channel",
-        f"none like '{name}'",
-        _second(role, kinds)
-        or (closest(name, kinds) if kinds else "the recording has no column besides time"),
+        field, "name a channel", f"no column named like {_TITLES[role]}", _missing(role, kinds)
     )
 
 
-def _second(role: str | None, kinds: Mapping[str, str | None]) -> str:
-    """What to do where one of load and shear force is recorded and `role`, the other, is not."""
-    other = {"W": "F", "F": "W"}.get(role or "")
-    present = candidates(other, kinds) if other else []
-    others = sorted({*kinds} - {*present})
-    if len(present) != 1 or not others:
-        return ""
-    friction = Argument("columns", "friction", "mu")
+_TITLES = {
+    "time": "a time",
+    "W": "a normal load",
+    "F": "a shear force",
+    "velocity": "a velocity",
+    "displacement": "a displacement",
+    "friction": "a friction coefficient",
+}
+
+
+def _may_be(role: str | None, kind: str | None) -> bool:
+    """Whether a unit of `kind` does not contradict a role; a ratio may stand for a force."""
+    return role is None or kind in {None, "dimensionless"} | ROLES[role].kinds
+
+
+def _missing(role: str, kinds: Mapping[str, str | None]) -> str:
+    """What to do where no column is named like `role`."""
+    others = {n for r in ROLES if r != role for n in candidates(r, kinds)}
+    free = sorted({*kinds} - others)
+    like = Argument("columns", role, *free[:1])
+    ways = [f"choose one of {listed(free)}, like {like}"] if free else []
     if role == "W":
-        missing = "normal load"
-        ways = f"give a constant one, like {Argument('channels', 'load', '1200 N')}, or name F/W"
-    else:
-        missing, ways = "shear force", "or name F/W"
-    return (
-        f"a second channel, the {missing}, is missing: choose one of {listed(others)}, "
-        f"{ways}, like {friction}"
-    )
+        ways.append(f"give a constant one, like {Argument('channels', 'load', '1200 N')}")
+    if role in ("W", "F"):
+        ways.append(f"name F/W, like {Argument('columns', 'friction', 'mu')}")
+    return ", or ".join(ways) or closest(role, kinds)

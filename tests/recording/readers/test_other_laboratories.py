@@ -72,7 +72,7 @@ TEXTS = {
     ),
     "American afternoon": (NAMES + rows([f"05/02/2019 {c} PM" for c in clock()]), set()),
     "German dates": (
-        "Zeit;Normalkraft (N);Reibkraft (N)\n"
+        "Datum;Normalkraft (N);Reibkraft (N)\n"
         + rows([f"02-05-2019 {c}" for c in clock()], sep=";").replace(".", ","),
         set(),
     ),

@@ -32,7 +32,7 @@ from asperity.units import quantity_text
 Float = NDArray[np.float64]
 
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
-_RIVAL = 9.0
+RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
 #: between which intervals of the normal approximation are taken: a quarter too wide or too narrow.
 _TRIED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
@@ -389,7 +389,7 @@ def _rivals(
     asked = np.array([not k.nuisance for k in objective.unknowns])
     kept = [minima[0]]
     for u, chi2 in minima[1:]:
-        if chi2 - minima[0][1] > _RIVAL:
+        if chi2 - minima[0][1] > RIVAL:
             continue
         # Those that differ in nuisances alone, such as the times of steps, are one answer.
         away = [(np.abs(u - v)[asked] / sd[asked]).max(initial=0.0) for v, _ in kept]

@@ -58,7 +58,7 @@ from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.tables.table import LockInTable, joined
-from asperity.inference.tables.term import Forward, LockInTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material
@@ -436,7 +436,7 @@ def _objective(
         require_free(law, free, priors, bare=bare)
     if table is not None:
         require_enough(table, unknowns)
-        terms.append(LockInTerm(table, Forward(law, table, constants, **motion)))
+        terms.append(LockInTerm(table, law, constants, **motion))
     if recordings:
         if shared and table is None:
             unknowns.append(shared_stiffness(recordings, begun, priors))

@@ -17,7 +17,7 @@ from asperity.inference.fitting.minima import minima_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import stiffness_in
 from asperity.inference.runs.run import RecordedRun
-from asperity.inference.tables.term import Forward, LockInTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
 
 #: Decrease of AICc with the stiffness of each run free that contradicts a fixed or shared one.
@@ -173,21 +173,13 @@ def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
     if fit.dof <= 0 or fit.p_value >= _FAILS:
         return None
     (term,) = tables
-    before = term.forward
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
-    forward = Forward(
-        objective.law,
-        term.table,
-        fixed,
-        inertia=before.inertia,
-        radiation_damping=before.radiation_damping,
-    )
     largest = float(term.table.points["epsilon"].max())
     start = {"K": float(given[0])}
     (own,) = unknowns_of(objective.law, ["K"], largest_epsilon=largest, start=start, priors={})
     freed = replace(
         objective,
-        terms=(LockInTerm(term.table, forward),),
+        terms=(LockInTerm(term.table, objective.law, fixed, **term.motion),),
         unknowns=(*objective.unknowns, own),
         fixed=fixed,
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.inference.fitting.result import Fit
-from asperity.inference.tables.term import Forward, LockInTerm
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
@@ -48,8 +48,9 @@ def shift_of_estimates(
     (term,) = tables
     sides = []
     for change in (high, low):
-        forward = Forward(fit.objective.law, term.table, {**fit.objective.fixed, **change})
-        residuals = LockInTerm(term.table, forward).residuals(fit.values, search=True)
+        fixed = {**fit.objective.fixed, **change}
+        changed = LockInTerm(term.table, fit.objective.law, fixed, **term.motion)
+        residuals = changed.residuals(fit.values, search=True)
         if residuals is None:
             return dict.fromkeys(fit.values, math.inf)
         sides.append(residuals)

@@ -111,23 +111,6 @@ class HoldTerm(DataTerm):
             float(np.log(sigma).sum()),
         )
 
-    def chi2_of_many(
-        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
-    ) -> Float:
-        """Sums of squared residuals at many sets of parameters; see `DataTerm`."""
-        rows, sets = self.table.rows, len(values)
-        predicted = np.empty(rows * sets)
-        for i in range(0, predicted.size, _MANY):
-            flat = np.minimum(np.arange(i, i + _MANY), predicted.size - 1)
-            which, at = np.divmod(flat, rows)
-            free = {n: np.array([v[n] for v in values])[which] for n in values[0]}
-            given = self._given(free, at)
-            found = _healing(self.law, tuple(self._fields.items()), given, *self._at(at))
-            end = min(i + _MANY, predicted.size)
-            predicted[i:end] = np.asarray(found)[: end - i]
-        off = (predicted.reshape(sets, rows) - self.table.healing) / self.sigma
-        return np.where(np.isfinite(off).all(1), np.sum(np.nan_to_num(off) ** 2, 1), np.inf)
-
     def _given(self, values: Mapping[str, Any], at: NDArray[np.intp]) -> dict[str, Array]:
         """Parameters of the law at some rows."""
         known = {**self._fixed, **{n: v for n, v in values.items() if n in self._fields}}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -353,7 +354,8 @@ def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
         slider,
         (law, values["K"], values["W0"], values.get("M", slider.M)),
     )
-    return eqx.tree_at(lambda m: m.slider, motion, changed)
+    motion = eqx.tree_at(lambda m: m.slider, motion, changed)
+    return replace(motion, eta=values["eta"]) if "eta" in values else motion
 
 
 def law_fields(law: type[Law]) -> dict[str, str]:

@@ -112,7 +112,7 @@ def _given_or_measured(
             f"{Argument('velocities')}"
         )
     result = (
-        partition(time, displacement, signals.friction)
+        partition(time, displacement)
         if steps is None
         else partition_at(time, displacement, np.array(steps))
     )

@@ -17,7 +17,7 @@ from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing
 from asperity.measurement.sliding.segments import Partition, partition, partition_at
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
-from asperity.measurement.verdicts.checks import findings
+from asperity.measurement.verdicts.checks import findings, friction
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
 from asperity.parameters.parameter import Drawn, SummaryLine
 
@@ -188,7 +188,7 @@ def measure_sliding(
     time, friction = signals.time, signals.friction
     times = _given_cuts(time, steps, holds)
     if times is None:
-        cut = partition(time, signals.displacement, friction)
+        cut = partition(time, signals.displacement)
     else:
         cut = partition_at(time, signals.displacement, np.array(times))
         cut = _with_holds(cut, time, holds)
@@ -369,13 +369,23 @@ def _rates(time: Array) -> tuple[tuple[float, float], ...]:
     return tuple((float(1 / values[i]), float(counts[i] / steps.size)) for i in order)
 
 
+def _exchanged(signals: SlidingSignals, spread: float) -> str:
+    """A question where the larger of two signals is called shear and varies less than the load."""
+    borne, friction = signals.load, signals.friction
+    if borne is None or borne.size != friction.size or abs(friction.mean()) < 1:
+        return ""
+    shear = friction * borne
+    steadier = float(shear.std() / abs(shear.mean())) < spread
+    return "; the shear is larger and steadier: are their columns exchanged?" if steadier else ""
+
+
 def _checks(
     signals: SlidingSignals,
     segments: tuple[SlidingSegment, ...],
     steps: list[VelocityStep],
     doubts: list[str],
 ) -> list[Check]:
-    checks = []
+    checks = [friction(float(np.abs(signals.friction).mean()))]
     borne, mean = signals.load, max(abs(float(signals.friction.mean())), 1e-300)
     if borne is not None and borne.size:
         spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
@@ -384,7 +394,8 @@ def _checks(
                 "load",
                 spread,
                 LIMITS["load"],
-                f"the load's standard deviation is {100 * spread:.2g} % of its mean",
+                f"the load's standard deviation is {100 * spread:.2g} % of its mean"
+                + _exchanged(signals, spread),
             )
         )
     sliding = [s for s in segments if not s.hold] or list(segments)

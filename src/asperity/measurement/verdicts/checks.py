@@ -257,9 +257,8 @@ def contact(reading: LockInReading) -> Check:
     )
 
 
-def friction(reading: LockInReading) -> Check:
-    """Whether the mean friction is one."""
-    number = reading.mean_friction
+def friction(number: float) -> Check:
+    """Whether a mean of F/W0 is a friction coefficient of contacts."""
     limits = LIMITS["high friction" if number > LIMITS["low friction"][0] else "low friction"]
     sentence = (
         f"the mean of F/W0 is {number:.4g}, where contacts have {LIMITS['low friction'][0]:g} to 2"

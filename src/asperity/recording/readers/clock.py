@@ -57,7 +57,7 @@ def settle_time(
     rate: float | str | None,
     recorded: RawRecording,
 ) -> Clock:
-    """Time from the user's choice, else from a column named like time, else from the interval.
+    """Time from the user's choice, a column named like time, the interval, or a column of dates.
 
     Raises
     ------
@@ -85,6 +85,9 @@ def settle_time(
     if recorded.step is not None:
         time = np.asarray(recorded.start + np.arange(rows) * recorded.step)
         return Clock(time, f"interval of {recorded.step:.10g} s in the file")
+    for name, raw in values.items():
+        if raw.dtype.kind not in "iufb" and _elapsed(raw[:1]) is not None:
+            return _from_dates(name, raw)
     return _from_first_column(values, units, recorded)
 
 
@@ -101,8 +104,8 @@ def _from_first_column(
             Argument("columns", "time"),
             "be a column",
             f"none among {listed(map(repr, values))} that is named like time",
-            f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or say which column "
-            f"it is, like {Argument('columns', 'time', first)}",
+            f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or, if one of them "
+            f"is time, its name with {Argument('columns', 'time', '...')}",
         )
     clock = _from_column(first, values, units)
     assumed = Finding(
