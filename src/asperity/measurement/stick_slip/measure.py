@@ -243,7 +243,8 @@ def measure_stick_slip(
     about += signals.signs
     crowded = _CROWDED if any(regime.sticks for regime in parts) else CROWDED
     for name in signals.names:
-        about += saturation(trace.channel(name).values, trace.time, name, crowded)
+        cut_off = saturation(trace.channel(name).values, trace.time, name, crowded)
+        about += [f for f in cut_off if f.name == "saturation"]
     checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
     steps = coarsely_rounded(signals.friction)
     if steps and len(events):
@@ -377,7 +378,7 @@ def _hidden(result: StickSlipMeasurement) -> tuple[float, float]:
     after = np.concatenate(
         [[], *(np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks)]
     ).astype(np.intp)
-    if after.size < LIMITS["events"][1]:
+    if after.size < LIMITS["events"][1] or not result.loading_slope > 0:
         return np.nan, np.nan
     total = np.concatenate([[0.0], np.cumsum(result.friction)])
     quarter = events.stick_duration[after] / 4
@@ -398,7 +399,8 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         check = judged(name, number, LIMITS[name], sentence, significant=abs(number) >= 3 * error)
         checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
 
-    ask("events", count, f"{count} complete events", "; means and spreads of so few say little")
+    text = f"{count} complete event{'' if count == 1 else 's'}"
+    ask("events", count, text, "; means and spreads of so few say little")
     open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
     kind = result.kind
     for one in open_[:1]:
