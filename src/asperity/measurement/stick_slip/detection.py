@@ -299,8 +299,9 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
 def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise twice as fast as the loading around it is the
-    instrument's. Loading is as fast as the fastest rises but for a quarter of the time.
+    The slider does not move backwards: a rise that is closer to the usual fall than to the loading
+    around it, on a logarithmic scale, is the instrument's. Loading is as fast as the fastest rises
+    but for a quarter of the time.
     """
     if peak.size < 3:
         return peak, trough
@@ -314,5 +315,6 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
     fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
     usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
-    apart = rate <= 2 * usual
+    fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
+    apart = rate <= np.sqrt(np.maximum(usual * fall, 0.0))
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]
