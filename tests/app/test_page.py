@@ -40,6 +40,11 @@ def test_no_barrier_that_axe_knows_of_and_nothing_wider_than_the_screen(visit, b
     for width in (375, 800, 1440):
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        # Nor is a picture wider than its panel, which clips it.
+        page.wait_for_function(
+            "[...document.querySelectorAll('.plot svg')].every("
+            "(e) => e.clientWidth <= e.parentElement.clientWidth)"
+        )
     if tab == "map":  # left at work, its process would be ended, and with it what it has compiled
         page.get_by_text("16 × 16 points.").wait_for()
 
