@@ -81,7 +81,7 @@ def by_moduli(objective):
     size = {n: float(np.median(table.errors[n])) for n in ("delta_mu", "mu1", "mu2")}
 
     def residuals(x):
-        predicted, _, _ = term.forward(dict(zip(TRUTH, x * list(TRUTH.values()), strict=True)))
+        predicted, _, _ = term.predicted(dict(zip(TRUTH, x * list(TRUTH.values()), strict=True)))
         parts = {"delta_mu": predicted.mean_friction - predicted.mu_ss}
         parts |= {f"mu{n}": np.abs(predicted.harmonics[:, n - 1]) for n in (1, 2)}
         return np.concatenate([(parts[n] - table.values[n]) / size[n] for n in parts])
@@ -163,14 +163,14 @@ def fit_problem(table, material):
     """The objective of a fit, without its search for minima."""
     from asperity.inference.fitting.inputs import fixed_values
     from asperity.inference.objective import Objective
-    from asperity.inference.tables.term import Forward, LockInTerm
+    from asperity.inference.tables.term import LockInTerm
     from asperity.inference.unknowns import unknowns_of
     from asperity.laws import get_law
 
     law = get_law("elasto-plastic")
     unknowns = unknowns_of(law, list(TRUTH), largest_epsilon=0.5, start=TRUTH, priors={})
     fixed = fixed_values(law, table, list(TRUTH), None, material)
-    return Objective((LockInTerm(table, Forward(law, table, fixed)),), law, unknowns, fixed)
+    return Objective((LockInTerm(table, law, fixed),), law, unknowns, fixed)
 
 
 if __name__ == "__main__":

@@ -277,7 +277,7 @@ def test_the_library_imports_no_paper() -> None:
         "from asperity.orbit import search",
         "from asperity import _version",
         "from asperity.errors import closest",
-        "def f():\n    from asperity.inference.tables.term import Forward",
+        "def f():\n    from asperity.inference.tables.term import LockInTerm",
     ],
 )
 def test_a_planted_private_name_is_caught(line: str) -> None:

@@ -370,7 +370,7 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
         "posterior": True, "chains": 2, "draws": 100, "seed": 7,
     }  # fmt: skip
     sent = []
-    whole = {"asked": fits.Fitted.model_validate(asked).model_dump(), "files": []}
+    whole = {"question": fits.Fitted.model_validate(asked).model_dump(), "files": []}
     result = fits.fit(whole, lambda **message: sent.append(message))
     assert {"draws": 50, "of": 800} in sent
     assert result["posterior"]["seed"] == 7
@@ -423,66 +423,60 @@ def test_a_wrong_fit_gets_a_sentence(ask, changed, word):
     assert " must " in error
 
 
-def test_a_recording_is_dropped_measured_and_restored_from_its_link(
-    visit, barriers, modulated, tmp_path
+def test_recordings_are_dropped_measured_and_restored_from_their_link(
+    visit, barriers, modulated, sawtooth, tmp_path
 ):
-    (tmp_path / "good.csv").write_bytes(modulated)
-    (tmp_path / "bad.csv").write_bytes(b"PK\x03\x04" + b"\0" * 500)
     page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
-    page.set_input_files("#data-files", [tmp_path / "bad.csv", tmp_path / "good.csv"])
-    good, bad = (
-        page.locator(".recording[aria-label='good.csv']"),
-        page.locator(".recording[aria-label='bad.csv']"),
+    contents = {"good.csv": modulated, "events.csv": sawtooth}
+    page.set_input_files(
+        "#data-files",
+        [{"name": n, "mimeType": "text/csv", "buffer": content} for n, content in contents.items()],
     )
-    bad.locator(".message", has_text="must").wait_for()
+    good, events = (page.locator(f".recording[aria-label='{name}']") for name in contents)
     good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
     assert good.locator("figure").count() == 4
-    assert barriers(page) == []
-    page.get_by_role("button", name="Remove bad.csv").click()
-    page.wait_for_url(lambda url: "good.csv" in url and "bad.csv" not in url)
-    again = visit(page.url.split("/")[-1])
-    # While the link is opened, a channel is given another role by hand on the first page.
-    page.locator("summary", has_text="Channels").first.click()
-    page.get_by_label("Role of Fn").select_option("F")
-    again.locator(".sentence", has_text="Modulated at 20 Hz").wait_for()
-    good.locator(".message", has_text="must").wait_for()
-
-
-def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(
-    visit, barriers, sawtooth, tmp_path
-):
-    page = visit("#data", bypass_csp=True)
-    page.locator(".drop").wait_for()
-    page.set_input_files(
-        "#data-files", [{"name": "events.csv", "mimeType": "text/csv", "buffer": sawtooth}]
-    )
-    sentence = page.locator(".recording .sentence", has_text="Regular stick-slip: ")
+    # Tables are those of the command, with a box for each amplitude.
+    parts = good.get_by_role("region", name="What was measured of good.csv").locator("tbody tr")
+    assert parts.count() == 1
+    mu1 = float(parts.inner_text().split("\t")[8].split()[0])
+    assert mu1 == pytest.approx(MU1, rel=0.01)
+    assert parts.get_by_label("Use part 1 in fits").is_checked()
+    assert "against the load" in good.get_by_role("region", name="good.csv: ").inner_text()
+    sentence = events.locator(".sentence", has_text="Regular stick-slip: ")
     sentence.wait_for()
     count = int(sentence.inner_text().split(": ")[1].split()[0])
-    table = page.get_by_role("region", name="Catalogue of events")
+    table = events.get_by_role("region", name="Catalogue of events")
     assert table.locator("tbody tr").count() == count
     assert barriers(page) == []
-    assert page.locator(".panel.drops .plot .point").count() == count - 1
+    assert events.locator(".panel.drops .plot .point").count() == count - 1
     with page.expect_download() as waited:
-        page.get_by_role("button", name="Catalogue as CSV").click()
+        events.get_by_role("button", name="Catalogue as CSV").click()
     waited.value.save_as(tmp_path / "events.csv")
     head, *rows = (tmp_path / "events.csv").read_text().splitlines()
     assert head.startswith("onset (s),end (s)")
     assert len(rows) == count
-    plot = page.locator(".panel.whole .plot")
+    plot = events.locator(".panel.whole .plot")
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 60, steps=4)
     page.mouse.up()
-    page.get_by_role("button", name="Measure the whole recording").wait_for()
-    begin, end = map(float, page.get_by_label("Window (s)").input_value().split(":"))
+    events.get_by_role("button", name="Measure the whole recording").wait_for()
+    begin, end = map(float, events.get_by_label("Window (s)").input_value().split(":"))
     assert 0 < begin < end < 30
-    onsets = page.locator(".catalogue tbody td:nth-child(2)").all_inner_texts()
+    onsets = events.locator(".catalogue tbody td:nth-child(2)").all_inner_texts()
     assert len(onsets) < count
     assert begin <= float(onsets[0].split()[0]) <= float(onsets[-1].split()[0]) <= end
+    page.get_by_role("button", name="Remove events.csv").click()
+    page.wait_for_url(lambda url: "good.csv" in url and "events.csv" not in url)
+    again = visit(page.url.split("/")[-1])
+    # While the link is opened, a channel is given another role by hand on the first page.
+    page.locator("summary", has_text="Channels").first.click()
+    page.get_by_label("Role of Fn").select_option("F")
+    again.locator(".sentence", has_text="Modulated at 20 Hz").wait_for()
+    good.locator(".message", has_text="must").wait_for()
 
 
 #: Rate-and-state friction of `steps`, of which a fit finds A, B and D0 in few iterations.
@@ -525,11 +519,11 @@ def steps(stepped, tmp_path):
         "laws": ["rice-ruina"], "free": ["A", "B", "D0"], "material": "bureau2000",
         "runs": [{"recording": "0" * 32, "window": [0.5, 2.75]}],
     }  # fmt: skip
-    return {"asked": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
+    return {"question": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
 
 
 def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
-    asked = fits.Fitted(**steps["asked"])
+    asked = fits.Fitted(**steps["question"])
     (data,) = fits._data(asked, steps["files"], tmp_path)
     (run,) = read_data(questions.Fit(data=[data]), fits._read)
     direct = asp.inference.recorded_run(steps["files"][0]["path"], window=(0.5, 2.75))
@@ -540,12 +534,12 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
 
 
 def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monkeypatch):
-    steps["asked"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
+    steps["question"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
     more = {
         "fit_rate": "2 Hz", "gauge": "50 Hz", "fixed": {"W0": "10 N"}, "drift": True,
         "prior": {"K": "0.2+-0.01 N/um"}, "trend": "quadratic",
     }  # fmt: skip
-    page = fits.Fitted(**steps["asked"], **more)
+    page = fits.Fitted(**steps["question"], **more)
     command = shlex.split(fits._fit_command(page, ["steps.csv"]))
     asked = []
     monkeypatch.setattr(
@@ -578,8 +572,8 @@ def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monk
     ],
 )
 def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, word):
-    steps["asked"] |= asked
-    steps["asked"]["runs"][0] |= run
+    steps["question"] |= asked
+    steps["question"]["runs"][0] |= run
     with pytest.raises(InputError, match=" must ") as refused:
         fits.fit(steps, lambda **message: None)
     assert word in str(refused.value)
@@ -642,6 +636,6 @@ def number(text):
 
 
 def test_a_fit_needs_a_recording_that_was_sent(ask, steps):
-    answer = ask("data/fit", steps["asked"])
+    answer = ask("data/fit", steps["question"])
     assert answer.status == 400
     assert "recording must be" in answer.json["error"]

@@ -92,6 +92,24 @@ def test_a_formula_is_decided_by_the_independent_number(printed, derived, verdic
     assert formula_verdict(printed, derived, math.nan, 0.01) == "differs"
 
 
+@pytest.mark.parametrize(
+    ("formula", "expected"),
+    [
+        ("a/b.high - 2*lambda_**2", 6 / 4 - 2 * 25),
+        ("sqrt(a + 3)*ln(b.high)/pi", 3 * math.log(4) / math.pi),
+    ],
+)
+def test_a_formula_of_printed_numbers(formula, expected):
+    numbers = {"a": 6.0, "b.high": 4.0, "lambda": 5.0}
+    assert rules.formula_value(formula, numbers, "x") == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("formula", ["a b", "__import__('os')", "a.b", "1/0", "[a]", "ln(0)", ""])
+def test_what_is_no_formula_of_printed_numbers_is_refused(formula):
+    with pytest.raises(InputError, match=r"x.values must be a (formula|number)"):
+        rules.formula_value(formula, {"a": 1.0}, "x.values")
+
+
 def test_claims_and_checks_belong_together():
     @check("no-such-claim")
     def computed(model):

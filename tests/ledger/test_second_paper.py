@@ -50,7 +50,7 @@ def test_verdicts_and_conclusions_of_the_second_paper(installed):
     assert varied.verdicts == ("differs", "reproduced")
     (headline,) = paper.headlines(claims)
     assert headline.standing == "holds at the central values"
-    assert headline.found == "1.592 Hz."
+    assert headline.result == "1.592 Hz."
 
 
 def test_the_second_paper_is_reproduced_by_its_name(installed, tmp_path):

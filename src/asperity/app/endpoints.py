@@ -48,7 +48,7 @@ class Answer:
 class Job:
     """A computation of any length in a worker process, answered with a line of JSON per message.
 
-    It ends when the page closes the connection, or begins another job on the same path.
+    It ends when the page closes the connection.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Upload:
     seconds: float = 900.0
 
 
-async def asked(request: Request, kind: type[Question]) -> Any:
+async def question_in(request: Request, kind: type[Question]) -> Any:
     """The question that a request holds.
 
     Raises

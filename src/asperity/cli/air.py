@@ -9,9 +9,11 @@ import click
 from asperity.cli.options import (
     material_named,
     material_option,
+    option,
     output_options,
     set_option,
     settings_of,
+    switch,
 )
 from asperity.cli.report import Output, say
 from asperity.errors import require
@@ -46,20 +48,18 @@ Parameters: R, h0, P0, eta of the layer; W0, M, lambda_z of the slider.
 
 
 @click.command(epilog=_EPILOG)
-@click.option(
-    "-f",
-    "--frequency",
-    "frequencies",
-    metavar="VALUE",
+@option(
+    "-f --frequency frequencies",
+    "VALUE",
+    'Modulation frequency, like "120 Hz"; repeatable.',
     multiple=True,
     required=True,
-    help='Modulation frequency, like "120 Hz"; repeatable.',
 )
 @material_option()
 @set_option('--set "R=2.5 cm"')
-@click.option("--vacuum", is_flag=True, help="Without air between the surfaces.")
-@click.option("--inverse", metavar="RATIO", help="Find what gives this eps_eff/eps.")
-@click.option("--for", "sought", metavar="radius|gap", help="What --inverse looks for.")
+@switch("--vacuum", "Without air between the surfaces.")
+@option("--inverse", "RATIO", "Find what gives this eps_eff/eps.")
+@option("--for sought", "radius|gap", "What --inverse looks for.")
 @output_options()
 def air(
     frequencies: tuple[str, ...],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import output_options
+from asperity.cli.options import option, output_options
 from asperity.cli.report import Output
 
 if TYPE_CHECKING:
@@ -33,16 +33,14 @@ line by line, examples/load_on_age.toml is one.
 
 @click.command(epilog=_EPILOG)
 @click.argument("plan", type=Path)
-@click.option(
+@option(
     "--simulate",
-    type=click.IntRange(0, 100_000),
+    "N",
+    "Fit N synthetic sets of readings and compare the spread of the estimates.",
+    click.IntRange(0, 100_000),
     default=0,
-    metavar="N",
-    help="Fit N synthetic sets of readings and compare the spread of the estimates.",
 )
-@click.option(
-    "--csv", "table", type=Path, metavar="CSV", help="Write the points as a table for `response`."
-)
+@option("--csv table", "CSV", "Write the points as a table for `response`.", Path)
 @output_options()
 def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int:
     """Operating points that measure parameters or exclude a law best.

@@ -12,9 +12,11 @@ import click
 from asperity.cli.options import (
     field_option,
     law_options,
+    option,
     output_options,
     parameter_name,
     settings_of,
+    switch,
 )
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.report import Output, say
@@ -96,28 +98,26 @@ def _field(name: str) -> Any:
 
 #: Options of the data and of what is estimated, what is needed first before the others.
 _FIRST = (
-    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
+    option("--window", "START:END", "Seconds of a recording to fit."),
     _field("free"),
-    click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."),
-    click.option("--start", multiple=True, metavar="NAME=VALUE", help="Start value."),
+    option("--fix fixed", "NAME=VALUE", "Fix a parameter.", multiple=True),
+    option("--start", "NAME=VALUE", "Start value.", multiple=True),
     _field("material"),
-    click.option(
+    option(
         "--prior",
+        "NAME|NAME=VALUE+-SD",
+        'Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
         multiple=True,
-        metavar="NAME|NAME=VALUE+-SD",
-        help='Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
     ),
 )
 _THEN = (
-    click.option(
+    option(
         "--steps",
-        metavar="TIMES|FILE",
-        help="Times (s) at which the velocity of the drive changes, where no channel has it.",
+        "TIMES|FILE",
+        "Times (s) at which the velocity of the drive changes, where no channel has it.",
     ),
-    click.option(
-        "--velocities",
-        metavar="VALUES",
-        help='Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.',
+    option(
+        "--velocities", "VALUES", 'Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.'
     ),
     *(_field(n) for n in ("stiffness_from", "trend", "drift", "initial", "gauge", "gauge_order")),
     *(_field(name) for name in ("fit_rate", "profile", "inertia", "radiation_damping")),
@@ -174,18 +174,18 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
         first = (
             click.argument("data", nargs=-1, required=True, type=Path),
             law_options,
-            click.option(
+            option(
                 "--report",
-                type=Path,
-                metavar="DIR",
-                help="Folder for a page with pictures, the numbers, and a material.",
+                "DIR",
+                "Folder for a page with pictures, the numbers, and a material.",
+                Path,
             ),
             output_options(plot=True),
             *_FIRST,
         )
         result: Callable[..., Any] = gathered
-        for option in reversed((*first, source_options, *_THEN, *further)):
-            result = option(result)
+        for add in reversed((*first, source_options, *_THEN, *further)):
+            result = add(result)
         return result
 
     return with_options
@@ -194,13 +194,11 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
 @click.command(epilog=_EPILOG)
 @_question_options(
     _field("windows"),
-    click.option("--posterior", is_flag=True, help="Sample the posterior (extra 'bayes')."),
-    click.option("--chains", default=4, show_default=True, metavar="N", help="Chains."),
-    click.option(
-        "--draws", default=1000, show_default=True, metavar="N", help="Draws of each chain."
-    ),
-    click.option("--seed", default=0, show_default=True, metavar="N", help="Of the draws."),
-    click.option("--out", type=Path, metavar="NC", help="Where the draws go, for ArviZ."),
+    switch("--posterior", "Sample the posterior (extra 'bayes')."),
+    option("--chains", "N", "Chains.", default=4, show_default=True),
+    option("--draws", "N", "Draws of each chain.", default=1000, show_default=True),
+    option("--seed", "N", "Of the draws.", default=0, show_default=True),
+    option("--out", "NC", "Where the draws go, for ArviZ.", Path),
 )
 def fit(
     laws: tuple[str, ...],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import output_options, point_options
+from asperity.cli.options import option, output_options, point_options, switch
 from asperity.cli.report import Output, save_figure, say
 from asperity.errors import require
 from asperity.parameters.arguments import one_of
@@ -34,21 +34,21 @@ bifurcation and the frequency of its mode.
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--x", "x", metavar="AXIS", help='Number along x, like "epsilon=0.01:0.5:200".')
-@click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
+@option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".')
+@option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".')
 @point_options
 @output_options(plot=True)
-@click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
-@click.option(
+@option("--out", "NC", "Where the map goes, as NetCDF.", Path)
+@option(
     "--show",
-    metavar="QUANTITY",
+    "QUANTITY",
+    "What the picture shows: mu1, delta_mu, floquet_max, ...",
     default="growth_rate",
     show_default=True,
-    help="What the picture shows: mu1, delta_mu, floquet_max, ...",
 )
-@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
-@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
-@click.option("--resume", is_flag=True, help="Go on with an interrupted map.")
+@switch("--log-x", "Points along x at equal ratios.")
+@switch("--log-y", "Points along y at equal ratios.")
+@switch("--resume", "Go on with an interrupted map.")
 def map(
     x: str | None,
     y: str | None,
@@ -73,12 +73,12 @@ def map(
     from asperity.study.map import SHOWN, Axis, write_map
 
     one_of(show, SHOWN, "--show")
-    for option, text, example in (
+    for name, text, example in (
         ("--out", out, "map.nc"),
         ("--x", x, "'epsilon=0.01:0.5:200'"),
         ("--y", y, "'K=0.05:0.5:200 N/um'"),
     ):
-        require(text, option, "be given", "nothing", f"write it like {option} {example}")
+        require(text, name, "be given", "nothing", f"write it like {name} {example}")
     assert out is not None
     output.require_picture()
     output_files({"--out": out, "--plot": output.plot})

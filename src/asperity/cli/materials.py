@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import output_options
+from asperity.cli.options import output_options, switch
 from asperity.cli.report import Output
 from asperity.errors import require
 
@@ -27,7 +27,7 @@ a fit), assumed (not in the paper).
 
 @click.command(epilog=_EPILOG)
 @click.argument("name", required=False)
-@click.option("--cite", is_flag=True, help="Print the source as BibTeX.")
+@switch("--cite", "Print the source as BibTeX.")
 @output_options()
 def materials(name: str | None, cite: bool, output: Output) -> None:
     """List the materials, or every number of one.

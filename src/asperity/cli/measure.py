@@ -13,10 +13,12 @@ from asperity.cli.options import (
     field_option,
     law_option,
     material_option,
+    option,
     output_options,
     point_of,
     set_option,
     settings_of,
+    switch,
 )
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.report import Output, say
@@ -138,15 +140,15 @@ in place of numbers; 2: bad input.
     _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
     "START:END",
 )  # fmt: skip
-@click.option(
+@option(
     "--steps",
-    metavar="TIMES|FILE",
-    help="Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
+    "TIMES|FILE",
+    "Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
 )
-@click.option(
+@option(
     "--holds",
-    metavar="TIMES|FILE",
-    help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
+    "TIMES|FILE",
+    "Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @source_options
 @field_option(
@@ -158,53 +160,39 @@ in place of numbers; 2: bad input.
 @field_option(_QUESTION, "harmonics", "How many.", "N")
 @field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
 @field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
-@click.option(
-    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
-)
-@click.option(
+@switch("--amplitudes", "Read every modulated stretch, and print them as a table.")
+@switch(
     "--no-modulation",
-    is_flag=True,
-    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
+    "Velocity steps and holds; by default, those of a recording whose load is constant.",
 )
-@click.option(
+@switch(
     "--stick-slip",
-    is_flag=True,
-    help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
+    "Slip events; by default, those of a recording that is stick-slip and not modulated.",
 )
 @set_option(
     '--set "K=168 N/m" --set "V=42 um/s"',
     "K, V, M or W0 of the machine, for slip events; with --law its parameters too",
 )
-@click.option(
-    "--events",
-    type=Path,
-    metavar="CSV|NC|JSON",
-    help="Where the catalogue of slip events goes.",
-)
-@click.option(
+@option("--events", "CSV|NC|JSON", "Where the catalogue of slip events goes.", Path)
+@option(
     "--out",
-    type=Path,
-    metavar="CSV|NC",
-    help="Measure all recordings into one table: a row for each amplitude, step and hold.",
+    "CSV|NC",
+    "Measure all recordings into one table: a row for each amplitude, step and hold.",
+    Path,
 )
-@click.option(
+@option(
     "--conditions",
-    metavar="CSV|PATTERN",
-    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
-    'names like "run_k{K N/m}_v{V um/s}".',
+    "CSV|PATTERN",
+    "K, V, M or W0 of each file: a table with a column file, or a pattern of the files' names "
+    'like "run_k{K N/m}_v{V um/s}".',
 )
-@click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=click.IntRange(1),
-    help="Processes of a table; as many as cores if not given.",
-)
-@click.option(
+@switch("--resume", "Go on with an interrupted table.")
+@option("--jobs", "N", "Processes of a table; as many as cores if not given.", click.IntRange(1))
+@option(
     "--thresholds",
-    type=Path,
-    metavar="CSV",
-    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+    "CSV",
+    "With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+    Path,
 )
 @law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
 @material_option()
@@ -278,9 +266,9 @@ def measure(
 
 
 def _amplitudes(recording: Path, source: Source, question: Question, output: Output) -> int:
-    from asperity.cli.measurement_text import amplitude_sections
     from asperity.measurement.campaign import modulated_rows
     from asperity.measurement.from_file import modulated_parts
+    from asperity.measurement.report import amplitude_sections
     from asperity.recording.readers.from_file import read_source
 
     rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
@@ -295,10 +283,10 @@ def _one(
     recording: Path, source: Source, question: Question, events: Path | None, output: Output
 ) -> int:
     from asperity._version import __version__
-    from asperity.cli.measurement_text import measured_sections
     from asperity.cli.progress import waiting
     from asperity.measurement.from_file import answer_measurement
     from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.report import measured_sections
     from asperity.measurement.stick_slip import catalogue
     from asperity.outputs import output_files
     from asperity.recording.readers.from_file import read_source
@@ -410,9 +398,9 @@ def _campaign(
 ) -> int:
     import os
 
-    from asperity.cli.measurement_text import healing_section
     from asperity.cli.progress import bar
     from asperity.measurement.campaign import run_campaign
+    from asperity.measurement.report import healing_section
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
     from asperity.measurement.stick_slip.threshold import write_thresholds

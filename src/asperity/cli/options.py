@@ -58,6 +58,29 @@ class FieldOption(click.Option):
         return super().get_help_record(ctx)
 
 
+def option(names: str, metavar: str | None, about: str, kind: Any = None, **more: Any) -> Decorator:
+    """An option with a value.
+
+    Parameters
+    ----------
+    names : str
+        Its names, and that of the argument of the command where it is another one.
+    metavar : str or None
+        What is given.
+    about : str
+        For the help.
+    kind : type, optional
+    **more
+        As of `click.option`.
+    """
+    return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
+
+
+def switch(names: str, about: str) -> Decorator:
+    """An option without a value; parameters as of `option`."""
+    return click.option(*names.split(), is_flag=True, help=about)
+
+
 def field_option(
     record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
 ) -> Decorator:
@@ -76,7 +99,7 @@ def field_option(
         A second name of the option.
     """
     names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
-    # Click takes an option that is said to be no switch for one whose value may be left out.
+    # With is_flag=False Click takes an option for one whose value may be left out.
     look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
     kind = Count() if metavar == "N" else None
     return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)
@@ -84,11 +107,10 @@ def field_option(
 
 def material_option() -> Decorator:
     """``--material``."""
-    return click.option(
+    return option(
         "--material",
-        metavar="NAME",
-        help="Take the numbers that are not given from a material, such as bureau2000, or from "
-        "a TOML file.",
+        "NAME",
+        "Take the numbers that are not given from a material, such as bureau2000, or a TOML file.",
     )
 
 
@@ -116,25 +138,26 @@ def output_options(*, plot: bool = False) -> Decorator:
             return command(output=Output(as_json, names, plot), **others)
 
         result: Command = gathered
-        for option in reversed(_OUTPUT if plot else _OUTPUT[1:]):
-            result = option(result)
+        for add in reversed(_OUTPUT if plot else _OUTPUT[1:]):
+            result = add(result)
         return result
 
     return with_options
 
 
 _OUTPUT = (
-    click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes."),
-    click.option(
+    option("--plot", "PNG", "Where a figure goes.", Path),
+    option(
         "--names",
-        type=click.Choice(NAMES),
+        None,
+        "Names on screen, in figures and options: A, B, D0, K/W0, or geophysics: a, b, D_c, "
+        "k/sigma_n.",
+        click.Choice(NAMES),
         default=NAMES[0],
         is_eager=True,
         callback=lambda context, option, names: context.meta.setdefault(CHOSEN_NAMES, names),
-        help="Names on screen, in figures and options: A, B, D0, K/W0, or geophysics: a, b, D_c, "
-        "k/sigma_n.",
     ),
-    click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
+    switch("--json as_json", "Print JSON instead of text."),
 )
 
 
@@ -159,8 +182,8 @@ def point_options(command: Command) -> Command:
     machine = [_option(parameter) for parameter in MACHINE.values() if parameter.options]
     numbers = set_option('--set A=0.013 --set "K=0.3 N/um"')
     result: Command = gathered
-    for option in reversed((law_option(), material_option(), *drive, numbers, *machine)):
-        result = option(result)
+    for add in reversed((law_option(), material_option(), *drive, numbers, *machine)):
+        result = add(result)
     return result
 
 
@@ -185,17 +208,14 @@ def law_options(command: Command) -> Command:
         parts = (part.strip() for text in texts for part in text.split(","))
         return tuple(known_place(part) for part in parts if part)
 
-    option = click.option(
-        "--law",
-        "--laws",
-        "laws",
-        metavar="NAME",
+    result: Command = option(
+        "--law --laws laws",
+        "NAME",
+        "Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        "of a comparison, repeatable, also as a,b,c, or all, the default.",
         multiple=True,
         callback=names,
-        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
-        "of a comparison, repeatable, also as a,b,c, or all, the default.",
-    )
-    result: Command = option(command)
+    )(command)
     return result
 
 

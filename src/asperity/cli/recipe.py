@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import output_options, settings_of
+from asperity.cli.options import option, output_options, settings_of
 from asperity.cli.report import Output
 from asperity.errors import InputError
 
@@ -35,10 +35,8 @@ oscillations, frequency_err. They give A, B and D0.
 @click.command(epilog=_EPILOG)
 @click.argument("paper")
 @click.argument("readings", nargs=-1, required=True, type=Path)
-@click.option(
-    "--thresholds", type=Path, required=True, metavar="CSV", help="Table of bifurcations."
-)
-@click.option("--fix", "fixes", multiple=True, metavar="NAME=VALUE", help="K, W0 or V0.")
+@option("--thresholds", "CSV", "Table of bifurcations.", Path, required=True)
+@option("--fix fixes", "NAME=VALUE", "K, W0 or V0.", multiple=True)
 @output_options()
 def recipe(
     paper: str,
@@ -79,8 +77,8 @@ def _section(result: RecipeResult) -> Section:
     rows = []
     for name, r in result.numbers.items():
         here = f"{r.value:.4g} +- {r.se:.2g} {r.unit}".rstrip()
-        if r.upper_limit is not None:
-            here = f"below {r.upper_limit:.3g} (95 %)"
+        if r.upper_limit_95 is not None:
+            here = f"below {r.upper_limit_95:.3g} (95 %)"
         paper = ""
         if r.published is not None:
             paper = f"{r.published:.4g}"

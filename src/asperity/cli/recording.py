@@ -8,8 +8,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-import click
-
+from asperity.cli.options import option
 from asperity.errors import InputError, require
 
 Command = Callable[..., Any]
@@ -40,51 +39,34 @@ def listed_times(text: str, option: str) -> list[str]:
 
 
 _OPTIONS = (
-    click.option(
-        "--load",
-        metavar="NAME",
-        help="Column of the normal load; by default recognised by name and unit.",
-    ),
-    click.option(
-        "--force",
-        metavar="NAME",
-        help="Column of the shear force; by default recognised by name and unit.",
-    ),
-    click.option("--time", metavar="NAME", help="Column of the time."),
-    click.option(
-        "--column",
-        "columns",
-        metavar="ROLE=NAME",
+    option("--load", "NAME", "Column of the normal load; by default recognised by name and unit."),
+    option("--force", "NAME", "Column of the shear force; by default recognised by name and unit."),
+    option("--time", "NAME", "Column of the time."),
+    option(
+        "--column columns",
+        "ROLE=NAME",
+        "Column of another role: velocity, displacement or friction; repeatable.",
         multiple=True,
-        help="Column of another role: velocity, displacement or friction; repeatable.",
     ),
-    click.option(
-        "--unit",
-        "units",
-        metavar="NAME=UNIT",
+    option(
+        "--unit units",
+        "NAME=UNIT",
+        "Unit of a column that the file leaves open, like Fn=N; repeatable.",
         multiple=True,
-        help="Unit of a column that the file leaves open, like Fn=N; repeatable.",
     ),
-    click.option("--area", metavar="VALUE", help='Makes stresses forces, like "25 cm^2".'),
-    click.option(
-        "--rate", metavar="VALUE", help='Samples per second, like "10 kHz", in place of times.'
-    ),
-    click.option(
-        "--channel",
-        "channels",
-        metavar="NAME=EXPRESSION",
+    option("--area", "VALUE", 'Makes stresses forces, like "25 cm^2".'),
+    option("--rate", "VALUE", 'Samples per second, like "10 kHz", in place of times.'),
+    option(
+        "--channel channels",
+        "NAME=EXPRESSION",
+        'A channel made of others, like "load = Conf.Press - Pore.Press"; repeatable.',
         multiple=True,
-        help='A channel made of others, like "load = Conf.Press - Pore.Press"; repeatable.',
     ),
-    click.option(
-        "--recipe", type=Path, metavar="TOML", help="Reduction file: columns, units and channels."
-    ),
-    click.option(
-        "--group", metavar="NAME", help="Group of an HDF5, MATLAB or TDMS file of several."
-    ),
-    click.option("--format", metavar="NAME", help="Format of the file, or name of a reader."),
-    click.option("--delimiter", metavar="SIGN", help="Of a text: a character, tab or blank."),
-    click.option("--decimal", metavar="SIGN", help="Decimal mark of a text: . or ,"),
+    option("--recipe", "TOML", "Reduction file: columns, units and channels.", Path),
+    option("--group", "NAME", "Group of an HDF5, MATLAB or TDMS file of several."),
+    option("--format", "NAME", "Format of the file, or name of a reader."),
+    option("--delimiter", "SIGN", "Of a text: a character, tab or blank."),
+    option("--decimal", "SIGN", "Decimal mark of a text: . or ,"),
 )
 #: Options that are fields of the source under the same name.
 _FIELDS = ("rate", "group", "area", "recipe", "format", "delimiter", "decimal")
@@ -115,8 +97,8 @@ def source_options(command: Command) -> Command:
         return command(source=source, **others)
 
     result: Command = gathered
-    for option in reversed(_OPTIONS):
-        result = option(result)
+    for add in reversed(_OPTIONS):
+        result = add(result)
     return result
 
 

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import click
 
+from asperity.cli.options import option
+
 
 @click.command(epilog="Example: asperity reproduce --out report")
 @click.argument("paper", required=False)
-@click.option(
-    "--out", type=Path, metavar="DIR", required=True, help="Folder for the report; made if absent."
-)
-@click.option(
+@option("--out", "DIR", "Folder for the report; made if absent.", Path, required=True)
+@option(
     "--data",
-    type=Path,
-    metavar="CSV",
-    help="Measured or digitised points to draw and to compare with the curves; columns figure, "
+    "CSV",
+    "Measured or digitised points to draw and to compare with the curves; columns figure, "
     "observable, series, x, y, y_err, source.",
+    Path,
 )
 def reproduce(paper: str | None, out: Path, data: Path | None) -> int:
     """Reproduce a PAPER, the first one in alphabetical order if none is named.

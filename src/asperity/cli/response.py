@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import output_options, point_options
+from asperity.cli.options import option, output_options, point_options, switch
 from asperity.cli.report import Output, say
 from asperity.errors import require
 
@@ -61,14 +61,13 @@ _JSON = (
 @click.command(epilog=_EPILOG)
 @point_options
 @output_options(plot=True)
-@click.option(
+@switch(
     "--stick-slip",
-    is_flag=True,
-    help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
+    "Without a modulation: period, drop and durations of stick-slip, if there is any.",
 )
-@click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
-@click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
-@click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
+@option("--table", "CSV", "Solve every row of a table.", Path)
+@option("--out", "CSV", "Where the table with its results goes.", Path)
+@switch("--resume", "Go on with an interrupted table.")
 def response(
     point: Point,
     output: Output,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import law_option, output_options
+from asperity.cli.options import law_option, option, output_options, switch
 from asperity.cli.report import Output, save_figure, say
 from asperity.errors import InputError
 
@@ -48,17 +48,14 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 
 @click.command(epilog=_EPILOG)
 @click.argument("protocol", type=Path)
-@click.option("--out", type=Path, metavar="NC", required=True, help="Where the motion goes.")
+@option("--out", "NC", "Where the motion goes.", Path, required=True)
 @output_options(plot=True)
-@click.option("--csv", "as_csv", is_flag=True, help="Write it as text too, next to --out.")
-@click.option(
-    "--record",
-    type=Path,
-    metavar="FILE",
-    help="Record it with the protocol's tribometer: .csv, .txt, .h5 or .tdms.",
+@switch("--csv as_csv", "Write it as text too, next to --out.")
+@option(
+    "--record", "FILE", "Record it with the protocol's tribometer: .csv, .txt, .h5 or .tdms.", Path
 )
 @law_option("Make a law of your own known to the protocol: module:Name or file.py:Name.")
-@click.option("--resume", is_flag=True, help="Go on with an interrupted run.")
+@switch("--resume", "Go on with an interrupted run.")
 def run(
     protocol: Path,
     out: Path,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from asperity.cli.options import Count, output_options
+from asperity.cli.options import Count, option, output_options
 from asperity.cli.report import Output
 
 _EPILOG = """\b
@@ -19,12 +19,13 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("name", required=False)
-@click.option(
+@option(
     "--out",
-    type=click.Path(path_type=Path),
-    help="File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
+    None,
+    "File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
+    click.Path(path_type=Path),
 )
-@click.option("--seed", type=Count(), default=0, show_default=True, help="Of the noise.")
+@option("--seed", None, "Of the noise.", Count(), default=0, show_default=True)
 @output_options()
 def samples(name: str | None, out: Path | None, seed: int, output: Output) -> None:
     """List the sample recordings, or make one of them.

@@ -7,6 +7,8 @@ import sys
 
 import click
 
+from asperity.cli.options import option, switch
+
 _EPILOG = """\b
 Examples:
   asperity serve --open
@@ -21,22 +23,21 @@ an environment.
 
 
 @click.command(epilog=_EPILOG)
-@click.option(
+@option(
     "--port",
-    type=int,
+    "NUMBER",
+    "Port to listen on; 0 for any that is free.",
+    int,
     default=8765,
     show_default=True,
-    metavar="NUMBER",
-    help="Port to listen on; 0 for any that is free.",
 )
-@click.option(
-    "--law",
-    "laws",
+@option(
+    "--law laws",
+    "PLACE",
+    "A law of your own on the page, as module:Name or file.py:Name; repeatable.",
     multiple=True,
-    metavar="PLACE",
-    help="A law of your own on the page, as module:Name or file.py:Name; repeatable.",
 )
-@click.option("--open", "opened", is_flag=True, help="Open the page in the browser.")
+@switch("--open opened", "Open the page in the browser.")
 def serve(port: int, laws: tuple[str, ...], opened: bool) -> None:
     """Serve the page: explore, map, and look at recordings in a browser."""
     from contextlib import ExitStack

@@ -41,9 +41,8 @@ class Shell(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import a command; an unknown name is answered with the nearest one."""
         if cmd_name not in self.modules:
-            raise InputError(
-                f"command must be a known one, got '{cmd_name}'; {closest(cmd_name, self.modules)}"
-            )
+            rule = "be a known one"
+            raise InputError("command", rule, f"'{cmd_name}'", closest(cmd_name, self.modules))
         command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
         return command
 

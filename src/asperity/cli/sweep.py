@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import Count, output_options
+from asperity.cli.options import Count, option, output_options, switch
 from asperity.cli.progress import bar
 from asperity.cli.report import Output, save_figure, say
 from asperity.errors import InputError
@@ -81,20 +81,13 @@ def sweep(context: click.Context) -> None:
 
 @sweep.command()
 @click.argument("plan", type=Path)
-@click.option("--out", type=Path, metavar="STORE", help="Folder of the store, like results.zarr.")
-@click.option(
-    "--workers", type=Count(), metavar="N", help="Processes of this machine; one a core by default."
-)
-@click.option(
-    "--cluster",
-    type=Count(),
-    metavar="N",
-    help="A Dask cluster of N workers on this machine, instead.",
-)
-@click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that runs, instead.")
-@click.option("--extend", is_flag=True, help="The plan has more rows behind those of the store.")
-@click.option("--retry-failed", is_flag=True, help="Solve chunks with failed points again.")
-@click.option("--dry-run", is_flag=True, help="Only say what it would take, from a sample.")
+@option("--out", "STORE", "Folder of the store, like results.zarr.", Path)
+@option("--workers", "N", "Processes of this machine; one a core by default.", Count())
+@option("--cluster", "N", "A Dask cluster of N workers on this machine, instead.", Count())
+@option("--scheduler", "ADDRESS", "A Dask scheduler that runs, instead.")
+@switch("--extend", "The plan has more rows behind those of the store.")
+@switch("--retry-failed", "Solve chunks with failed points again.")
+@switch("--dry-run", "Only say what it would take, from a sample.")
 @output_options()
 def run(
     plan: Path,
@@ -253,13 +246,11 @@ def export(store: Path, out: Path) -> int:
 
 @sweep.command()
 @click.argument("store", type=Path)
-@click.option("--show", metavar="OUTPUT", required=True, help="What is drawn, such as delta_mu.")
-@click.option("--x", "x", metavar="AXIS", required=True, help="Axis along x.")
-@click.option("--y", "y", metavar="AXIS", help="Axis along y; a curve without it.")
-@click.option(
-    "--at", multiple=True, metavar="AXIS=VALUE", help="Where another axis is: SI value, or row."
-)
-@click.option("--out", type=Path, metavar="PNG", required=True, help="Where the picture goes.")
+@option("--show", "OUTPUT", "What is drawn, such as delta_mu.", required=True)
+@option("--x x", "AXIS", "Axis along x.", required=True)
+@option("--y y", "AXIS", "Axis along y; a curve without it.")
+@option("--at", "AXIS=VALUE", "Where another axis is: SI value, or row.", multiple=True)
+@option("--out", "PNG", "Where the picture goes.", Path, required=True)
 def plot(
     store: Path,
     show: str,

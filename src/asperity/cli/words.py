@@ -85,10 +85,10 @@ def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
     """
 
     def words(argument: Argument) -> str:
-        head, _, rest = argument.name.partition(".")
+        head, _, field = argument.name.partition(".")
         # All files of data have the same options.
-        if head == "data" and rest:
-            argument = argument._replace(name=rest.partition(".")[2] or rest)
+        if head == "data" and field:
+            argument = argument._replace(name=field.partition(".")[2] or field)
         return in_options(argument, options)
 
     with naming(words):

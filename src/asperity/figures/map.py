@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from asperity.figures.style import new_figure
+from asperity.parameters import DRIVE, INTERFACE, MACHINE, OUTPUTS
 from asperity.units import KINDS
 
 if TYPE_CHECKING:
@@ -42,34 +44,6 @@ _FAILED: dict[str, Any] = {
     "linewidth": 0,
 }
 
-#: Symbol of a quantity, and of the quantity that is drawn.
-_SYMBOLS = {
-    "epsilon": r"amplitude $\epsilon$",
-    "K": r"spring stiffness $K$",
-    "W0": r"load $W_0$",
-    "M": r"mass $M$",
-    "eta": r"radiation damping $\eta$",
-    "V": r"velocity $V$",
-    "frequency": r"frequency $f$",
-    "A": r"$A$",
-    "B": r"$B$",
-    "D0": r"memory length $D_0$",
-    "mu0": r"$\mu_0$",
-    "alpha": r"$\alpha$",
-    "lambda": r"shear length $\lambda$",
-}
-_SHOWN = {
-    "mean_friction": r"mean of $F/W_0$",
-    "delta_mu": r"$\Delta\bar{\mu}$",
-    "mu1": r"$\mu_1$",
-    "mu2": r"$\mu_2$",
-    "phase1": r"phase of $\mu_1$ (rad)",
-    "phase2": r"phase of $\mu_2$ (rad)",
-    "floquet_max": r"leading multiplier $|m|$",
-    "log_multiplier": r"$\ln|m|$",
-    "mode_frequency": "frequency of the leading mode (Hz)",
-    "growth_rate": r"growth rate (1/s)",
-}
 _CYCLIC = ("phase1", "phase2")
 _SIGNED = ("log_multiplier", "growth_rate", "floquet_max")
 #: Ratio of the largest to the smallest value above which the colour scale is logarithmic.
@@ -96,7 +70,7 @@ def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
     axis = figure.subplots()
     mesh = draw_plane(axis, dataset, show)
     bar = figure.colorbar(mesh, ax=axis, pad=0.02, aspect=28, extend=_extend(dataset, show, mesh))
-    bar.set_label(_SHOWN[show])
+    bar.set_label(label(dataset[show], (1.0, dataset[show].attrs["units"])))
     bar.ax.minorticks_off()
     handles = keys(dataset)
     if handles:
@@ -171,7 +145,7 @@ def keys(dataset: xarray.Dataset) -> list[Any]:
     if "critical_stiffness" in dataset:
         entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
     if not dataset["converged"].values.all():
-        entries.append(Patch(label="no response found", **_FAILED))
+        entries.append(Patch(label="no response", **_FAILED))
     return entries
 
 
@@ -185,10 +159,14 @@ def axis_unit(side: xarray.DataArray) -> tuple[float, str]:
 
 
 def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
-    """Symbol and unit of an axis."""
-    name = _SYMBOLS.get(str(side.name), str(side.name))
+    """Meaning, symbol and unit of a quantity."""
+    known: Any = {**OUTPUTS, **INTERFACE, **DRIVE, **MACHINE}.get(str(side.name))
+    # Matplotlib has no names for these bars.
+    letters = "" if known is None else re.sub(r"\\[lr]vert ?", "|", known.symbol)
+    symbol = f" ${letters}$" if letters else ""
+    meaning = re.split(r": | \(|, ", side.attrs.get("long_name", str(side.name)))[0]
     shown = unit[1].replace("um", "µm")
-    return f"{name} ({shown})" if shown else name
+    return f"{meaning}{symbol}" + (f" ({shown})" if shown not in ("", "1") else "")
 
 
 def _write_numbers(axis: Axis, ratio: float) -> None:

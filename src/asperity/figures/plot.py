@@ -234,10 +234,8 @@ class _Drawing:
         of_curve = panel.curve.replace("{}", value)
         name = of_curve if of_curve in self.numbers else value
         if name not in self.numbers:
-            raise InputError(
-                f"a figure's numbers must be computed, got '{value}'; "
-                f"{closest(value, self.numbers)}"
-            )
+            rule = "be computed"
+            raise InputError("a figure's numbers", rule, f"'{value}'", closest(value, self.numbers))
         return float(self.numbers[name])
 
     def ends(self, values: Value | tuple[Value, ...], panel: Panel) -> list[float]:
@@ -255,9 +253,7 @@ class _Drawing:
         rows = self.data[self.data["curve"] == full]
         if rows.empty:
             names = [str(one) for one in self.data["curve"].unique()]
-            raise InputError(
-                f"a figure's curves must be computed, got '{full}'; {closest(full, names)}"
-            )
+            raise InputError("a figure's curves", "be computed", f"'{full}'", closest(full, names))
         return rows
 
     # --- Items -----------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.figures.map import axis_unit, label
 from asperity.figures.style import ELASTO_PLASTIC, GREY, RICE_RUINA, new_figure
 from asperity.units import format_si
@@ -78,8 +78,7 @@ def draw_stick_slip_response(response: StickSlip) -> Figure:
 
 def _stick_slip_cycle(response: StickSlip, cycle: LimitCycle) -> Figure:
     """Force and displacement of the slider: over a period, and enlarged about its slip."""
-    if not cycle.slips:
-        raise InputError("plot", "show a cycle", cycle.result, "choose another velocity or spring")
+    require(cycle.slips, "plot", "show a cycle", cycle.result, "choose another velocity or spring")
     slider = response.slider
     V, K, W0 = (float(np.asarray(a).item()) for a in (response.velocity, slider.K, slider.W0))
     slip, period = cycle.slip_duration, cycle.period
@@ -107,11 +106,9 @@ def _stick_slip_cycle(response: StickSlip, cycle: LimitCycle) -> Figure:
 
 
 def _require_rows(shape: tuple[int, ...], rows: str, other: str) -> None:
-    if len(shape) > 2 or int(np.prod(shape[:-1])) > _MOST_CURVES:
-        raise InputError(
-            f"plot must have {rows} or up to {_MOST_CURVES} rows, got "
-            f"{'x'.join(map(str, shape))} points; draw grids with {other}"
-        )
+    rule, got = f"have {rows} or up to {_MOST_CURVES} rows", f"{'x'.join(map(str, shape))} points"
+    advice = f"draw grids with {other}"
+    require(len(shape) <= 2 and int(np.prod(shape[:-1])) <= _MOST_CURVES, "plot", rule, got, advice)
 
 
 def _cycle(response: PeriodicResponse) -> Figure:

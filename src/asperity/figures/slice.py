@@ -44,17 +44,16 @@ def plot_slice(
     result = open_store(store)
     outputs = [str(n) for n, v in result.data_vars.items() if x in v.dims or len(v.dims) > 0]
     if show not in outputs:
-        raise InputError(f"show must be an output, got '{show}'; {closest(show, outputs)}")
+        raise InputError("show", "be an output", f"'{show}'", closest(show, outputs))
     part = result[show]
     dims = [str(d) for d in part.dims]
     for name, side in (("x", x), ("y", y)):
         if side is not None and side not in dims:
-            raise InputError(f"{name} must be an axis of the store, got '{side}'; "
-                             f"{closest(side, dims)}")  # fmt: skip
+            raise InputError(name, "be an axis of the store", f"'{side}'", closest(side, dims))
     chosen = dict(at or {})
     for name in chosen:
         if name not in dims or name in (x, y):
-            raise InputError(f"at must name other axes, got '{name}'; {closest(name, dims)}")
+            raise InputError("at", "name other axes", f"'{name}'", closest(name, dims))
     numbered = {d: d in part.indexes and part[d].dtype.kind in "if" for d in dims}
     for dim in dims:
         if dim in chosen and numbered[dim]:

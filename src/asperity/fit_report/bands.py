@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference import Fit, LockInTable, Posterior
-from asperity.inference.tables.term import Forward, LockInTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.orbit import Outcome
 
 Float = NDArray[np.float64]
@@ -72,21 +72,15 @@ def bands_of(
         row = int(np.flatnonzero(rows)[0])
         top = table.points["epsilon"][rows].max()
         epsilon = np.linspace(top / _AMPLITUDES, top, _AMPLITUDES)
-        fixed = {n: np.full(_AMPLITUDES, v[row]) for n, v in term.forward.fixed.items()}
+        fixed = {n: np.full(_AMPLITUDES, v[row]) for n, v in term.fixed.items()}
         points = {n: np.full(_AMPLITUDES, v[row]) for n, v in table.points.items()}
         curve = LockInTable("curve", points | {"epsilon": epsilon}, {}, {})
-        forward = Forward(
-            fit.objective.law,
-            curve,
-            fixed | {"epsilon": epsilon},
-            inertia=term.forward.inertia,
-            radiation_damping=term.forward.radiation_damping,
-        )
+        along = LockInTerm(curve, term.law, fixed | {"epsilon": epsilon}, **term.motion)
         if term.searches:
-            forward.uses_search = True
-            forward(fit.values)
+            along.use_search(True)
+            along.predicted(fit.values)
         free = {n: np.repeat(v, _AMPLITUDES) for n, v in values.items()}
-        predicted, outcome = forward.predicted(free, count, near=term.searches)
+        predicted, outcome = along.predicted_at_many(free, count, near=term.searches)
         good = outcome == Outcome.CONVERGED
         quantities = {
             "mean_friction": predicted.mean_friction,

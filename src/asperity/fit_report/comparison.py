@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.fit_report.bands import Series, bands_of
 from asperity.fit_report.folder import (
     RUN_CAPTION,
@@ -49,10 +49,8 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
         If no fit has converged, or the folder cannot be written.
     """
     fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
-    if not fits:
-        raise InputError(
-            f"comparison must have a converged fit for a report, got none; {comparison.verdict}"
-        )
+    rule = "have a converged fit for a report"
+    require(fits, "comparison", rule, "none", f"{comparison.verdict}")
     with written_folder(folder, "report") as staging:
         record = json.dumps(comparison_record(comparison), indent=2)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
@@ -104,10 +102,9 @@ def draw_comparison(comparison: Comparison) -> Figure:
             return run_figure(*_motions(fits, 0))
         if fit.objective.terms_of(LockInTerm):
             return laws_figure(*_predictions(fits, 0))
-    raise InputError(
-        "plot must be asked of laws compared on a recording or a table of readings, got another "
-        "kind of data or no fit; plot the residuals of the fits yourself"
-    )
+    rule = "have laws compared on a recording or a table of readings"
+    got = "another kind of data or no fit"
+    raise InputError("plot", rule, got, "plot the residuals of the fits yourself")
 
 
 def _predictions(fits: Mapping[str, Fit], i: int) -> tuple[LockInTable, dict[str, list[Series]]]:

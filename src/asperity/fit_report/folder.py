@@ -9,14 +9,13 @@ import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from asperity._version import __version__
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.fit_report.bands import bands_of
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, Posterior
@@ -25,7 +24,7 @@ from asperity.inference.report import fit_report, posterior_sections
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
-from asperity.outputs.tables import as_html, html_table
+from asperity.outputs.tables import as_html, html_page, html_table
 from asperity.outputs.written import written_folder
 from asperity.parameters import law_parameters, point_parameters
 
@@ -40,24 +39,9 @@ def document(title: str, kicker: str, heading: str, sections: Mapping[str, str])
     sections : mapping of str to str
         HTML by heading.
     """
-    style = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
-    body = "\n".join(
-        f'<section aria-label="{escape(name)}"><h2>{escape(name)}</h2>\n{content}\n</section>'
-        for name, content in sections.items()
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{style}\n"
-        "table{border-collapse:collapse;display:block;overflow-x:auto}"
-        "td,th{padding:.15rem .7rem;text-align:right;white-space:nowrap}"
-        "td:first-child,th:first-child{text-align:left}"
-        "figure.wide{grid-template-columns:1fr}"
-        "svg{max-width:100%;height:auto;background:#fff}</style>\n"
-        f'</head>\n<body>\n<header><p class="kicker">{escape(kicker)}</p>'
-        f"<h1>{escape(heading)}</h1></header>\n<main>\n{body}\n</main>\n"
-        f"<footer>Written by asperity {__version__}.</footer>\n</body>\n</html>\n"
-    )
+    header = f'<p class="kicker">{escape(kicker)}</p><h1>{escape(heading)}</h1>'
+    keyed = {name: (name.lower().replace(" ", "-"), html) for name, html in sections.items()}
+    return html_page(title, header, keyed)
 
 
 def figure(svg: str, caption: str, *, wide: bool = False) -> str:
@@ -87,10 +71,8 @@ def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> 
     InputError
         If the fit has not converged, or the folder cannot be written.
     """
-    if not fit.converged:
-        raise InputError(
-            f"fit must have converged for a report, got '{fit.message}'; correct that first"
-        )
+    rule = "have converged for a report"
+    require(fit.converged, "fit", rule, f"'{fit.message}'", "correct that first")
     with written_folder(folder, "report") as staging:
         more = {"posterior": posterior.record()} if posterior else {}
         record = json.dumps({**fit_record(fit), **more}, indent=2)

@@ -85,12 +85,19 @@ class DataTerm(ABC):
         Free parameters of this set of data alone, such as the offset of a gauge.
     failure : str
         Why the residuals may not exist, and what to do: the message of a fit that failed.
+    searches : bool or None
+        Whether orbits that the fast method does not find are searched for at every call. None for
+        data that are no periodic responses.
+    affordable : int
+        Evaluations that an integral over the parameters may take.
     """
 
     name: str
     observables: tuple[str, ...]
     nuisances: tuple[Unknown, ...] = ()
     failure: str
+    searches: bool | None = None
+    affordable: int = 256
 
     @property
     @abstractmethod
@@ -104,19 +111,6 @@ class DataTerm(ABC):
         They count in AICc, BIC and degrees of freedom.
         """
         return 0
-
-    @property
-    def searches(self) -> bool | None:
-        """Whether orbits that the fast method does not find are searched for at every call.
-
-        None for data that are no periodic responses.
-        """
-        return None
-
-    @property
-    def affordable(self) -> int:
-        """Evaluations that an integral over the parameters may take."""
-        return 256
 
     @abstractmethod
     def residuals(
@@ -133,7 +127,6 @@ class DataTerm(ABC):
             Whether a slower method is tried where the fast one finds no solution.
         """
 
-    @abstractmethod
     def chi2_of_many(
         self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
     ) -> Float:
@@ -149,6 +142,8 @@ class DataTerm(ABC):
             Share of a table's rows that must have a periodic orbit; with some, the sum is that of
             these rows, scaled to all. Infinite with fewer, and where there is no motion.
         """
+        several = [self.residuals(numbers) for numbers in values]
+        return np.array([np.inf if r is None else np.sum(r.values**2) for r in several])
 
     @abstractmethod
     def observed(self) -> Mapping[str, Float]:

@@ -12,7 +12,7 @@ from numbers import Real
 from types import ModuleType
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
 from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind, Uncertainty
 from asperity.ledger.sentences import fill
@@ -68,11 +68,8 @@ def find_checks(module: ModuleType) -> dict[str, Check]:
             if getattr(value, "__module__", None) != part.__name__:
                 continue  # imported, not defined, in this module
             for claim, arguments in getattr(value, _MARK, ()):
-                if claim in checks:
-                    raise InputError(
-                        f"checks.{claim} must be computed by one function, got two; "
-                        "remove one of the marks"
-                    )
+                rule, advice = "be computed by one function", "remove one of the marks"
+                require(claim not in checks, f"checks.{claim}", rule, "two", advice)
                 checks[claim] = _bound(value, arguments)
     return checks
 
@@ -206,24 +203,18 @@ def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Clai
 def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
     """The computed numbers that the rule of the entry judges, in the order of the check."""
     if not isinstance(computed, Mapping):
-        raise InputError(
-            f"the check of '{entry.id}' must be a function that returns numbers by name, got "
-            f"{shown(computed)}; return {{'name': number}}"
-        )
+        rule, got = "be a function that returns numbers by name", shown(computed)
+        raise InputError(f"the check of '{entry.id}'", rule, got, "return {'name': number}")
     for name, value in computed.items():
         if not isinstance(value, str) and not (isinstance(value, Real) and math.isfinite(value)):
-            raise InputError(
-                f"checks must compute finite numbers, got {value!r} for '{name}' of "
-                f"'{entry.id}'; correct the check"
-            )
+            got = f"{value!r} for '{name}' of '{entry.id}'"
+            raise InputError("checks", "compute finite numbers", got, "correct the check")
     numbers = {name: float(v) for name, v in computed.items() if not isinstance(v, str)}
     patterns = entry.judged or (_FORMULA if entry.rule.is_formula else ("*",))
     for pattern in entry.judged:
         if not any(fnmatchcase(name, pattern) for name in numbers):
-            raise InputError(
-                f"{entry.id}.judged must name numbers of its check, got '{pattern}'; "
-                f"{closest(pattern, numbers)}"
-            )
+            rule = "name numbers of its check"
+            raise InputError(f"{entry.id}.judged", rule, f"'{pattern}'", closest(pattern, numbers))
     return {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)}
 
 
@@ -323,18 +314,35 @@ def judge_claims(
     central = model(numbers)
     claims = []
     for entry in contents.claim:
-        claims.append(judge(entry, checks[entry.id](central), stated))
+        claims.append(judge(entry, computed_numbers(entry, checks, central, numbers), stated))
         report(1)
     if not sensitivity:
         return claims
     varied: dict[str, list[Sensitivity]] = {entry.id: [] for entry in contents.claim}
     for uncertainty in contents.uncertainty:
-        resting = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
-        ends = [model(altered(numbers, end)) for end in (uncertainty.low, uncertainty.high)]
-        for entry in resting:
-            numbers_there = [judged_numbers(entry, checks[entry.id](end)) for end in ends]
+        affected = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
+        ends = [altered(numbers, end) for end in (uncertainty.low, uncertainty.high)]
+        models = [model(end) for end in ends]
+        for entry in affected:
+            numbers_there = [
+                judged_numbers(entry, computed_numbers(entry, checks, *at))
+                for at in zip(models, ends, strict=True)
+            ]
             varied[entry.id].append(_sensitivity(entry, uncertainty, numbers_there, stated))
     return [replace(claim, sensitivity=tuple(varied[claim.id])) for claim in claims]
+
+
+def computed_numbers(
+    entry: Entry, checks: Mapping[str, Check], model: Any, numbers: Material
+) -> Computed:
+    """The numbers of a claim, by its formulas or by its check."""
+    if not entry.values:
+        return checks[entry.id](model)
+    printed = printed_numbers(numbers)
+    return {
+        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}")
+        for name, formula in entry.values.items()
+    }
 
 
 def _sensitivity(
@@ -357,13 +365,21 @@ def _text(end: Mapping[str, float]) -> str:
 
 
 def printed_numbers(numbers: Material) -> dict[str, float]:
-    """The paper's single values in SI, and the ends of its ranges as NAME.low and NAME.high."""
+    """The paper's single values in SI, and as NAME.low and so on parts of its other numbers.
+
+    ``low`` and ``high`` are the ends of a range, ``first`` and ``last`` those of a list of values,
+    and ``uncertainty`` is that of a value.
+    """
     stated = {
         name: number.si for name, number in numbers.numbers.items() if number.value is not None
     }
     for name, number in numbers.numbers.items():
         if number.si_range is not None:
             stated[f"{name}.low"], stated[f"{name}.high"] = number.si_range
+        if number.si_values:
+            stated[f"{name}.first"], *_, stated[f"{name}.last"] = number.si_values
+        if number.si_uncertainty is not None:
+            stated[f"{name}.uncertainty"] = number.si_uncertainty
     return stated
 
 
@@ -376,17 +392,13 @@ def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
 
 
 def _check_pairs(entries: Sequence[Entry], checks: Mapping[str, Check]) -> None:
-    ids = {entry.id for entry in entries}
+    ids = {entry.id for entry in entries if not entry.values}
     for name in sorted(ids - set(checks)):
-        raise InputError(
-            f"checks must compute every claim of claims.toml, got none for '{name}'; "
-            f'mark a function with @check("{name}")'
-        )
+        rule, got = "compute every claim of claims.toml", f"none for '{name}'"
+        raise InputError("checks", rule, got, f'mark a function with @check("{name}")')
     for name in sorted(set(checks) - ids):
-        raise InputError(
-            f"claims.toml must hold every claim that is computed, got none for '{name}'; "
-            "add [[claim]] with that id"
-        )
+        rule = "hold every claim that is computed"
+        raise InputError("claims.toml", rule, f"none for '{name}'", "add [[claim]] with that id")
 
 
 Standing: TypeAlias = Literal["holds", "holds at the central values", "undecided", "does not hold"]
@@ -400,7 +412,7 @@ class Headline:
     ----------
     claim : str
         Conclusion of the paper.
-    found : str
+    result : str
         Summary of the computation.
     standing : str
         "holds": every claim is reproduced, at the ends of all published uncertainties too.
@@ -412,7 +424,7 @@ class Headline:
     """
 
     claim: str
-    found: str
+    result: str
     standing: Standing
     claims: tuple[str, ...]
 
@@ -436,7 +448,7 @@ def headlines(words: Sequence[HeadlineWords], claims: Sequence[Claim]) -> list[H
     return [
         Headline(
             claim=conclusion.statement,
-            found=fill(conclusion.found, computed, "headline.found"),
+            result=fill(conclusion.result, computed, "headline.result"),
             standing=_standing([ledger[name] for name in conclusion.claims]),
             claims=conclusion.claims,
         )

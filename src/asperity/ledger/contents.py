@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import Field
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
 from asperity.ledger.sentences import names_in
 from asperity.parameters.toml_file import parsed_toml
@@ -53,18 +53,16 @@ class RuleWords(Record):
             If the rule is unknown or a number of it is missing or unknown.
         """
         if self.accept not in rules.RULES:
-            raise InputError(
-                f"{claim}.rule.accept must be a rule of the ledger, got '{self.accept}'; "
-                f"{closest(self.accept, (*rules.RULES, 'formula', 'undecided'))}"
-            )
+            rule = "be a rule of the ledger"
+            advice = closest(self.accept, (*rules.RULES, "formula", "undecided"))
+            raise InputError(f"{claim}.rule.accept", rule, f"'{self.accept}'", advice)
         make, names = rules.RULES[self.accept]
         values = []
         for name in names:
             value = getattr(self, name)
             if value is None:
-                raise InputError(
-                    f"{claim}.rule.{name} must be given for '{self.accept}', got nothing; add it"
-                )
+                rule = f"be given for '{self.accept}'"
+                raise InputError(f"{claim}.rule.{name}", rule, "nothing", "add it")
             values.append(rules.number(value, numbers, f"{claim}.rule.{name}"))
         return make(*values, self.what)
 
@@ -77,6 +75,9 @@ class Entry(Record):
     rule : RuleWords
     computed : str
         Sentence with the numbers of the check, see `asperity.ledger.sentences`.
+    values : mapping of str to str
+        Formulas of the paper's printed numbers, by the names of their results, in place of a
+        check; see `asperity.ledger.rules.formula_value`.
     judged : tuple of str
         Names of the numbers that the rule judges, ``*`` standing for any text: every one of them
         has to pass. All by default. A rule on a formula judges ``printed``, ``independent`` and,
@@ -92,6 +93,7 @@ class Entry(Record):
     why: str
     kind: Kind
     rule: RuleWords
+    values: Mapping[str, str] = Field(default_factory=dict)
     judged: tuple[str, ...] = ()
     depends_on: tuple[str, ...] = ()
 
@@ -151,14 +153,14 @@ class HeadlineWords(Record):
     Attributes
     ----------
     statement : str
-    found : str
+    result : str
         Result; ``{id}`` stands for the computed text of that claim.
     claims : tuple of str
         Ids of the claims whose verdicts decide.
     """
 
     statement: str
-    found: str
+    result: str
     claims: tuple[str, ...]
 
 
@@ -205,9 +207,8 @@ def read_words(file: Traversable, kind: type[Words]) -> Words:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            str(file), "be a readable text", type(error).__name__, "write the words there"
-        ) from None
+        rule = "be a readable text"
+        raise InputError(str(file), rule, type(error).__name__, "write the words there") from None
     return kind.of_content(parsed_toml(text, file.name, f"'{file}'"), str(file))
 
 
@@ -228,8 +229,8 @@ def read_contents(file: Traversable) -> Contents:
 def _check_names(contents: Contents, file: str) -> None:
     ids = [entry.id for entry in contents.claim]
     for name in ids:
-        if ids.count(name) > 1:
-            raise InputError(f"{file}: claim.id must be unique, got '{name}' twice; rename one")
+        got = f"'{name}' twice"
+        require(ids.count(name) <= 1, f"{file}: claim.id", "be unique", got, "rename one")
     quantities = {u.quantity for u in contents.uncertainty}
     references = [
         *((f"{e.id}.depends_on", "an uncertainty", e.depends_on, quantities)
@@ -237,11 +238,9 @@ def _check_names(contents: Contents, file: str) -> None:
         *(("summary.sentences", "claims", names_in(sentence), ids)
           for words in contents.summary for sentence in words.sentences),
         *(("headline.claims", "claims", h.claims, ids) for h in contents.headline),
-        *(("headline.found", "claims", names_in(h.found), ids) for h in contents.headline),
+        *(("headline.result", "claims", names_in(h.result), ids) for h in contents.headline),
     ]  # fmt: skip
     for where, what, names, known in references:
         for name in (name for name in names if name not in known):
-            raise InputError(
-                f"{file}: {where} must name {what} of the file, got '{name}'; "
-                f"{closest(name, known)}"
-            )
+            rule = f"name {what} of the file"
+            raise InputError(f"{file}: {where}", rule, f"'{name}'", closest(name, known))

@@ -18,7 +18,7 @@ import pandas as pd
 from pydantic import ConfigDict, Field
 
 from asperity.errors import InputError
-from asperity.figures.plot import Plot
+from asperity.figures.plot import Panel, Plot
 from asperity.ledger.contents import read_words
 from asperity.ledger.sentences import fill
 from asperity.questions.record import Question, Record
@@ -29,31 +29,8 @@ if TYPE_CHECKING:
     from asperity.materials import Material
 
 
-@dataclass(frozen=True)
-class Observable:
-    """A quantity of a figure, and its panel.
-
-    Attributes
-    ----------
-    column : str
-        Column of the figure's table, and name in a file of points.
-    x : str
-        Column of the abscissa.
-    kind : str
-        Dimension of the abscissa, a key of `asperity.units.KINDS`; texts in other than pure
-        numbers carry a unit.
-    panel : int
-        Index of the axes in the Matplotlib figure.
-    x_scale, y_scale : float
-        Factors from SI to the units of the axes.
-    """
-
-    column: str
-    x: str
-    kind: str = "dimensionless"
-    panel: int = 0
-    x_scale: float = 1.0
-    y_scale: float = 1.0
+#: Number and description of the panel of each quantity of a figure, by its column.
+Observables: TypeAlias = Mapping[str, tuple[int, Panel]]
 
 
 @dataclass(frozen=True)
@@ -183,22 +160,16 @@ class FigureWords(Record):
     plot: Plot | None = None
 
     @cached_property
-    def observables(self) -> tuple[Observable, ...]:
-        """The quantities of its panels that measured points can be drawn on."""
+    def observables(self) -> Observables:
+        """The quantities that measured points can be drawn on."""
         panels = () if self.plot is None else self.plot.panel
-        return tuple(
-            Observable(p.y, p.x, p.x_kind, n, p.x_scale, p.y_scale)
-            for n, p in enumerate(panels)
-            if "/" not in p.y and not p.less
-        )
+        return {p.y: (n, p) for n, p in enumerate(panels) if "/" not in p.y and not p.less}
 
     def draw(self, numbers: FigureNumbers) -> Figure:
         """The picture; the style must be active."""
         if self.plot is None:
-            raise InputError(
-                f"figures.{numbers.name} must say what is drawn, got no plot; add "
-                f"[[{numbers.name}.plot.panel]]"
-            )
+            advice = f"add [[{numbers.name}.plot.panel]]"
+            raise InputError(f"figures.{numbers.name}", "say what is drawn", "no plot", advice)
         return self.plot.figure(numbers.data, numbers.numbers, numbers.points)
 
 
@@ -321,7 +292,7 @@ class Section:
     title : str
     figures : sequence of functions
         Each computes one figure.
-    observables : mapping of str to sequence of Observable
+    observables : mapping of str to Observables
         By the name of a figure that takes measured points: the quantities of its first table.
     before, after : functions
         From the figures of the section to HTML that goes before and after them.
@@ -330,7 +301,7 @@ class Section:
     key: str
     title: str
     figures: Sequence[Callable[[], PaperFigure]]
-    observables: Mapping[str, Sequence[Observable]] = field(default_factory=dict)
+    observables: Mapping[str, Observables] = field(default_factory=dict)
     before: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
     after: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
 

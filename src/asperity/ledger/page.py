@@ -5,23 +5,20 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING
 
-from asperity._version import __version__
 from asperity.ledger.claims import Claim, Headline
 from asperity.ledger.markup import embedded_png, rich, table
 from asperity.ledger.points import RULE, CurveComparison
 from asperity.ledger.sentences import fill, names_in
 from asperity.materials import Number, citation
+from asperity.outputs.tables import html_page
 
 if TYPE_CHECKING:
     from asperity.ledger.contents import About, SummaryWords
-    from asperity.ledger.figures import PaperFigure
+    from asperity.ledger.figures import PaperFigure, Section
     from asperity.ledger.paper import Paper
 
 #: Verdicts in the order of the page, with the sign and the meaning of each.
@@ -40,29 +37,10 @@ KIND_TEXTS: Mapping[str, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Plate:
-    """A figure as the page shows it, and its files."""
-
-    figure: PaperFigure
-    png: Path
-    files: Sequence[str]
-
-
-@dataclass(frozen=True)
-class PlateGroup:
-    """A section of figures, with the HTML before and after them."""
-
-    key: str
-    title: str
-    before: str
-    plates: Sequence[Plate]
-    after: str
-
-
 def build_page(
     paper: Paper,
-    groups: Sequence[PlateGroup],
+    folder: Path,
+    shown: Sequence[tuple[Section, Sequence[PaperFigure]]],
     claims: Sequence[Claim],
     headlines: Sequence[Headline],
     agreement: Sequence[CurveComparison] = (),
@@ -72,8 +50,10 @@ def build_page(
     Parameters
     ----------
     paper : Paper
-    groups : sequence of PlateGroup
-        The sections of figures, in their order on the page.
+    folder : Path
+        Of the report, which has the pictures already.
+    shown : sequence of (Section, sequence of PaperFigure)
+        The sections in their order on the page, and their figures.
     claims : sequence of Claim
     headlines : sequence of Headline
     agreement : sequence of CurveComparison
@@ -83,40 +63,33 @@ def build_page(
     parts = {
         "In brief": ("brief", _brief(paper.contents.summary, headlines, claims)),
         **{
-            group.title: (
-                group.key,
-                group.before + "\n".join(map(_figure, group.plates)) + group.after,
+            section.title: (
+                section.key,
+                section.before(figures)
+                + "\n".join(_figure(figure, folder) for figure in figures)
+                + section.after(figures),
             )
-            for group in groups
+            for section, figures in shown
         },
         **({"Measured points": ("points", _agreement(agreement))} if agreement else {}),
         "Claims": ("claims", _ledger(paper, claims)),
         "Parameters": ("parameters", _parameters(paper)),
         "Sources": ("sources", _sources(about)),
     }
-    sections = "\n".join(
-        f'<section id="{key}" aria-labelledby="{key}-head"><h2 id="{key}-head">{name}</h2>\n'
-        f"{content}\n</section>"
-        for name, (key, content) in parts.items()
+    head = (
+        f'<p class="kicker">A reproduction</p><h1>{escape(about.title)}</h1>'
+        f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
+        f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
+        "again from its own equations and numbers. "
+        f"{sum(claim.is_test for claim in claims)} of them could have come out otherwise; "
+        f"each number leads to its entries:</p>{_tiles(claims)}"
+        f"<p>{escape(_counted_apart(claims))}</p>"
     )
-    links = "".join(f'<a href="#{key}">{name}</a>' for name, (key, _) in parts.items())
-    page, style = (
-        files("asperity.ledger").joinpath(name).read_text(encoding="utf-8")
-        for name in ("page.html", "page.css")
+    footer = (
+        " Figures (PNG, PDF), their numbers (CSV) and the claims (JSON, CSV) are in the folder of "
+        "this page."
     )
-    return Template(page).substitute(
-        title=escape(about.title),
-        authors=escape(about.authors),
-        journal=escape(about.journal),
-        claims=len(claims),
-        tests=sum(claim.is_test for claim in claims),
-        tiles=_tiles(claims),
-        apart=escape(_counted_apart(claims)),
-        style=style,
-        links=links,
-        sections=sections,
-        version=__version__,
-    )
+    return html_page(f"Reproduced: {about.title}", head, parts, footer)
 
 
 def _agreement(agreement: Sequence[CurveComparison]) -> str:
@@ -143,11 +116,12 @@ def _chip(kind: str, sign: str, word: str) -> str:
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
 
 
-def _figure(plate: Plate) -> str:
-    links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in plate.files)
-    shown = plate.figure
+def _figure(shown: PaperFigure, folder: Path) -> str:
+    files = [f"figures/{shown.name}.{kind}" for kind in ("png", "pdf")]
+    files += [f"data/{table.name}.csv" for table in shown.tables]
+    links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in files)
     return (
-        f'<figure id="{shown.name}">{embedded_png(plate.png, shown.alt)}'
+        f'<figure id="{shown.name}">{embedded_png(folder / files[0], shown.alt)}'
         f'<figcaption><p class="kicker">{shown.place}</p><h3>{rich(shown.title)}</h3>'
         f'<p>{rich(shown.caption)}</p><p class="files">{links}</p></figcaption></figure>'
     )
@@ -161,7 +135,7 @@ def _kind(name: str) -> str:
 def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
     ends = "; ".join(rich(f"{u.quantity}: {u.note}") for u in paper.contents.uncertainty)
     varied = (
-        "\n<p>Numbers that rest on uncertain quantities are computed at the ends of the "
+        "\n<p>Numbers that follow from uncertain quantities are computed at the ends of the "
         f"uncertainties too ({ends}).</p>"
     )
     return (
@@ -232,8 +206,8 @@ def _links(names: Sequence[str], claims: dict[str, Claim]) -> str:
 
 
 def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:
-    rows = [(rich(h.claim), rich(h.found), _standing(h) + _basis(h, claims)) for h in headlines]
-    heads = {"The paper concludes": "statement", "Found here": "computed", "Holds?": "verdict"}
+    rows = [(rich(h.claim), rich(h.result), _standing(h) + _basis(h, claims)) for h in headlines]
+    heads = {"The paper concludes": "statement", "Computed here": "computed", "Holds?": "verdict"}
     return (
         "<h3>The paper’s conclusions</h3>"
         f"{table(heads, rows, 'Conclusions of the paper', 'ledger brief')}"
@@ -283,11 +257,7 @@ def _counted_apart(claims: Sequence[Claim]) -> str:
 
 #: Filters: name in addresses, and what they show.
 _FILTERS = (
-    ("all", "all"),
-    ("reproduced", "reproduced"),
-    ("misprint", "misprint"),
-    ("differs", "differs"),
-    ("undecided", "undecided"),
+    *((name, name) for name in ("all", *VERDICT_TEXTS)),
     ("apart", "fits, arithmetic, identities"),
 )
 

@@ -5,9 +5,10 @@ NAME = "package". It holds
 
 - ``claims.toml``: what the paper is, its claims in words, their rules and kinds, its conclusions
   and the ends of its published uncertainties (`asperity.ledger.contents`);
-- ``checks``, a module or package: one function a claim, marked with `asperity.ledger.check`, from
-  the paper's numbers to computed numbers by name. A function ``model`` there, if any, turns the
-  paper's numbers into what the checks are given, so that they can share what is computed once;
+- ``checks``, a module or package: one function for each claim without formulas (``values``),
+  marked with `asperity.ledger.check`, from the paper's numbers to computed numbers by name. A
+  function ``model`` there, if any, turns the paper's numbers into what the checks are given, so
+  that they can share what is computed once;
 - ``figures.toml``: titles, captions and alternative texts of its figures, and what is drawn;
 - ``figures``, a module or package: ``FIGURES``, functions that return a
   `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of
@@ -30,7 +31,7 @@ from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
 from asperity import materials
-from asperity.errors import InputError, closest, code_of_others
+from asperity.errors import InputError, closest, code_of_others, require
 from asperity.ledger.claims import (
     Claim,
     Headline,
@@ -158,10 +159,8 @@ class Paper:
             return
         figures = getattr(module, "FIGURES", None)
         if not isinstance(figures, Sequence) or not all(callable(f) for f in figures):
-            raise InputError(
-                f"{where} must have FIGURES, a tuple of functions, or sections, got "
-                f"{shown(figures)}; write FIGURES = (first_figure,)"
-            )
+            rule = "have FIGURES, a tuple of functions, or sections"
+            raise InputError(where, rule, shown(figures), "write FIGURES = (first_figure,)")
         yield (_guarded_section(Section("figures", "Figures", tuple(figures)), where),)
 
 
@@ -170,10 +169,9 @@ def available() -> dict[str, str]:
     papers: dict[str, str] = {}
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         if papers.setdefault(point.name, point.value) != point.value:
-            raise InputError(
-                f"paper must have a name that no other has, got '{point.name}' of {point.value} "
-                f"and of {papers[point.name]}; rename one of the entry points"
-            )
+            rule = "have a name that no other has"
+            got = f"'{point.name}' of {point.value} and of {papers[point.name]}"
+            raise InputError("paper", rule, got, "rename one of the entry points")
     return papers
 
 
@@ -186,18 +184,13 @@ def find_paper(name: str | None = None) -> Paper:
         If there is no such paper, or no paper is installed.
     """
     papers = available()
-    if not papers:
-        raise InputError(
-            f"a paper must be installed, got no entry point of the group {GROUP}; install asperity "
-            "again, which brings its papers along"
-        )
+    advice = "install asperity again, which brings its papers along"
+    require(papers, "a paper", "be installed", f"no entry point of the group {GROUP}", advice)
     if name is None:
         name = next(iter(papers))
     if name not in papers:
-        raise InputError(
-            f"paper must be one of the papers that are installed, got '{name}'; "
-            f"{closest(name, papers)}"
-        )
+        rule = "be one of the papers that are installed"
+        raise InputError("paper", rule, f"'{name}'", closest(name, papers))
     return Paper(name, papers[name])
 
 

@@ -17,20 +17,22 @@ undecided      chi^2 is not larger, but the errors are so wide that a curve 20 %
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import pandas as pd
 
-from asperity.errors import InputError, closest
-from asperity.ledger.figures import Observable, PaperFigure
+from asperity.errors import InputError, closest, require
+from asperity.ledger.figures import Observables, PaperFigure
 from asperity.ledger.recipe import read_columns
 from asperity.units import to_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from asperity.figures.plot import Panel
 
 #: Significance level: the probability that a test rejects a true curve.
 LEVEL = 0.05
@@ -107,17 +109,13 @@ def read_points(path: Path) -> pd.DataFrame:
         if not point["y_err"] > 0:
             what = f"{point['y_err']:g}"
             raise InputError(f"{where}: y_err", "be positive", what, "give the standard error of y")
-        if not point["source"]:
-            raise InputError(
-                f"{where}: source", "say where the point comes from", "nothing",
-                "name the table, the recording or the figure that was digitised",
-            )  # fmt: skip
+        rule = "say where the point comes from"
+        advice = "name the table, the recording or the figure that was digitised"
+        require(point["source"], f"{where}: source", rule, "nothing", advice)
     return points
 
 
-def check_names(
-    points: pd.DataFrame, observables: Mapping[str, Sequence[Observable]], name: str
-) -> None:
+def check_names(points: pd.DataFrame, observables: Mapping[str, Observables], name: str) -> None:
     """Refuse points of figures or observables that the paper's report does not have.
 
     Raises
@@ -126,7 +124,7 @@ def check_names(
     """
     for row, point in points.iterrows():
         figure, where = point["figure"], f"{name}, row {row}"
-        columns = [one.column for one in observables.get(figure, ())]
+        columns = list(observables.get(figure, ()))
         for field_, rule, known in (
             ("figure", "be a figure with curves", list(observables)),
             ("observable", f"be one of {figure}", columns),
@@ -139,7 +137,7 @@ def check_names(
 def with_curves(
     points: pd.DataFrame,
     table: pd.DataFrame,
-    observables: Sequence[Observable],
+    observables: Observables,
     name: str,
 ) -> pd.DataFrame:
     """The points of one figure with the value of the curve at each.
@@ -150,7 +148,7 @@ def with_curves(
         From `read_points`, of that figure.
     table : DataFrame
         The figure's curves, with the columns ``curve`` and ``law``.
-    observables : sequence of Observable
+    observables : Observables
         Of that figure.
     name : str
         Of the file, for messages.
@@ -165,9 +163,8 @@ def with_curves(
     InputError
         If the curve does not exist, or x lies outside of it.
     """
-    by_name = {one.column: one for one in observables}
     rows = [
-        _row(point, table, by_name[point["observable"]], f"{name}, row {row}")
+        _row(point, table, observables[point["observable"]][1], f"{name}, row {row}")
         for row, point in points.iterrows()
     ]
     return pd.DataFrame(rows, columns=list(POINT_COLUMNS))
@@ -188,27 +185,21 @@ POINT_COLUMNS = {
 }
 
 
-def _row(
-    point: pd.Series, table: pd.DataFrame, observable: Observable, where: str
-) -> dict[str, Any]:
+def _row(point: pd.Series, table: pd.DataFrame, panel: Panel, where: str) -> dict[str, Any]:
     """A point with the value of its curve; `where` is its row, for messages."""
     from scipy.interpolate import CubicSpline
 
     curve = table[table["curve"] == point["series"]]
     if curve.empty:
         known = [str(one) for one in table["curve"].unique()]
-        raise InputError(
-            f"{where}: series", f"be a curve of {point['figure']}", f"'{point['series']}'",
-            closest(point["series"], known),
-        )  # fmt: skip
-    x = float(to_si(point["x"], observable.kind, f"{where}: x", require_unit=True))
-    at = curve[observable.x].to_numpy(float)
+        rule, got = f"be a curve of {point['figure']}", f"'{point['series']}'"
+        raise InputError(f"{where}: series", rule, got, closest(point["series"], known))
+    x = float(to_si(point["x"], panel.x_kind, f"{where}: x", require_unit=True))
+    at = curve[panel.x].to_numpy(float)
     if not at.min() <= x <= at.max():
-        raise InputError(
-            f"{where}: x", f"lie on the curve, from {at.min():g} to {at.max():g} (SI)", f"{x:g}",
-            "leave the point out",
-        )  # fmt: skip
-    model = float(CubicSpline(at, curve[observable.column].to_numpy(float))(x))
+        rule = f"lie on the curve, from {at.min():g} to {at.max():g} (SI)"
+        raise InputError(f"{where}: x", rule, f"{x:g}", "leave the point out")
+    model = float(CubicSpline(at, curve[panel.y].to_numpy(float))(x))
     residual = (point["y"] - model) / point["y_err"]
     law = str(curve["law"].iloc[0])
     return {**point, "x": x, "law": law, "model": model, "residual": residual}
@@ -245,7 +236,7 @@ def _judge(rows: pd.DataFrame, figure: str, observable: str, law: str) -> CurveC
     return CurveComparison(figure, observable, law, n, value, p, power, verdict)
 
 
-def draw_points(figure: Figure, rows: pd.DataFrame, observables: Sequence[Observable]) -> None:
+def draw_points(figure: Figure, rows: pd.DataFrame, observables: Observables) -> None:
     """Draw points with their standard uncertainties over the curves, and name them in a legend.
 
     Parameters
@@ -253,17 +244,17 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Sequence[Observ
     figure : matplotlib Figure
     rows : DataFrame
         From `with_curves`, of this figure.
-    observables : sequence of Observable
+    observables : Observables
     """
     handles: dict[str, Any] = {}
     markers = dict(zip(rows["series"].unique(), _MARKERS * len(rows), strict=False))
-    for observable in observables:
-        axis = figure.axes[observable.panel]
-        for series, points in rows[rows["observable"] == observable.column].groupby("series"):
+    for column, (place, panel) in observables.items():
+        axis = figure.axes[place]
+        for series, points in rows[rows["observable"] == column].groupby("series"):
             handles[str(series)] = axis.errorbar(
-                observable.x_scale * points["x"],
-                observable.y_scale * points["y"],
-                yerr=observable.y_scale * points["y_err"],
+                panel.x_scale * points["x"],
+                panel.y_scale * points["y"],
+                yerr=panel.y_scale * points["y_err"],
                 linestyle="none", marker=markers[series], markersize=5, color=_COLOUR,
                 markerfacecolor="white", capsize=2.5, elinewidth=1.0, zorder=6,
             )  # fmt: skip
@@ -302,9 +293,7 @@ class MeasuredPoints:
         """Read a file; see `read_points`."""
         return cls(path.name, read_points(path))
 
-    def add(
-        self, figure: PaperFigure, observables: Mapping[str, Sequence[Observable]]
-    ) -> PaperFigure:
+    def add(self, figure: PaperFigure, observables: Mapping[str, Observables]) -> PaperFigure:
         """The figure with its points drawn; the points are compared with its curves."""
         points = self.points[self.points["figure"] == figure.name]
         if points.empty:
@@ -331,7 +320,7 @@ class MeasuredPoints:
         if not self.compared:
             return []
         rows = pd.concat(self.compared, ignore_index=True)
-        head = [f"points of {self.name} beside the curves of the figures", RULE]
+        head = [f"points of {self.name} and the curves of the figures", RULE]
         save_table(rows, folder / "data" / "points.csv", header=head, columns=POINT_COLUMNS)
         compared = comparisons(rows)
         record = {

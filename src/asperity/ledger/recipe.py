@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +74,7 @@ class RecipeNumber:
     published, published_uncertainty : float or None
     published_place : str
         Section of the paper.
-    upper_limit : float or None
+    upper_limit_95 : float or None
         At 95 % confidence, of a number that is only bounded.
     """
 
@@ -88,12 +88,12 @@ class RecipeNumber:
     published: float | None
     published_uncertainty: float | None
     published_place: str
-    upper_limit: float | None = None
+    upper_limit_95: float | None = None
 
     @property
     def deviation(self) -> float | None:
         """Difference from the paper over the combined standard error; None if one is unknown."""
-        if self.published is None or self.upper_limit is not None:
+        if self.published is None or self.upper_limit_95 is not None:
             return None
         spread = math.hypot(self.se, self.published_uncertainty or 0.0)
         return (self.value - self.published) / spread if spread > 0 else None
@@ -123,20 +123,7 @@ class RecipeResult:
         return {
             "recipe": self.paper,
             "numbers": {
-                n: {
-                    "value": r.value,
-                    "unit": r.unit,
-                    "se": r.se,
-                    "se_own": r.se_own,
-                    "upper_limit_95": r.upper_limit,
-                    "step": r.step,
-                    "how": r.how,
-                    "published": r.published,
-                    "published_uncertainty": r.published_uncertainty,
-                    "published_place": r.published_place,
-                    "deviation": r.deviation,
-                }
-                for n, r in self.numbers.items()
+                n: {**asdict(r), "deviation": r.deviation} for n, r in self.numbers.items()
             },
             "warnings": list(self.warnings),
             "data": list(self.data),

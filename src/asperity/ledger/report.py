@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from asperity._version import __version__
 from asperity.ledger.claims import VERDICTS, Claim
 from asperity.ledger.contents import KINDS
-from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, Plate, PlateGroup, build_page, counts
+from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import written_folder
@@ -154,9 +154,7 @@ def reproduce(
         _write_json(paper, claims, folder / "claims.json")
         _write_csv(claims, folder / "claims.csv")
         agreement = points.write(folder)
-        page = build_page(
-            paper, [group for group, _ in shown], claims, paper.headlines(claims), agreement
-        )
+        page = build_page(paper, folder, shown, claims, paper.headlines(claims), agreement)
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
     begin("done")
     figures = [figure for _, drawn in shown for figure in drawn]
@@ -165,36 +163,23 @@ def reproduce(
 
 def _show(
     section: Section, folder: Path, begin: Callable[[str], None], points: MeasuredPoints
-) -> tuple[PlateGroup, list[PaperFigure]]:
+) -> tuple[Section, list[PaperFigure]]:
     """Compute and draw the figures of a section, and write their tables."""
-    from asperity.figures.style import style
+    from asperity.figures.style import save_picture, save_table, style
 
     figures = []
     for compute in section.figures:
         begin(f"numbers of {section.title.lower()}")
         figures.append(points.add(compute(), section.observables))
-    plates = []
     # The style also says how pictures are saved.
     with style():
         for figure in figures:
             begin(figure.place)
-            plates.append(_draw(figure, folder))
-    group = PlateGroup(
-        section.key, section.title, section.before(figures), plates, section.after(figures)
-    )
-    return group, figures
-
-
-def _draw(figure: PaperFigure, folder: Path) -> Plate:
-    from asperity.figures.style import save_picture, save_table
-
-    png, _ = save_picture(figure.draw(), folder / "figures" / figure.name)
-    for table in figure.tables:
-        path = folder / "data" / f"{table.name}.csv"
-        save_table(table.data, path, header=list(table.header), columns=table.columns)
-    files = [f"figures/{figure.name}.{kind}" for kind in ("png", "pdf")]
-    files += [f"data/{table.name}.csv" for table in figure.tables]
-    return Plate(figure, png, tuple(files))
+            save_picture(figure.draw(), folder / "figures" / figure.name)
+            for table in figure.tables:
+                path = folder / "data" / f"{table.name}.csv"
+                save_table(table.data, path, header=list(table.header), columns=table.columns)
+    return section, figures
 
 
 _FIELDS = (

@@ -30,7 +30,10 @@ one number twice, the more precise statement is judged.
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -89,10 +92,7 @@ def rounds_to(stated: float, last_digit: float, what: str = "the value") -> Acce
 
 def about(stated: float, what: str = "the value") -> AcceptanceRule:
     """Within 5 %."""
-    return AcceptanceRule(
-        f"{what} within {100 * ABOUT:g} % of {stated:g}",
-        lambda value: abs(value / stated - 1) <= ABOUT + _TIE,
-    )
+    return within(stated, ABOUT, what)
 
 
 def within(stated: float, tolerance: float, what: str = "the value") -> AcceptanceRule:
@@ -141,6 +141,56 @@ def formula_text(tolerance: float) -> str:
     )
 
 
+_OPERATIONS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_FUNCTIONS: Mapping[str, Callable[[float], float]] = {"sqrt": math.sqrt, "ln": math.log}
+
+
+def formula_value(formula: str, numbers: Mapping[str, float], place: str) -> float:
+    """The value of a formula with + - * / **, sqrt, ln, pi and the paper's numbers.
+
+    Parameters
+    ----------
+    formula : str
+        A name that is a word of Python has an underscore at its end: ``lambda_``.
+    numbers : mapping of str to float
+        From `asperity.ledger.claims.printed_numbers`.
+    place : str
+        Of the formula, for messages.
+
+    Raises
+    ------
+    InputError
+        If it is no such formula, or names something else.
+    """
+
+    def value(node: ast.expr) -> float:
+        match node:
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
+                return _OPERATIONS[type(op)](value(left), value(right))
+            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
+                return _FUNCTIONS[name](value(inner))
+            case ast.Constant(value=int() | float() as constant):
+                return float(constant)
+            case ast.Name() | ast.Attribute():
+                name = re.sub(r"_(?=$|\.)", "", ast.unparse(node))
+                return number(name, {**numbers, "pi": math.pi}, place)
+        raise SyntaxError
+
+    try:
+        return value(ast.parse(formula, mode="eval").body)
+    except (SyntaxError, ArithmeticError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
+        raise InputError(place, rule, f"'{formula}'", advice) from None
+
+
 #: Rules that claims.toml may name, with the names of their numbers in the order of arguments.
 RULES: Mapping[str, tuple[Callable[..., AcceptanceRule], tuple[str, ...]]] = {
     "rounds-to": (rounds_to, ("stated", "last_digit")),
@@ -168,7 +218,5 @@ def number(value: float | str, numbers: Mapping[str, float], place: str) -> floa
         return WORDS[value]
     if value in numbers:
         return numbers[value]
-    raise InputError(
-        f"{place} must be a number, a word of the rules or one of the paper's numbers, got "
-        f"'{value}'; {closest(value, {**WORDS, **numbers})}"
-    )
+    rule = "be a number, a word of the rules or one of the paper's numbers"
+    raise InputError(place, rule, f"'{value}'", closest(value, {**WORDS, **numbers}))

@@ -60,10 +60,8 @@ def fill(sentence: str, values: Mapping[str, Any], where: str) -> str:
         return _Filler().vformat(sentence, (), values)
     except KeyError as error:
         name = str(error.args[0])
-        raise InputError(
-            f"{where} must quote numbers that are computed, got '{{{name}}}'; "
-            f"{closest(name, values)}"
-        ) from None
+        rule = "quote numbers that are computed"
+        raise InputError(where, rule, f"'{{{name}}}'", closest(name, values)) from None
     except (ValueError, TypeError) as error:
         raise InputError(
             f"{where} must be a sentence with valid placeholders, got: {error}; correct it"

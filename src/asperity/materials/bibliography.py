@@ -24,9 +24,8 @@ def citation(key: str) -> str:
     try:
         return entries[key]
     except KeyError:
-        raise InputError(
-            f"citation must be a known source, got '{key}'; {closest(key, entries)}"
-        ) from None
+        rule = "be a known source"
+        raise InputError("citation", rule, f"'{key}'", closest(key, entries)) from None
 
 
 def cited_works(source: str) -> dict[str, str]:

@@ -50,9 +50,8 @@ class Number(Record):
     @classmethod
     def _dimension_is_known(cls, dimension: str) -> str:
         if dimension not in KINDS:
-            raise InputError(
-                "", "be a kind of quantity", f"'{dimension}'", closest(dimension, KINDS)
-            )
+            rule = "be a kind of quantity"
+            raise InputError("", rule, f"'{dimension}'", closest(dimension, KINDS))
         return dimension
 
     @model_validator(mode="after")
@@ -79,10 +78,8 @@ class Number(Record):
     def si(self) -> float:
         """The value in SI; raises `InputError` where the paper gives only a range or a list."""
         if self.value is None:
-            raise InputError(
-                f"number.value must be given, got only {'a range' if self.range else 'a list'}; "
-                "take si_range or si_values"
-            )
+            got = f"only {'a range' if self.range else 'a list'}"
+            raise InputError("number.value", "be given", got, "take si_range or si_values")
         return self._to_si(self.value)
 
     @property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import field_validator
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
 from asperity.parameters.arguments import shown, typed
@@ -47,13 +47,9 @@ class Material(Question):
     @classmethod
     def _usable(cls, numbers: Mapping[str, Number]) -> Mapping[str, Number]:
         for name, number in numbers.items():
-            if not name.isidentifier() or name.startswith("_") or hasattr(cls, name):
-                raise InputError(
-                    "numbers",
-                    "have names that are Python attributes and not in use",
-                    f"'{name}'",
-                    "rename that number",
-                )
+            holds = name.isidentifier() and not name.startswith("_") and not hasattr(cls, name)
+            rule = "have names that are Python attributes and not in use"
+            require(holds, "numbers", rule, f"'{name}'", "rename that number")
             if number.value is not None:
                 _check_rule(name, number.si, number.dimension, "numbers")
         return numbers
@@ -63,9 +59,8 @@ class Material(Question):
         try:
             return self.numbers[_plain(name)]
         except KeyError:
-            raise InputError(
-                self.name, "have the number", shown(name), closest(name, self.numbers)
-            ) from None
+            rule = "have the number"
+            raise InputError(self.name, rule, shown(name), closest(name, self.numbers)) from None
 
     def __getattr__(self, name: str) -> float:
         # Python and pydantic probe for names with underscores.
@@ -75,12 +70,8 @@ class Material(Question):
             )
         number = self.numbers[_plain(name)]
         if number.value is None:
-            raise InputError(
-                f"{self.name}.{name}",
-                "be a single value here",
-                number,
-                f"take si_range or si_values of material['{name}']",
-            )
+            advice = f"take si_range or si_values of material['{name}']"
+            raise InputError(f"{self.name}.{name}", "be a single value here", number, advice)
         return number.si
 
     def __contains__(self, name: str) -> bool:
@@ -120,12 +111,8 @@ class Material(Question):
         given = {_plain(parameter): value for parameter, value in overrides.items()}
         for parameter in given:
             if parameter not in wanted:
-                raise InputError(
-                    name,
-                    "be given its own parameters",
-                    f"'{parameter}'",
-                    closest(parameter, wanted),
-                )
+                rule = "be given its own parameters"
+                raise InputError(name, rule, f"'{parameter}'", closest(parameter, wanted))
         values = {p: self._parameter(p, name, given) for p in wanted}
         return law(**{_field(p, law): value for p, value in values.items()})
 
@@ -133,12 +120,9 @@ class Material(Question):
         number = self.numbers.get(parameter)
         if parameter not in given:
             if number is None:
-                raise InputError(
-                    f"{owner}.{parameter}",
-                    "be given",
-                    f"nothing and '{self.name}' has no such number",
-                    f"write {parameter}=... after the law's name",
-                )
+                got = f"nothing and '{self.name}' has no such number"
+                advice = f"write {parameter}=... after the law's name"
+                raise InputError(f"{owner}.{parameter}", "be given", got, advice)
             return number.si
         if number is None:  # the declaration of the law's field checks unit and rule
             return given[parameter]

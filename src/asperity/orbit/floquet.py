@@ -1,18 +1,24 @@
-"""Floquet multipliers from a monodromy matrix, with their logarithms where they overflow.
+"""Floquet multipliers from a monodromy matrix or from its logarithm, where they overflow too.
 
 Sign and order: a perturbation of the orbit is multiplied by a multiplier each period of the
 modulation; they are sorted by falling modulus, and the orbit is stable if all moduli are below 1.
 
-For derivatives the same logarithms are functions of JAX arrays, differentiable to any order.
+Orbits on meshes have monodromy matrices, products of transfer maps. On the grid of the fast method
+a periodic change of variables makes the linearised equations ones of constant coefficients L
+(Floquet's theorem); the multipliers are exp(2 pi eig L).
 """
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+
+from asperity.algebra.small_systems import Matrix, add, inverse_points, multiply, product, subtract
 
 #: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
 #: phases, is then unknown, too.
@@ -54,15 +60,15 @@ def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) 
             return _log_pair(monodromy, log_scale, log_determinant)
         finite = np.where(np.isfinite(monodromy), monodromy, 0.0)
         values = np.log(np.linalg.eigvals(np.moveaxis(finite, -1, 0)).T.astype(complex))
-        logs = values + log_scale
-    order = np.argsort(-logs.real, axis=0, kind="stable")
-    return np.take_along_axis(logs, order, axis=0)
+    logs: Complex = sorted_logs(values + log_scale)
+    return logs
 
 
-def log_multipliers_of_exponent(exponent: Float, log_determinant: Float) -> Complex:
+def log_multipliers_of_exponent(exponent: Any, log_determinant: Any) -> Any:
     """Logarithms of the multipliers from a matrix whose exponential is the monodromy matrix.
 
-    A multiplier near 1 has a distance from 1 that a monodromy matrix loses to round-off.
+    Of NumPy or JAX. A multiplier near 1 has a distance from 1 that a monodromy matrix loses to
+    round-off.
 
     Parameters
     ----------
@@ -70,19 +76,141 @@ def log_multipliers_of_exponent(exponent: Float, log_determinant: Float) -> Comp
     log_determinant : array, shape (points,)
         Trace of `exponent`, free of cancellation.
     """
-    n = exponent.shape[0]
+    return _turned_back(_eigenvalues(exponent, log_determinant))
+
+
+def _eigenvalues(exponent: Any, log_determinant: Any) -> Any:
+    """Eigenvalues, (n, points), by falling real part."""
+    n, xp = exponent.shape[0], exponent.__array_namespace__()
     if n == 1:
-        return log_determinant[None].astype(complex)
+        return log_determinant[None] + 0j
     if n == 2:
         (a, b), (c, d) = exponent
-        root = np.sqrt(0.25 * (a - d) ** 2 + b * c + 0j)
-        logs = 0.5 * log_determinant + np.stack([root, -root])
-    else:
-        logs = np.linalg.eigvals(np.moveaxis(exponent, -1, 0)).T.astype(complex)
-    # Arguments in (-pi, pi].
-    logs.imag -= 2 * np.pi * np.ceil(logs.imag / (2 * np.pi) - 0.5)
-    order = np.argsort(-logs.real, axis=0, kind="stable")
-    return np.take_along_axis(logs, order, axis=0)
+        root = xp.sqrt(0.25 * (a - d) ** 2 + b * c + 0j)
+        return 0.5 * log_determinant + xp.stack([root, -root])
+    finite = xp.where(xp.isfinite(exponent).all((0, 1)), exponent, 0.0)
+    return sorted_logs(xp.linalg.eigvals(xp.moveaxis(finite, -1, 0)).T + 0j)
+
+
+def _turned_back(logs: Any) -> Any:
+    """Logarithms with arguments in (-pi, pi]."""
+    xp = logs.__array_namespace__()
+    return logs - 2j * np.pi * xp.ceil(logs.imag / (2 * np.pi) - 0.5)
+
+
+#: Estimated error of L, and size of what still varies where its periodic factor is wanted.
+_EXPONENT_ERROR, _FACTOR_ERROR = 1e-10, 1e-9
+_MOST_STEPS = 40
+
+
+class FloquetForm(NamedTuple):
+    """The fundamental matrix P(tau) e^{L tau} of linear equations with a period.
+
+    Attributes
+    ----------
+    exponent : array, shape (size, size, points)
+        2 pi L, whose exponential is similar to the monodromy matrix.
+    factor : matrix of arrays, shape (nodes, points), or None
+        P, if wanted.
+    converged : bool array, shape (points,)
+    """
+
+    exponent: Array
+    factor: Matrix | None
+    converged: Array
+
+
+def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> FloquetForm:
+    """Exponent and periodic factor of the fundamental matrix.
+
+    Parameters
+    ----------
+    J : matrix of arrays, shape (nodes, points)
+        Derivatives of the rates to the states, per unit of tau, on an even grid.
+    integral : array, shape (nodes, nodes)
+        Zero-mean antiderivative in tau.
+    factor : bool
+        Whether P is wanted, which takes about twice as many steps.
+
+    Notes
+    -----
+    Let L be the mean of J and q the zero-mean antiderivative of J - L. With y = (1 + q) z, the
+    equation dy/dtau = J y becomes
+
+        dz/dtau = R z,      R = (1 + q)^-1 (L + J q),
+
+    and R varies less than J by a factor of the size of L and q. A step does this with the R of the
+    last one; P is the product of all 1 + q. By averaging, the error of L is the square of what
+    still varies.
+    """
+    n = range(len(J))
+    accepted = _FACTOR_ERROR if factor else _EXPONENT_ERROR
+
+    def step(carry: tuple) -> tuple:
+        R, L, P, last, _, steps = carry
+        q = [[integral @ a for a in row] for row in subtract(R, L)]
+        inverse = inverse_points([[q[i][j] + float(i == j) for j in n] for i in n])
+        R = multiply(inverse, add(L, multiply(R, q)))
+        new = _means(R)
+        change = jnp.stack([jnp.abs(new[i][j] - L[i][j]) for i in n for j in n]).max(0)
+        error = jnp.minimum(change, change**2 / (last + 1e-300))
+        if factor:
+            P = add(P, multiply(P, q))
+            error = jnp.stack([jnp.abs(a) for row in q for a in row]).max((0, 1))
+        return R, new, P, change, error, steps + 1
+
+    def unfinished(carry: tuple) -> Array:
+        *_, change, error, steps = carry
+        # What diverges becomes large or NaN, and ends the iteration.
+        return (steps < _MOST_STEPS) & jnp.any((error > accepted) & (change < 1e3))
+
+    none = jnp.zeros(J[0][0].shape[1])
+    identity = [[float(i == j) + 0 * J[i][j] for j in n] for i in n] if factor else None
+    start = (J, _means(J), identity, none + 1.0, none + 1.0, 0)
+    _, L, P, _, error, _ = jax.lax.while_loop(unfinished, step, start)
+    stacked = 2 * jnp.pi * jnp.stack([jnp.stack(row) for row in L])
+    return FloquetForm(stacked, P, error <= accepted)
+
+
+@jax.custom_jvp
+def log_multipliers_along(J: Matrix, integral: np.ndarray) -> Array:
+    """ln|m| + i arg m, (n, points), of `floquet_form`, with derivatives; J as there.
+
+    Simple multipliers: at a double one derivatives are not finite.
+    """
+    exponent = floquet_form(J, integral).exponent
+    return log_multipliers_of_exponent(exponent, jnp.trace(exponent))
+
+
+@log_multipliers_along.defjvp
+def _logs_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    """First-order perturbation theory: d ln m = 2 pi < tr(S P^-1 dJ P) >.
+
+    S is the projector on the eigenspace of m, prod_j (L - l_j)/(l_m - l_j) over the other
+    eigenvalues.
+    """
+    (J, integral), (dJ, _) = primals, tangents
+    n = range(len(J))
+    exponent, P, _ = floquet_form(J, integral, factor=True)
+    logs = _eigenvalues(exponent, jnp.trace(exponent))
+    back = inverse_points(P)
+    changes = []
+    for m in n:
+        projector = jnp.eye(len(J))[..., None] + 0 * exponent
+        for j in n:
+            if j != m:
+                other = exponent - logs[j] * jnp.eye(len(J))[..., None]
+                projector = product(projector, other / (logs[m] - logs[j]))
+        weights = multiply(multiply(P, [list(row) for row in projector]), back)
+        change = sum(weights[j][i] * dJ[i][j] for i in n for j in n)
+        changes.append(2 * jnp.pi * change.mean(0))
+    return _turned_back(logs), jnp.stack(changes)
+
+
+def _means(entries: Matrix) -> Matrix:
+    """Means over tau, as products with a vector: XLA's reductions would be slower."""
+    share = np.full(len(entries[0][0]), 1 / len(entries[0][0]))
+    return [[share @ entry for entry in row] for row in entries]
 
 
 def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Complex:
@@ -174,63 +302,9 @@ def without_lost_arguments(logs: Complex) -> Complex:
     return kept
 
 
-def differentiable_log_multipliers(exponent: Array) -> Array:
-    """ln|m| + i arg m from a matrix L, (n, n, points), of which e^L is the monodromy matrix.
-
-    Returns
-    -------
-    complex array, shape (n, points), sorted by falling real part
-    """
-    n = exponent.shape[0]
-    if n == 1:
-        return exponent[0] + 0j
-    if n == 2:
-        (a, b), (c, d) = exponent
-        half, square = 0.5 * (a + d), 0.25 * (a - d) ** 2 + b * c
-        real = square >= 0
-        root = jnp.where(real, jnp.sqrt(jnp.where(real, square, 1.0)), 0.0)
-        turn = jnp.where(real, 0.0, jnp.sqrt(jnp.where(real, 1.0, -square)))
-        logs = jnp.stack([half + root + 1j * turn, half - root - 1j * turn])
-    else:
-        values, _ = eigensystem(jnp.moveaxis(exponent, -1, 0) + 0j)
-        logs = sorted_logs(values.T)
-    turns = jax.lax.stop_gradient(jnp.round(logs.imag / (2 * jnp.pi)))
-    return logs - 2j * jnp.pi * turns
-
-
-def sorted_logs(logs: Array) -> Array:
+def sorted_logs(logs: Any) -> Any:
     """By falling real part; of a complex pair the one with the positive argument first."""
-    margin = 1e-9 * (1 + jnp.abs(logs.real))
-    order = jnp.argsort(-logs.real - margin * jnp.sign(logs.imag), axis=0, stable=True)
-    return jnp.take_along_axis(logs, order, axis=0)
-
-
-@jax.custom_jvp
-def eigensystem(matrix: Array) -> tuple[Array, Array]:
-    """Eigenvalues and right eigenvectors as columns.
-
-    Parameters
-    ----------
-    matrix : complex array, shape (points, n, n)
-        With simple eigenvalues: at a multiple one the derivatives are not finite.
-
-    Returns
-    -------
-    values : array, shape (points, n)
-    vectors : array, shape (points, n, n)
-        Of a norm that does not change to first order in any coordinate system of the vectors.
-    """
-    finite = jnp.isfinite(matrix).all((1, 2), keepdims=True)
-    values, vectors = jnp.linalg.eig(jnp.where(finite, matrix, jnp.eye(matrix.shape[-1])))
-    return jnp.where(finite[..., 0], values, jnp.nan), vectors
-
-
-@eigensystem.defjvp
-def _eigensystem_rule(primals: tuple, tangents: tuple) -> tuple:
-    """First-order perturbation theory; the rule calls `eigensystem`, which gives higher orders."""
-    values, vectors = eigensystem(*primals)
-    turned = jnp.linalg.solve(vectors, tangents[0] @ vectors)
-    n = values.shape[-1]
-    differences = values[:, None, :] - values[:, :, None] + jnp.eye(n)
-    mixed = jnp.where(jnp.eye(n, dtype=bool), 0.0, turned / differences)
-    return (values, vectors), (jnp.diagonal(turned, axis1=-2, axis2=-1), vectors @ mixed)
+    xp = logs.__array_namespace__()
+    margin = 1e-9 * (1 + abs(logs.real))
+    order = xp.argsort(-logs.real - margin * xp.sign(logs.imag), axis=0, stable=True)
+    return xp.take_along_axis(logs, order, axis=0)

@@ -1,11 +1,15 @@
-"""Sections of a report, rendered as text for a terminal and as HTML for a page."""
+"""Sections of a report, rendered as text for a terminal and as HTML for a page; whole pages."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
+from importlib.resources import files
+from string import Template
 from typing import Any, NamedTuple
+
+from asperity._version import __version__
 
 Row = Sequence[str]
 
@@ -90,6 +94,36 @@ def as_html(sections: Iterable[Section], *, level: int = 3) -> str:
         listed = "".join(f"<li>{escape(warning)}</li>" for warning in section.warnings)
         parts += [f"<ul>{listed}</ul>"] if listed else []
     return "\n".join(parts)
+
+
+def html_page(
+    title: str, header: str, sections: Mapping[str, tuple[str, str]], footer: str = ""
+) -> str:
+    """A page in one file without external resources, with a link to each of its sections.
+
+    Parameters
+    ----------
+    title : str
+        Plain text.
+    header, footer : str
+        HTML; the footer follows the name of the program.
+    sections : mapping of str to (str, str)
+        Key of each section in addresses within the page, and its HTML, by its heading.
+    """
+    body = "\n".join(
+        f'<section id="{key}" aria-labelledby="{key}-head"><h2 id="{key}-head">{name}</h2>\n'
+        f"{content}\n</section>"
+        for name, (key, content) in sections.items()
+    )
+    links = "".join(f'<a href="#{key}">{name}</a>' for name, (key, _) in sections.items())
+    page, style = (
+        files("asperity.outputs").joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css")
+    )
+    return Template(page).substitute(
+        title=escape(title), style=style, header=header, links=links, sections=body,
+        version=__version__, footer=footer,
+    )  # fmt: skip
 
 
 def rounded(value: float, doubt: float) -> tuple[str, str]:

@@ -11,7 +11,7 @@ import stat
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 #: Share of the free room that one computation may fill.
 _SHARE = 0.8
@@ -71,11 +71,8 @@ def require_disk(size: float, folder: Path, name: str, what: str, way_out: str) 
 
 
 def _require(size: float, free: float, name: str, what: str, way_out: str, where: str) -> None:
-    if size > _SHARE * free:
-        raise InputError(
-            f"{name} must fit into the free space, got {what}, {size_text(size)}, with "
-            f"{size_text(free)} {where} free; {way_out}"
-        )
+    got = f"{what}, {size_text(size)}, with {size_text(free)} {where} free"
+    require(not size > _SHARE * free, name, "fit into the free space", got, way_out)
 
 
 def _available() -> float | None:
@@ -149,21 +146,13 @@ def output_file(
                 f"that is {kind}; choose another name, or move what is there"
             )
     folder = target.parent
-    if not folder.is_dir():
-        raise InputError(
-            f"{name} must lie in a folder that exists, got '{path}'; make the folder or choose "
-            "another"
-        )
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(
-            f"{name} must lie in a folder that can be written, got '{path}'; choose another folder"
-        )
+    rule = "lie in a folder that exists"
+    require(folder.is_dir(), name, rule, f"'{path}'", "make the folder or choose another")
+    rule = "lie in a folder that can be written"
+    require(os.access(folder, os.W_OK | os.X_OK), name, rule, f"'{path}'", "choose another folder")
     for role, source in (inputs or {}).items():
-        if _same(target, Path(source)):
-            raise InputError(
-                f"{name} must be another file than the {role}, got '{path}'; choose a new name, "
-                f"such as '{example}'"
-            )
+        rule, advice = f"be another file than the {role}", f"choose a new name, such as '{example}'"
+        require(not _same(target, Path(source)), name, rule, f"'{path}'", advice)
     return target
 
 
@@ -198,11 +187,8 @@ def output_files(
         example = "new" + (Path(path).suffix or ".csv")
         target = output_file(path, name, example=example, inputs=inputs)
         for other, taken in targets.items():
-            if target == taken:
-                raise InputError(
-                    f"{name} must be another file than {other}, got '{path}' for both; "
-                    "change one of the names"
-                )
+            rule = f"be another file than {other}"
+            require(target != taken, name, rule, f"'{path}' for both", "change one of the names")
         targets[name] = target
     return targets
 
@@ -214,10 +200,8 @@ def _resolved(path: str | os.PathLike[str], name: str, example: str) -> Path:
         os.fsencode(target)
     except (OSError, ValueError, RuntimeError, TypeError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            f"{name} must be the name of a file, got {str(path)!r} ({why.lower()}); "
-            f"write it like '{example}'"
-        ) from None
+        got = f"{str(path)!r} ({why.lower()})"
+        raise InputError(name, "be the name of a file", got, f"write it like '{example}'") from None
     return target
 
 
@@ -240,12 +224,9 @@ def require_short(target: Path, files: Iterable[Path], name: str = "out") -> Non
     """
     length = max(len(os.fsencode(file.name)) for file in files)
     name_length = len(os.fsencode(target.name))
-    if length > _LONGEST:
-        raise InputError(
-            f"{name} must have a name of at most {_LONGEST - length + name_length} bytes, got "
-            f"{name_length}, which leaves no room for the names of temporary files; choose a "
-            "shorter one"
-        )
+    rule = f"have a name of at most {_LONGEST - length + name_length} bytes"
+    got = f"{name_length}, which leaves no room for the names of temporary files"
+    require(not length > _LONGEST, name, rule, got, "choose a shorter one")
 
 
 def unfinished_name(target: Path) -> Path:
@@ -275,10 +256,8 @@ def require_rereadable(path: Path, label: str) -> None:
         If the path is neither a regular file nor a folder.
     """
     other = not_a_file(path)
-    if other and not path.is_dir():
-        raise InputError(
-            f"{label} must be a regular file, got '{path}', {other}; write the data to a file"
-        )
+    got = f"'{path}', {other}"
+    require(not other or path.is_dir(), label, "be a regular file", got, "write the data to a file")
 
 
 def not_a_file(path: Path) -> str:

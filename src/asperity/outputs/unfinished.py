@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from asperity._version import __version__
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
 from asperity.outputs.written import to_disk, writable
@@ -94,11 +94,8 @@ class UnfinishedOutput:
         """
         if not (self.record.exists() and self.data.exists()):
             return self.progress
-        if not resume:
-            raise InputError(
-                f"{self.target} must not have an unfinished run, got '{self.record}'; "
-                "go on with --resume, or delete it to start over"
-            )
+        advice = "go on with --resume, or delete it to start over"
+        require(resume, str(self.target), "not have an unfinished run", f"'{self.record}'", advice)
         try:
             saved = json_content(self.record)
             inputs, progress = dict(saved["inputs"]), dict(saved["progress"])
@@ -106,11 +103,8 @@ class UnfinishedOutput:
             different = differences(inputs, self.inputs)
         except (ValueError, KeyError, TypeError, RecursionError):
             raise self.damaged() from None
-        if different:
-            raise InputError(
-                f"{self.record} must belong to the same inputs, got {different}; "
-                "repeat the earlier command, or delete it to start over"
-            )
+        advice = "repeat the earlier command, or delete it to start over"
+        require(not different, str(self.record), "belong to the same inputs", different, advice)
         if not whole:
             raise self.damaged()
         self.progress = progress

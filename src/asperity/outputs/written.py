@@ -58,11 +58,9 @@ def writable(target: Path, name: str = "out") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(
-            f"{name} must be a file that can be written, got '{target}' "
-            f"({(error.strerror or str(error)).lower()}); choose a folder that exists, is "
-            "writable and has room"
-        ) from None
+        got = f"'{target}' ({(error.strerror or str(error)).lower()})"
+        advice = "choose a folder that exists, is writable and has room"
+        raise InputError(name, "be a file that can be written", got, advice) from None
 
 
 def to_disk(path: Path) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.parameters.toml_file import file_content
 
 #: A name and its unit.
@@ -51,20 +51,16 @@ def read_headed_columns(
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     separator = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
     rows = [[cell.strip() for cell in cells] for cells in csv.reader(lines, delimiter=separator)]
-    if len(rows) < 2:
-        raise InputError(
-            f"{path.name} must have a heading and {row} a row, got {len(rows)} lines; add them"
-        )
+    rule = f"have a heading and {row} a row"
+    require(len(rows) >= 2, path.name, rule, f"{len(rows)} lines", "add them")
     columns: dict[str, list[float | str]] = {}
     for place, heading in enumerate(rows[0]):
         match = _HEADING.fullmatch(heading)
         if match is None or match[1] not in {*numbers, *texts}:
             continue
         name, unit = match[1], match[2] or ""
-        if name in columns:
-            raise InputError(
-                f"{path.name} must have one column for {name}, got two; remove one of them"
-            )
+        rule = f"have one column for {name}"
+        require(name not in columns, path.name, rule, "two", "remove one of them")
         cells = [cells[place] if place < len(cells) else "" for cells in rows[1:]]
         columns[name] = [
             cell if name in texts else _number(cell, name, unit, f"{path.name}, row {n}")
@@ -82,18 +78,14 @@ def readable(path: Path, label: str) -> Iterator[None]:
         why = (getattr(error, "strerror", None) or "").lower() or "not UTF-8 text"
         if isinstance(error, csv.Error):
             why = f"{error}, check the quotation marks"
-        raise InputError(
-            Argument(label), "be a CSV that can be read", f"'{path}': {why}",
-            "correct the path or the file",
-        ) from None  # fmt: skip
+        rule, got = "be a CSV that can be read", f"'{path}': {why}"
+        raise InputError(Argument(label), rule, got, "correct the path or the file") from None
 
 
 def _number(cell: str, name: str, unit: str, where: str) -> float | str:
     try:
         number = float(cell)
     except ValueError:
-        raise InputError(
-            f"{where} must have a number in column {name}, got '{cell}'; correct the cell, and "
-            "write the unit into the heading"
-        ) from None
+        advice = "correct the cell, and write the unit into the heading"
+        raise InputError(where, f"have a number in column {name}", f"'{cell}'", advice) from None
     return f"{number!r} {unit}" if unit else number

@@ -100,12 +100,9 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
     for declared in dataclasses.fields(law):
         name = plain_name(declared.name)
         if name in EXPERIMENT:
-            raise InputError(
-                f"law.{name}",
-                "have a name that is free",
-                f"'{name}', which is the {EXPERIMENT[name].meaning}",
-                f"rename the field of {law.__name__}",
-            )
+            rule = "have a name that is free"
+            got = f"'{name}', which is the {EXPERIMENT[name].meaning}"
+            raise InputError(f"law.{name}", rule, got, f"rename the field of {law.__name__}")
         parameter = declared.metadata.get("parameter")
         # A field without declaration is a pure number.
         parameters[name] = parameter or Parameter(

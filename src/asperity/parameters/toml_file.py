@@ -66,14 +66,12 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
     try:
         text = file_content(file).decode("utf-8-sig")
     except FileNotFoundError:
-        raise InputError(
-            label, "be a file", f"'{path}'", "there is none, correct the path"
-        ) from None
+        advice = "there is none, correct the path"
+        raise InputError(label, "be a file", f"'{path}'", advice) from None
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(
-            label, "be a readable TOML file", f"'{path}' ({why})", "give another"
-        ) from None
+        rule = "be a readable TOML file"
+        raise InputError(label, rule, f"'{path}' ({why})", "give another") from None
     return file, parsed_toml(text.replace("\r\n", "\n"), label, f"'{path}'")
 
 
@@ -106,9 +104,8 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what = printable(" ".join(str(error).split()))
-        raise InputError(
-            label, "be valid TOML", f"{source} ({what})", "correct that line"
-        ) from None
+        rule = "be valid TOML"
+        raise InputError(label, rule, f"{source} ({what})", "correct that line") from None
     except RecursionError:
         raise deep from None
     except ValueError:

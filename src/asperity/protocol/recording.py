@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.parameters.arguments import annotations_of, at_least, of_type, shown
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
@@ -145,21 +145,14 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
     made, measurable = SENSORS[name]
     chosen = options.pop("measures", None)
     measured = measurable[0] if chosen is None else chosen
-    if measured not in measurable:
-        raise InputError(
-            f"{place}.measures",
-            f"be something that a {name} can measure",
-            shown(measured),
-            f"choose {' or '.join(map(repr, measurable))}",
-        )
+    rule = f"be something that a {name} can measure"
+    advice = f"choose {' or '.join(map(repr, measurable))}"
+    require(measured in measurable, f"{place}.measures", rule, shown(measured), advice)
     claimed = next((_CLAIMS[r] for r in _CLAIMS if candidates(r, {channel: None})), measured)
     if chosen is None and claimed != measured:
-        raise InputError(
-            f"{place}.measures",
-            f"be given for a {name} in a channel of this name",
-            "nothing",
-            f"it measures the {measured} without measures = '{claimed}'",
-        )
+        rule = f"be given for a {name} in a channel of this name"
+        advice = f"it measures the {measured} without measures = '{claimed}'"
+        raise InputError(f"{place}.measures", rule, "nothing", advice)
     return _made(made, options, place), _SIGNALS[measured]
 
 
@@ -182,9 +175,5 @@ def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str
     wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"
-        raise InputError(
-            "solver.sampling",
-            f"be at least {wanted:g} Hz for the tribometer, its rate and twice its bandwidths",
-            shown,
-            "give four times its rate if you can",
-        )
+        rule = f"be at least {wanted:g} Hz for the tribometer, its rate and twice its bandwidths"
+        raise InputError("solver.sampling", rule, shown, "give four times its rate if you can")

@@ -73,12 +73,8 @@ def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
                     file.variables[name][begin[head] : end[head]] = _writable(variable.values)
     except OSError as error:
         why = error.strerror or "it is damaged"
-        raise InputError(
-            "out",
-            "be a file that can be written",
-            f"'{path}' ({why})",
-            "choose a folder that exists, is writable and has room",
-        ) from None
+        got, advice = f"'{path}' ({why})", "choose a folder that exists, is writable and has room"
+        raise InputError("out", "be a file that can be written", got, advice) from None
 
 
 def describe(path: Path, attributes: Mapping[str, Any]) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.experiment.recipes import SlideHoldSlide, VelocitySteps
 from asperity.loads import (
     Follow,
@@ -76,41 +76,30 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
     names = [name.strip().lower() for name in channels.split(" and ")]
     for name in names:
         if name not in _CHANNELS:
-            raise InputError(
-                "follow", "name what is followed", f"'{name}'", closest(name, _CHANNELS)
-            )
+            rule = "name what is followed"
+            raise InputError("follow", rule, f"'{name}'", closest(name, _CHANNELS))
     path = Path(file.strip("\"'"))
     trace = read(path if path.is_absolute() else folder / path)
     for finding in trace.findings:
-        if finding.name in _UNUSABLE:
-            raise InputError(
-                "follow",
-                f"take a recording without '{finding.name}'",
-                f"'{path.name}': {finding.sentence} Cut it to a part without this defect",
-            )
+        rule = f"take a recording without '{finding.name}'"
+        got = f"'{path.name}': {finding.sentence} Cut it to a part without this defect"
+        require(finding.name not in _UNUSABLE, "follow", rule, got)
     values: dict[str, np.ndarray] = {}
     for name in names:
         role, kind = _CHANNELS[name]
         channel = trace.channel(role)
-        if channel.kind != kind:
-            raise InputError(
-                "follow",
-                f"take the {name} from a channel of its unit",
-                f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'",
-                "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'",
-            )
+        rule = f"take the {name} from a channel of its unit"
+        got = f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'"
+        advice = "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'"
+        require(channel.kind == kind, "follow", rule, got, advice)
         values[name] = channel.values
     finite = np.isfinite(trace.time)
     for column in values.values():
         finite &= np.isfinite(column)
     if not finite.all():
         row = int(np.argmin(finite))
-        raise InputError(
-            "follow",
-            "have a number in every row",
-            f"none in row {row} of '{path.name}'",
-            "cut or fill the recording first",
-        )
+        rule, got = "have a number in every row", f"none in row {row} of '{path.name}'"
+        raise InputError("follow", rule, got, "cut or fill the recording first")
     return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))
 
 
@@ -298,12 +287,8 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
         try:
             _, level = one.step.lay_out(level, one.place)
             if isinstance(one.step, StepLoad) and not level.load > 0:
-                raise InputError(
-                    f"{one.place}.load",
-                    "be positive",
-                    f"{level.load:g} N",
-                    "give a load above zero, without which there is no contact",
-                )
+                advice = "give a load above zero, without which there is no contact"
+                raise InputError(f"{one.place}.load", "be positive", f"{level.load:g} N", advice)
         except InputError as error:
             if one.place not in reported:
                 reported.add(one.place)
@@ -334,13 +319,8 @@ def _one(step: Any, place: str, folder: Path, mistakes: list[InputError]) -> lis
     else:
         times, inner = step.repeat, step.steps
     block = _planned(inner, f"{place}.", folder, mistakes)
-    if times * len(block) > MOST:
-        raise InputError(
-            place,
-            f"come to at most {MOST} steps",
-            f"{shown(times)} times {len(block)}",
-            "repeat it less often",
-        )
+    rule, got = f"come to at most {MOST} steps", f"{shown(times)} times {len(block)}"
+    require(not times * len(block) > MOST, place, rule, got, "repeat it less often")
     return block * times
 
 
@@ -348,12 +328,8 @@ def _repetition(line: str, place: str) -> tuple[int, list[str]]:
     match = REPEAT.fullmatch(line)
     inner = [part.strip() for part in match["steps"].split(";")] if match else []
     if match is None or not match["times"].isdecimal() or _count(match["times"]) < 1:
-        raise InputError(
-            place,
-            "say how often what is repeated",
-            f"'{line}'",
-            f"write it like '{REPEAT_EXAMPLE}'",
-        )
+        rule = "say how often what is repeated"
+        raise InputError(place, rule, f"'{line}'", f"write it like '{REPEAT_EXAMPLE}'")
     if any(part.lower().startswith("repeat") for part in inner):
         raise InputError(
             place,

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, StrictBool, StrictInt, model_validator
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.questions.fit import Priors
 from asperity.questions.record import Given, Names, Question, Record, quantity
 
@@ -141,54 +141,31 @@ class Design(Question):
     @model_validator(mode="after")
     def _one_aim(self) -> Design:
         if bool(self.measure) == (self.rival is not None):
-            raise InputError(
-                "plan",
-                "have one aim, measure or rival",
-                "both" if self.measure else "none",
-                "name parameters to measure, or a rival law",
-            )
+            rule, got = "have one aim, measure or rival", "both" if self.measure else "none"
+            raise InputError("plan", rule, got, "name parameters to measure, or a rival law")
         if self.rival_free is not None and self.rival is None:
             raise InputError("plan.rival_free", "go with a rival", "no rival", "leave it out")
         if self.draws and self.rival is not None:
-            raise InputError(
-                "plan.draws",
-                "be 0 with a rival",
-                self.draws,
-                "laws are separated at one set of values",
-            )
+            advice = "laws are separated at one set of values"
+            raise InputError("plan.draws", "be 0 with a rival", self.draws, advice)
         missing = [n for n in ("V", "epsilon", "frequency") if n not in self.ranges]
-        if missing:
-            raise InputError(
-                "plan.ranges",
-                "have V, epsilon and frequency",
-                f"none for {', '.join(missing)}",
-                "give a value, a list, or from and to",
-            )
+        rule, got = "have V, epsilon and frequency", f"none for {', '.join(missing)}"
+        require(not missing, "plan.ranges", rule, got, "give a value, a list, or from and to")
         for n in (1, 2):
-            if f"phase{n}" in self.noise and f"mu{n}" not in self.noise:
-                raise InputError(
-                    "plan.noise", f"have mu{n} where it has phase{n}", "none", "add it"
-                )
+            holds = f"phase{n}" not in self.noise or f"mu{n}" in self.noise
+            require(holds, "plan.noise", f"have mu{n} where it has phase{n}", "none", "add it")
         return self
 
     @model_validator(mode="after")
     def _one_budget(self) -> Design:
         if (self.points is None) == (self.time is None):
-            raise InputError(
-                "plan",
-                "have points or time",
-                "none" if self.points is None else "both",
-                "give a number of readings, or the time available",
-            )
+            rule, got = "have points or time", "none" if self.points is None else "both"
+            raise InputError("plan", rule, got, "give a number of readings, or the time available")
         costs = {n: getattr(self, n) for n in ("settling_slip", "integration")}
         given = [n for n, cost in costs.items() if cost is not None]
         if self.points is not None and given:
             raise InputError(f"plan.{given[0]}", "go with time", "points", "leave it out")
         if self.time is not None and not any(costs.values()):
-            raise InputError(
-                "plan",
-                "say what a reading takes",
-                "no settling_slip and no integration",
-                "give one or both",
-            )
+            got = "no settling_slip and no integration"
+            raise InputError("plan", "say what a reading takes", got, "give one or both")
         return self

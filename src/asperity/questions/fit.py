@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WrapValidator, model_validator
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.questions.record import (
     Given,
     Names,
@@ -75,9 +75,8 @@ class NormalPrior(Record):
             return value
         match = _PLUS_MINUS.match(value)
         if match is None:
-            raise InputError(
-                "", "be VALUE+-DEVIATION UNIT", f"'{value}'", "write it like 0.2+-0.01 N/um"
-            )
+            rule = "be VALUE+-DEVIATION UNIT"
+            raise InputError("", rule, f"'{value}'", "write it like 0.2+-0.01 N/um")
         mean, std, unit = match.groups()
         return {"mean": f"{mean} {unit}".strip(), "std": f"{std} {unit}".strip()}
 
@@ -91,12 +90,8 @@ def _priors(value: Any) -> Any:
         return value or {}
     texts = (value,) if isinstance(value, str) else value
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
-        raise InputError(
-            "",
-            "be materials or priors by name",
-            shown(value),
-            "write it like {K = '0.2+-0.01 N/um'}",
-        )
+        rule = "be materials or priors by name"
+        raise InputError("", rule, shown(value), "write it like {K = '0.2+-0.01 N/um'}")
     parts = [text.partition("=") for text in texts]
     return {name.strip(): prior.strip() if equals else None for name, equals, prior in parts}
 
@@ -182,10 +177,8 @@ class _OfData(Question, FitOptions):
 
     @model_validator(mode="after")
     def _some_data(self) -> _OfData:
-        if not self.data:
-            raise InputError(
-                "data", "hold readings or a recording", "none", "give a table or a recording"
-            )
+        rule = "hold readings or a recording"
+        require(self.data, "data", rule, "none", "give a table or a recording")
         return self
 
 
@@ -213,12 +206,10 @@ class Fit(_OfData):
     def _one_recording(self) -> Fit:
         if self.windows is not None and (self.data[0].window is not None or len(self.data) > 1):
             several = len(self.data) > 1
-            raise InputError(
-                "windows",
-                "go with one recording" if several else "stand alone",
-                f"{len(self.data)} files" if several else "a window too",
-                "give one recording" if several else "leave the window out",
-            )
+            rule = "go with one recording" if several else "stand alone"
+            got = f"{len(self.data)} files" if several else "a window too"
+            advice = "give one recording" if several else "leave the window out"
+            raise InputError("windows", rule, got, advice)
         return self
 
 

@@ -22,7 +22,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from asperity.errors import InputError, MistakesError, closest
+from asperity.errors import InputError, MistakesError, closest, require
 from asperity.parameters.arguments import number
 from asperity.parameters.arguments import shown as shown_value
 from asperity.parameters.toml_file import toml_content
@@ -213,8 +213,7 @@ def _span(value: Any) -> tuple[float, float]:
     """Both ends of a span; one that is left open in a text is infinite."""
     if isinstance(value, str):
         start, colon, end = (part.strip() for part in value.partition(":"))
-        if not colon:
-            raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
+        require(colon, "", "be START:END", f"'{value}'", "write it like 10:60")
         value = (start or -np.inf, end or np.inf)
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
@@ -309,9 +308,9 @@ def _mistakes(
         (limit,) = reported["ctx"].values()
         rule = f"be {limits[reported['type']]} {limit:g}"
         return (InputError(field, rule, value, "correct the value"),)
-    said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    text = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
-        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said
+        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), text
     )
     return (InputError(field, f"be {rule}", value, "correct the value"),)
 

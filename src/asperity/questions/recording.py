@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, require
 from asperity.questions.record import Question, Seconds, Span, quantity
 
 Column = str | int
@@ -78,8 +78,8 @@ def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
 def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     """Holds in their order, each with a begin and an end."""
     for start, end in spans:
-        if not (math.isfinite(start) and math.isfinite(end)):
-            raise InputError("", "have a start and an end", f"{start:g} to {end:g} s", "write both")
+        rule, got = "have a start and an end", f"{start:g} to {end:g} s"
+        require(math.isfinite(start) and math.isfinite(end), "", rule, got, "write both")
     return tuple(sorted(spans))
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
 from asperity.parameters import Parameter, canonical_name, obeying, suggestion
 from asperity.parameters.arguments import shown
@@ -145,13 +145,10 @@ def axis_record(
             _name(column, known): _spread(column, spread, known)
             for column, spread in (table.over or {}).items()
         }
-        if not spreads:
-            raise InputError("over must name what is drawn, got nothing; add over.K = { ... }")
-        if table.draw == "sobol" and (table.count or 0) > 2**SOBOL_BITS:
-            raise InputError(
-                f"count must be at most 2^{SOBOL_BITS} of a Sobol sequence, got {table.count:,}; "
-                "draw 'halton' or 'random'"
-            )
+        require(spreads, "over", "name what is drawn", "nothing", "add over.K = { ... }")
+        holds = table.draw != "sobol" or not (table.count or 0) > 2**SOBOL_BITS
+        rule = f"be at most 2^{SOBOL_BITS} of a Sobol sequence"
+        require(holds, "count", rule, f"{table.count:,}", "draw 'halton' or 'random'")
         return name, {
             "draw": table.draw,
             "seed": plan.seed,
@@ -184,11 +181,8 @@ def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
 
 def _check_length(length: int) -> None:
     """Refuse an axis without rows, or with more than `MOST_LISTED`."""
-    if not 1 <= length <= MOST_LISTED:
-        raise InputError(
-            f"axis must have from 1 to {MOST_LISTED:,} rows, got {length:,}; draw them, or split "
-            "the axis"
-        )
+    rule = f"have from 1 to {MOST_LISTED:,} rows"
+    require(1 <= length <= MOST_LISTED, "axis", rule, f"{length:,}", "draw them, or split the axis")
 
 
 def _name(name: str, known: Mapping[str, Parameter]) -> str:
@@ -231,8 +225,7 @@ def law_name(law: Any, folder: Path) -> str:
 def checked_value(parameter: Parameter, value: Any) -> float:
     """One number of a plan in SI."""
     number = parameter.check(value, parameter.name)
-    if np.ndim(number):
-        raise InputError(f"{parameter.name} must be one number, got {shown(value)}")
+    require(not np.ndim(number), parameter.name, "be one number", shown(value))
     return float(number)
 
 
@@ -249,21 +242,16 @@ def _ends(
     known : mapping of str to Parameter
     """
     column, fields = _name(name, known), {"from", "to", *others}
-    if column in TEXTS or not fields <= set(table) <= {*fields, "spacing"}:
-        raise InputError(
-            f"{name} must have {', '.join(sorted(fields))}, got "
-            f"{', '.join(sorted(table)) or 'nothing'}; write it like "
-            "{ from = 0.01, to = 0.5, count = 20 }, or draw it with mean and std"
-        )
+    holds = column not in TEXTS and fields <= set(table) <= {*fields, "spacing"}
+    rule = f"have {', '.join(sorted(fields))}"
+    advice = "write it like { from = 0.01, to = 0.5, count = 20 }, or draw it with mean and std"
+    require(holds, name, rule, ", ".join(sorted(table)) or "nothing", advice)
     low, high = (checked_value(known[column], table[end]) for end in ("from", "to"))
     spacing = table.get("spacing") or "linear"
-    if spacing not in ("linear", "log"):
-        raise InputError(f"{name}.spacing must be linear or log, got {shown(spacing)}; choose one")
-    if spacing == "log" and not low * high > 0:
-        raise InputError(
-            f"{name} must have ends above zero to be logarithmic, got {low:g} and {high:g}; "
-            "change them or the spacing"
-        )
+    rule = "be linear or log"
+    require(spacing in ("linear", "log"), f"{name}.spacing", rule, shown(spacing), "choose one")
+    rule, got = "have ends above zero to be logarithmic", f"{low:g} and {high:g}"
+    require(spacing != "log" or low * high > 0, name, rule, got, "change them or the spacing")
     return low, high, spacing
 
 
@@ -272,7 +260,7 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     low, high, spacing = _ends(name, table, known, "count")
     count = table["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LISTED:
-        raise InputError(f"count must be from 1 to {MOST_LISTED:,}, got {shown(count)}")
+        raise InputError("count", f"be from 1 to {MOST_LISTED:,}", shown(count))
     u = np.linspace(0.0, 1.0, count)
     values = low * (high / low) ** u if spacing == "log" else low + (high - low) * u
     # Rounding to 15 digits: a longer grid of the same step then has bit for bit the same values,
@@ -313,6 +301,5 @@ def _cases(
             point = dict(zip(lists, row, strict=True))
             for name in names:
                 columns[name].append(point.get(name, "" if name in TEXTS else None))
-    if not columns:
-        raise InputError("cases must have at least one case, got none; write [{ law = '...' }]")
+    require(columns, "cases", "have at least one case", "none", "write [{ law = '...' }]")
     return columns

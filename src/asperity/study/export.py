@@ -54,9 +54,8 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     target = output_file(out, example="results.nc")
     write = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}.get(target.suffix.lower())
     if write is None:
-        raise InputError(
-            f"out must end in {', '.join(_FORMATS)}, got '{target.name}'; write it like results.nc"
-        )
+        rule = f"end in {', '.join(_FORMATS)}"
+        raise InputError("out", rule, f"'{target.name}'", "write it like results.nc")
     require_disk(
         opened.grid.points * 8.0 * (len(opened.record["outputs"]) + 2),
         target.parent, "out", f"{opened.grid.points:,} points", "choose another disk",
@@ -113,10 +112,9 @@ def _parquet(store: SweepStore, file: Path) -> int:
         import pyarrow  # type: ignore[import-untyped]
         from pyarrow import parquet
     except ImportError:
-        raise InputError(
-            "out must be a format that is installed, got Parquet without pyarrow; install it with "
-            "pip install 'asperity[parquet]', or export to .csv or .nc"
-        ) from None
+        rule = "be a format that is installed"
+        advice = "install it with pip install 'asperity[parquet]', or export to .csv or .nc"
+        raise InputError("out", rule, "Parquet without pyarrow", advice) from None
     written = 0
     frames = _frames(store)
     schema = pyarrow.schema(

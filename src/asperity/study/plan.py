@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import model_validator
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
 from asperity.operating_point import known_parameters, material_of, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters
@@ -92,14 +92,12 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
     for name, table in plan.axes.items():
         try:
             written, axis = axis_record(name, table, known, plan)
-            if written in axes:
-                raise InputError(
-                    f"axis must be given once, got '{written}' under two names; leave one out"
-                )
+            got = f"'{written}' under two names"
+            require(written not in axes, "axis", "be given once", got, "leave one out")
             axes[written] = axis
         except InputError as error:
             at = error.field.name
-            place = f"axes.{name}" if at == name else f"axes.{name}.{at}"
+            place = f"axes.{name}" if at in (name, "axis") else f"axes.{name}.{at}"
             mistakes.append(error.about(place) if error.rule else f"axes.{name}: {error}")
     if not plan.axes:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
@@ -197,24 +195,19 @@ def _numbers(
     offered = sourced_numbers(written, material, "plan", laws[0] if laws else None, "parameters")
     explicit = {canonical_name(name, known) for name in written}
     for name in sorted({*explicit, *ratios} & varied, key=str):
-        raise InputError(
-            f"parameters.{name} must be given once, got an axis too; leave one of them out"
-        )
+        rule = "be given once"
+        raise InputError(f"parameters.{name}", rule, "an axis too", "leave one of them out")
     for target, ratio in targets.items():
-        if target in explicit | varied:
-            raise InputError(
-                f"{target} must be given once, got {ratio} too, which determines it; leave one out"
-            )
+        got = f"{ratio} too, which determines it"
+        require(target not in explicit | varied, target, "be given once", got, "leave one out")
     wanted: set[str] = set(SOLVES[plan.solve].parameters())
     for law in laws:
         wanted |= set(point_parameters(get_law(law)))
     for name in targets.values():
         wanted |= set(RATIOS[name].needs)
     for name in sorted(explicit - wanted, key=str):
-        raise InputError(
-            f"parameters.{name} must belong to the laws of the plan, got {', '.join(laws)}; leave "
-            "it out"
-        )
+        rule = "belong to the laws of the plan"
+        raise InputError(f"parameters.{name}", rule, ", ".join(laws), "leave it out")
     kept = {
         n: s for n, s in offered.items() if n in wanted and n not in varied and n not in targets
     }

@@ -131,10 +131,8 @@ def _workers(
     choices = {"workers": workers, "cluster": cluster, "scheduler": address}
     chosen = [name for name, value in choices.items() if value is not None]
     if len(chosen) > 1:
-        raise InputError(
-            f"{chosen[0]} must be the only choice of where to run, got {' and '.join(chosen)}; "
-            "leave all but one out"
-        )
+        rule = "be the only choice of where to run"
+        raise InputError(f"{chosen[0]}", rule, " and ".join(chosen), "leave all but one out")
     if cluster is not None:
         return local_cluster(cluster)
     if address is not None:
@@ -185,7 +183,7 @@ def _opened(
     advice = "its axes may only become longer" if extending else (
         "change the plan back, choose another store, or add points to the end of axes with --extend"
     )  # fmt: skip
-    raise InputError(f"{path.name} must have the same plan, got {changed}; {advice}")
+    raise InputError(path.name, "have the same plan", changed, advice)
 
 
 def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
@@ -274,10 +272,9 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         why = "the disk is full" if full else (error.strerror or str(error)).lower()
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
-        raise InputError(
-            f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
-            f"{done}; make room and repeat the command, which continues from there"
-        ) from None
+        rule = "be a folder that can be written"
+        advice = "make room and repeat the command, which continues from there"
+        raise InputError("out", rule, f"'{path.name}' ({why}, {room} free){done}", advice) from None
 
 
 def _started(workers: Workers) -> dict[str, Any]:

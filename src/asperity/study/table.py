@@ -24,7 +24,7 @@ from typing import TextIO
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law, get_law, registered
 from asperity.operating_point import known_parameters
 from asperity.orbit.outcome import Outcome
@@ -147,7 +147,9 @@ def _solved(
                 mistakes[int(members[k])] = _mistake(law, point, cells)
         for k, mistake in mistakes.items():
             results[sound[k]] = mistake
-    return answers, [mine or str(told) for mine, told in zip(results, answers.result, strict=True)]
+    return answers, [
+        mistake or str(reason) for mistake, reason in zip(results, answers.result, strict=True)
+    ]
 
 
 def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, ...]]:
@@ -199,11 +201,10 @@ class TableSource:
             stream.seek(0)
             rows = _rows(stream, self.delimiter)
             self.header = next(rows, [])
-            if not any(name.strip() for name in self.header):
-                raise InputError(
-                    f"{path} must have a line of column names and rows, got an empty file; "
-                    "give one operating point a row"
-                )
+            rule, advice = "have a line of column names and rows", "give one operating point a row"
+            require(
+                any(name.strip() for name in self.header), str(path), rule, "an empty file", advice
+            )
             self.columns = _checked_header(self.header, str(path))
             laws: Counter[str] = Counter()
             #: First text, and its row, of the columns in which no row so far has a number.
@@ -217,11 +218,8 @@ class TableSource:
                     elif cell and not texts[name][0]:
                         texts[name] = cell, count
         self.rows = laws.total()
-        if not self.rows:
-            raise InputError(
-                f"{path} must have rows of data, got only column names; give one operating point "
-                "a row"
-            )
+        rule = "have rows of data"
+        require(self.rows, str(path), rule, "only column names", "give one operating point a row")
         self._require_columns(list(laws), texts)
         with path.open("rb") as file:
             self.digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -240,28 +238,21 @@ class TableSource:
 
     def _require_columns(self, laws: Sequence[str], texts: Mapping[str, tuple[str, int]]) -> None:
         """Refuse a table in which no row can be solved; `texts` of the columns without a number."""
-        if not any(laws):
-            raise InputError(
-                f"{self.path} must name the law of its rows, got no column 'law'; add it or give "
-                "--law"
-            )
+        rule = "name the law of its rows"
+        require(any(laws), str(self.path), rule, "no column 'law'", "add it or give --law")
         known = [law for name, law in registered().items() if name in laws]
         if not known:
             get_law(max(laws))
         everywhere = set.intersection(*(set(required(law)) for law in known))
         for name, (text, row) in texts.items():
-            if name in everywhere and text:
-                raise InputError(
-                    f"{self.path} must have finite numbers in column '{name}', got '{text}' in "
-                    f"row {row} and none in any other; write SI numbers without units"
-                )
+            holds, advice = name not in everywhere or not text, "write SI numbers without units"
+            got = f"'{text}' in row {row} and none in any other"
+            require(holds, str(self.path), f"have finite numbers in column '{name}'", got, advice)
         missing = everywhere - (set(self.columns) - set(texts)) - set(self.filled)
         if missing:
-            raise InputError(
-                f"{self.path} must have the columns that its laws need, got none for "
-                f"{', '.join(n for n in known_parameters() if n in missing)}; add them or name a "
-                "material that has them"
-            )
+            rule = "have the columns that its laws need"
+            got = f"none for {', '.join(n for n in known_parameters() if n in missing)}"
+            raise InputError(str(self.path), rule, got, "add them or name a material that has them")
 
 
 @contextmanager
@@ -308,21 +299,13 @@ def _checked_header(header: Sequence[str], shown: str) -> dict[str, int]:
     known = {"law", *known_parameters()}
     for name in names:
         if names.count(name) > 1:
-            raise InputError(
-                f"{shown} must have each column once, got '{name}' {names.count(name)} times; "
-                "remove or rename all but one"
-            )
-        if name in RESULT_COLUMNS:
-            raise InputError(
-                f"{shown} must not have a column named like a result, got '{name}'; "
-                "rename or remove it"
-            )
+            got = f"'{name}' {names.count(name)} times"
+            raise InputError(shown, "have each column once", got, "remove or rename all but one")
+        rule = "not have a column named like a result"
+        require(name not in RESULT_COLUMNS, shown, rule, f"'{name}'", "rename or remove it")
         meant = None if name in known else _nearest(name, known)
-        if meant:
-            raise InputError(
-                f"{shown} must have columns of known names, got '{name}'; "
-                f"did you mean '{meant}'? If not, rename the column"
-            )
+        advice = f"did you mean '{meant}'? If not, rename the column"
+        require(not meant, shown, "have columns of known names", f"'{name}'", advice)
     return {name: place for place, name in enumerate(names) if name in known}
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
@@ -76,11 +76,9 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     InputError
         If the law has no A, B or D0.
     """
-    if not {"A", "B", "D0"} <= set(law_parameters(type(slider.law))):
-        raise InputError(
-            f"law must have A, B and D0 for a critical stiffness in closed form, got "
-            f"{slider.law.name}; give the limits of the search as between=(softest, stiffest)"
-        )
+    rule, got = "have A, B and D0 for a critical stiffness in closed form", slider.law.name
+    advice = "give the limits of the search as between=(softest, stiffest)"
+    require({"A", "B", "D0"} <= set(law_parameters(type(slider.law))), "law", rule, got, advice)
     p = _numbers(slider)
     V = number(velocity, "velocity", "velocity", "positive")
     excess = p["B"] - p["A"]
@@ -129,10 +127,8 @@ def stiffness_threshold(
     try:
         eps, f = np.broadcast_arrays(eps, f)
     except ValueError:
-        raise InputError(
-            f"epsilon and frequency must have shapes that broadcast, got {np.shape(eps)} and "
-            f"{np.shape(f)}; give arrays of one shape"
-        ) from None
+        rule, got = "have shapes that broadcast", f"{np.shape(eps)} and {np.shape(f)}"
+        raise InputError("epsilon and frequency", rule, got, "give arrays of one shape") from None
     try:
         critical, _ = natural_scales(slider, velocity)
     except InputError:
@@ -263,27 +259,18 @@ def _numbers(slider: Slider) -> dict[str, float]:
     """Parameters of a slider by name, as numbers."""
     values = slider_values(slider)
     arrays = [name for name, value in values.items() if np.size(value) != 1]
-    if arrays:
-        raise InputError(
-            f"slider must have numbers for a threshold, got an array for {', '.join(arrays)}; "
-            "call it once for each"
-        )
+    got = f"an array for {', '.join(arrays)}"
+    require(not arrays, "slider", "have numbers for a threshold", got, "call it once for each")
     return {name: float(np.ravel(value)[0]) for name, value in values.items()}
 
 
 def _ends(critical: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
     """Limits of the search (N/m), in ascending order."""
     if between is None:
-        if critical <= 0:
-            raise InputError(
-                f"between must be given for a law that strengthens with velocity, got none and "
-                f"K_c = {critical:g} N/m; give two stiffnesses"
-            )
+        rule, advice = "be given for a law that strengthens with velocity", "give two stiffnesses"
+        require(not critical <= 0, "between", rule, f"none and K_c = {critical:g} N/m", advice)
         return _BETWEEN[0] * critical, _BETWEEN[1] * critical
     low, high = (number(end, "between", "stiffness", "positive") for end in between)
-    if not low < high:
-        raise InputError(
-            f"between must go from a softer to a stiffer spring, got {low:g} to {high:g} N/m; "
-            "swap them"
-        )
+    rule = "go from a softer to a stiffer spring"
+    require(low < high, "between", rule, f"{low:g} to {high:g} N/m", "swap them")
     return low, high

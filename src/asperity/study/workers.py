@@ -190,11 +190,9 @@ def local_cluster(count: int) -> Iterator[Workers]:
             workers = DaskWorkers(stack.enter_context(client), about)
         # Dask raises one of these when a starting process ends or does not answer.
         except (RuntimeError, OSError, TimeoutError, CancelledError) as error:
-            raise InputError(
-                f"--cluster must be workers that this machine can start, got {count}, of which "
-                f"some ended while they started ({printable(str(error), 200)}); repeat the "
-                "command, or take fewer"
-            ) from None
+            rule = "be workers that this machine can start"
+            got = f"{count}, of which some ended while they started ({printable(str(error), 200)})"
+            raise InputError("--cluster", rule, got, "repeat the command, or take fewer") from None
         yield stack.enter_context(_closing(workers))
 
 
@@ -211,18 +209,14 @@ def scheduler(address: str) -> Iterator[Workers]:
     try:
         client = distributed.Client(address, timeout="10s")
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"--scheduler must be the address of a Dask scheduler, got '{address}' ({error}); "
-            "write it like tcp://host:8786"
-        ) from None
+        rule, got = "be the address of a Dask scheduler", f"'{address}' ({error})"
+        raise InputError("--scheduler", rule, got, "write it like tcp://host:8786") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=60)
         except TimeoutError:
-            raise InputError(
-                f"--scheduler must have workers, got none at '{address}' within a minute; start "
-                "some with dask worker"
-            ) from None
+            rule, got = "have workers", f"none at '{address}' within a minute"
+            raise InputError("--scheduler", rule, got, "start some with dask worker") from None
         with _closing(DaskWorkers(client, f"Dask scheduler at {address}")) as workers:
             yield workers
 

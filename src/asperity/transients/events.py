@@ -67,7 +67,8 @@ class Termination:
         return _SENTENCES[self.kind].format(time=self.time, detail=self.detail)
 
 
-_ROOT_STEPS = 60
+#: Of the time (s), relative, and of the distance at a root.
+_ROOT = {"xatol": 0.0, "xrtol": 4e-16, "fatol": 1e-13, "frtol": 0.0}
 
 #: v/V below which a slider whose velocity is about to vanish counts as at rest.
 _REST = 1e-9
@@ -239,40 +240,19 @@ class EventDetector:
             crossings.append((self._start + float(times[0]), bool(values[0] > 0)))
         change = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
         if change.size:
-            ends = times[change], times[change + 1]
-            roots = self._roots(distance, *ends, values[change], values[change + 1], dense_output)
+            # Imported here because the module loads slowly.
+            from scipy.optimize.elementwise import find_root
+
+            def between(t: np.ndarray) -> np.ndarray:
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    return distance(motion_samples(self._system, t, dense_output.evaluate(t)))
+
+            roots = find_root(between, (times[change], times[change + 1]), tolerances=_ROOT).x
             crossings += [
                 (self._start + float(t), bool(values[i] < 0))
                 for t, i in zip(roots, change, strict=True)
             ]
         return crossings
-
-    def _roots(
-        self,
-        distance: Distance,
-        left: np.ndarray,
-        right: np.ndarray,
-        f_left: np.ndarray,
-        f_right: np.ndarray,
-        dense_output: DenseOutput,
-    ) -> np.ndarray:
-        """Roots between `left` and `right`, all at once, by the Illinois method."""
-        left, right, f_left, f_right = (a.copy() for a in (left, right, f_left, f_right))
-        for _ in range(_ROOT_STEPS):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                middle = right - f_right * (right - left) / (f_right - f_left)
-                middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
-                value = distance(
-                    motion_samples(self._system, middle, dense_output.evaluate(middle))
-                )
-            beyond = np.sign(value) * np.sign(f_right) < 0
-            left = np.where(beyond, right, left)
-            f_left = np.where(beyond, f_right, 0.5 * f_left)
-            converged = np.abs(middle - right) <= 4e-16 * np.abs(middle)
-            right, f_right = middle, value
-            if np.all(converged | (np.abs(value) < 1e-13)):
-                break
-        return right
 
 
 class _PeriodicSteadiness:

@@ -232,11 +232,9 @@ class Sensor:
         """
         for name in ("bandwidth", "resonance"):
             if rate < 2 * getattr(self, name):
-                raise InputError(
-                    f"{type(self).__name__}.{name} must be at most half the sampling rate of the "
-                    f"motion, {rate / 2:g} Hz, got {getattr(self, name):g} Hz; sample the motion "
-                    "faster"
-                )
+                rule = f"be at most half the sampling rate of the motion, {rate / 2:g} Hz"
+                got, advice = f"{getattr(self, name):g} Hz", "sample the motion faster"
+                raise InputError(f"{type(self).__name__}.{name}", rule, got, advice)
         seen = self._responded(values, rate)
         seen = seen + self._noise(values.size, rate, random)
         seen = seen + self.offset + self.drift * np.arange(values.size) / rate

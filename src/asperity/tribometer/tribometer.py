@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.parameters.arguments import number
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
@@ -84,11 +84,8 @@ class Recorder:
         if channel not in self.ranges or not self.bits:
             return None
         low, high = (to_si(v, kind, f"Recorder.ranges['{channel}']") for v in self.ranges[channel])
-        if not low < high:
-            raise InputError(
-                f"Recorder.ranges['{channel}'] must rise, got {low:g} to {high:g}; "
-                "give the lowest value first"
-            )
+        advice = "give the lowest value first"
+        require(low < high, f"Recorder.ranges['{channel}']", "rise", f"{low:g} to {high:g}", advice)
         return low, high, (high - low) / (2**self.bits - 1)
 
 
@@ -142,30 +139,22 @@ class Tribometer:
         grid = np.asarray(time, float)
         rate = even_rate(grid) if grid.ndim == 1 and grid.size > 3 else None
         if rate is None:
-            raise InputError(
-                f"Tribometer.time must be evenly spaced, got {grid.size} uneven times; "
-                "sample the motion at a rate, like sampling='20 kHz'"
-            )
-        if rate < self.recorder.rate:
-            raise InputError(
-                f"Tribometer.time must be at least as fine as the recorder's clock, "
-                f"{self.recorder.rate:g} Hz, got {rate:g} Hz; sample the motion faster"
-            )
-        if set(signals) != set(self.sensors):
-            raise InputError(
-                f"Tribometer.signals must be those of the sensors, {', '.join(self.sensors)}, got "
-                f"{', '.join(signals) or 'none'}; name each as its sensor is named"
-            )
+            rule, advice = "be evenly spaced", "sample the motion at a rate, like sampling='20 kHz'"
+            raise InputError("Tribometer.time", rule, f"{grid.size} uneven times", advice)
+        rule = f"be at least as fine as the recorder's clock, {self.recorder.rate:g} Hz"
+        advice = "sample the motion faster"
+        require(not rate < self.recorder.rate, "Tribometer.time", rule, f"{rate:g} Hz", advice)
+        rule = f"be those of the sensors, {', '.join(self.sensors)}"
+        got, advice = ", ".join(signals) or "none", "name each as its sensor is named"
+        require(set(signals) == set(self.sensors), "Tribometer.signals", rule, got, advice)
         random = np.random.default_rng(seed)
         stamps, instants = self._clock(grid, random)
         channels = {}
         for name, sensor in self.sensors.items():
             values = np.asarray(signals[name], float)
-            if values.shape != grid.shape:
-                raise InputError(
-                    f"Tribometer.signals['{name}'] must be as long as time, got {values.shape} "
-                    f"for {grid.shape}; give one value for each time"
-                )
+            rule, got = "be as long as time", f"{values.shape} for {grid.shape}"
+            advice = "give one value for each time"
+            require(values.shape == grid.shape, f"Tribometer.signals['{name}']", rule, got, advice)
             channels[name] = self._channel(name, sensor, values, rate, instants, random)
         origin = {"format": "virtual tribometer", **(provenance or {})}
         trace = Trace(stamps, channels, provenance=origin)

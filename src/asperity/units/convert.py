@@ -167,12 +167,8 @@ def _stacked(rows: list[Any], name: str) -> Any:
     try:
         return np.array(rows, dtype=float)
     except ValueError:
-        raise InputError(
-            name,
-            "be a rectangular array",
-            "rows of different lengths",
-            "give every row the same length",
-        ) from None
+        rule, got = "be a rectangular array", "rows of different lengths"
+        raise InputError(name, rule, got, "give every row the same length") from None
 
 
 def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
@@ -199,17 +195,12 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     spec = kind_of(kind)
     match = _NUMBER.fullmatch(text)
     if match is None:
-        raise InputError(
-            name,
-            f"be a finite number{' with a unit' if spec.si else ''}",
-            f"'{shortened(text)}'",
-            f"write it like '{spec.example}'",
-        )
+        rule = f"be a finite number{' with a unit' if spec.si else ''}"
+        raise InputError(name, rule, f"'{shortened(text)}'", f"write it like '{spec.example}'")
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
-        raise InputError(
-            name, "carry a unit", f"'{shortened(text)}'", f"write it like '{spec.example}'"
-        )
+        rule = "carry a unit"
+        raise InputError(name, rule, f"'{shortened(text)}'", f"write it like '{spec.example}'")
     factor = unit_factor(unit, kind, name, shortened(text))
     power = _power_of_ten(match[2] or "0")
     # `Decimal` has a largest exponent; beyond it only zero is a number.
@@ -265,7 +256,6 @@ def to_radians(value: Any, name: str) -> Any:
     except (KeyError, ValueError):
         angle = math.nan
     if not math.isfinite(angle):
-        raise InputError(
-            name, "be an angle in rad or deg", f"'{shortened(value)}'", "write it like '5 deg'"
-        )
+        rule = "be an angle in rad or deg"
+        raise InputError(name, rule, f"'{shortened(value)}'", "write it like '5 deg'")
     return angle

@@ -49,6 +49,5 @@ def kind_of(kind: str) -> Kind:
     try:
         return KINDS[kind]
     except KeyError:
-        raise InputError(
-            "units.kind", "be a kind of quantity", f"'{kind}'", closest(kind, KINDS)
-        ) from None
+        rule = "be a kind of quantity"
+        raise InputError("units.kind", rule, f"'{kind}'", closest(kind, KINDS)) from None

@@ -12,7 +12,7 @@ from decimal import Context, Decimal
 from functools import lru_cache
 from typing import Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.units.kinds import KINDS
 
 #: More digits than any double needs, so that only the final rounding to a double is inexact.
@@ -157,8 +157,7 @@ def base_units(unit: str) -> tuple[float, Dimension]:
     # pint's parser accepts some texts that are no units.
     except (_UnitError, ArithmeticError, AttributeError, TypeError, ValueError):
         raise InputError("unit", "be a unit", f"'{unit}'", "write it like 'N/V'") from None
-    if shifted:
-        raise InputError("unit", "have no offset", f"'{unit}'", "convert it to kelvin first")
+    require(not shifted, "unit", "have no offset", f"'{unit}'", "convert it to kelvin first")
     return float(factor), dimension_of({str(k): float(v) for k, v in base._units.items()})
 
 

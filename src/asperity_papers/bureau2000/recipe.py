@@ -181,7 +181,7 @@ def paper_procedure(
 def _limited(number: RecipeNumber) -> RecipeNumber:
     """With the upper end of the 95 % interval of a number that is not negative."""
     limit = bounded_interval(number.value, number.se, _LEVEL, 0.0, math.inf)[1]
-    return replace(number, upper_limit=limit)
+    return replace(number, upper_limit_95=limit)
 
 
 def _rows(
@@ -199,15 +199,11 @@ def _rows(
 
     steady = part("mean_friction", ~modulated)
     if steady is None:
-        raise InputError(
-            f"{readings.name} must have rows with epsilon = 0 and mean_friction, got none; measure "
-            "steady sliding"
-        )
+        rule = "have rows with epsilon = 0 and mean_friction"
+        raise InputError(f"{readings.name}", rule, "none", "measure steady sliding")
     if np.unique(steady.points["V"]).size < 2:
-        raise InputError(
-            f"{readings.name} must have rows with epsilon = 0 at two velocities or more, got one; "
-            "the slope with ln V needs them"
-        )
+        rule = "have rows with epsilon = 0 at two velocities or more"
+        raise InputError(f"{readings.name}", rule, "one", "the slope with ln V needs them")
     return steady, part("delta_mu", modulated), part("mu1", modulated)
 
 
@@ -259,10 +255,9 @@ def _steady_and_threshold(
     except (ArithmeticError, ValueError, np.linalg.LinAlgError):
         finite = False
     if not finite:
-        raise InputError(
-            f"{thresholds.name} must have bifurcations from which A, B and D0 follow, got numbers "
-            "with which that cannot be computed; correct the cells, which are in SI"
-        )
+        rule = "have bifurcations from which A, B and D0 follow"
+        got = "numbers with which that cannot be computed"
+        raise InputError(f"{thresholds.name}", rule, got, "correct the cells, which are in SI")
     dof = solved.fun.size - 4
     if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
         warnings.append(
@@ -280,10 +275,8 @@ def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thres
         (log_v - centre) ** 2, weights=weight
     )
     if slope >= 0:
-        raise InputError(
-            f"{steady.name} must have friction that weakens with velocity, got a slope of "
-            f"{slope:.3g} with ln V; without weakening there is no bifurcation"
-        )
+        rule, got = "have friction that weakens with velocity", f"a slope of {slope:.3g} with ln V"
+        raise InputError(f"{steady.name}", rule, got, "without weakening there is no bifurcation")
     k = float(np.average(thresholds.K_over_W0, weights=thresholds.K_over_W0_err**-2))
     omega = 2 * math.pi * thresholds.frequency
     contrast = float(np.median(omega / thresholds.V)) * -slope / k
@@ -375,10 +368,9 @@ class _SingleFits:
             start["eps_ratio"] = material["transmission"].si
         result = fit(table, law, free, fixed=fixed, material=material, start=start)
         if not result.converged:
-            raise InputError(
-                f"{table.name} must have periodic responses with the numbers of the earlier steps, "
-                f"got none that fits {name}; check the thresholds and K and W0"
-            )
+            rule = "have periodic responses with the numbers of the earlier steps"
+            got = f"none that fits {name}"
+            raise InputError(f"{table.name}", rule, got, "check the thresholds and K and W0")
         self.warnings.extend(f"step {step}: {w}" for w in result.warnings)
         estimate = result.parameters[name]
 

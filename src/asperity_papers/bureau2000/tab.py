@@ -103,10 +103,9 @@ def _function(law: str) -> ResponseFunction:
 def _check_share(curve: FigureCurve) -> None:
     largest = float(curve.share * np.max(curve.applied))
     if not largest < 1:
-        raise InputError(
-            f"the amplitude on the contacts must be below 1, got {largest:.3g} for '{curve.name}'; "
-            "the slider's mass and the contacts resonate: change M, lambda_z or the frequency"
-        )
+        got = f"{largest:.3g} for '{curve.name}'"
+        advice = "the slider's mass and the contacts resonate: change M, lambda_z or the frequency"
+        raise InputError("the amplitude on the contacts", "be below 1", got, advice)
 
 
 # --- Lines with the mass of the slider, which take seconds ----------------------------------------
@@ -204,7 +203,7 @@ def _element_python(changes: Mapping[str, float]) -> str:
 
 def _figure(name: str) -> TabFigure:
     observables = WORDS.figures[name].observables
-    x, rows = observables[0].x, [o.column for o in observables]
+    x, rows = next(iter(observables.values()))[1].x, list(observables)
     return TabFigure(
         x=x,
         rows=rows,

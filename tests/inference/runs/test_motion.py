@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from asperity.inference.runs.drive import Drive
-from asperity.inference.runs.motion import RunMotion
+from asperity.inference.runs.motion import recorded_friction, run_equations
 from asperity.inference.runs.reading import reading_at
 from asperity.laws import get_law
 from references.populations import population
@@ -17,6 +17,7 @@ PULL = np.array([1.0, 10 / 3, 0.0, 10 / 3])
 LOAD_SLOPE = np.array([0.0, 0.0, 0.0, 0.2 / 25])
 TIMES = np.linspace(0.0, 70.0, 281)
 FREE = ("A", "B", "D0", "K", "alpha", "shift_1", "start_force", "start_state_0")
+MOTION = run_equations(get_law("linker-dieterich"), 3e-6)
 AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_state_0": -0.3}
 
 
@@ -52,13 +53,12 @@ def by_scipy(values, TIMES=TIMES):
 @pytest.fixture(scope="module")
 def computed():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
-    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
-    return motion(AT, FREE, drive, reading_at(TIMES))
+    return recorded_friction(MOTION, AT, FREE, drive, reading_at(TIMES))
 
 
 def test_friction_is_that_of_an_independent_integration(computed):
     # Local errors of 1e-7 relative, of steps that each move the states by some 0.1.
-    np.testing.assert_allclose(computed.friction, by_scipy(AT), atol=2e-7)
+    np.testing.assert_allclose(computed[0], by_scipy(AT), atol=2e-7)
 
 
 @pytest.mark.parametrize("name", FREE)
@@ -66,7 +66,7 @@ def test_derivatives_are_those_of_an_independent_integration(computed, name):
     size = {"K": 4.0, "D0": 1e-8, "shift_1": 1e-2}.get(name, 1e-4)
     more, less = ({**AT, name: AT[name] + sign * size} for sign in (1, -1))
     expected = (by_scipy(more) - by_scipy(less)) / (2 * size)
-    found = computed.derivatives[:, FREE.index(name)]
+    found = computed[1][:, FREE.index(name)]
     # Differences of second order; a shift moves the step across samples.
     near = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
     scale = np.abs(expected).max()
@@ -75,29 +75,41 @@ def test_derivatives_are_those_of_an_independent_integration(computed, name):
 
 def test_means_over_blocks_are_those_of_an_independent_integration(computed):
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
-    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
     # Blocks of 0.6 s, each change of the drive within one, and a gap.
     edges = np.linspace(0.0, 69.0, 116)
     blocks = np.stack([edges[:-1], edges[1:]], axis=1)[np.arange(115) != 60]
-    means = motion(AT, FREE, drive, reading_at(blocks))
+    means, slopes = recorded_friction(MOTION, AT, FREE, drive, reading_at(blocks))
     times = (blocks[:, :1] + 0.6 * (np.arange(50) + 0.5) / 50).ravel()
     expected = by_scipy(AT, times).reshape(-1, 50).mean(axis=1)
     # The midpoint rule over 12 ms, where friction turns by 0.04 a second; steps of it are 0.02.
-    np.testing.assert_allclose(means.friction, expected, atol=5e-6)
+    np.testing.assert_allclose(means, expected, atol=5e-6)
     # About the step and the beginning of the hold.
     some = slice(31, 51)
     at = times.reshape(-1, 50)[some].ravel()
-    points = motion(AT, FREE, drive, reading_at(at)).derivatives.reshape(20, 50, -1).mean(axis=1)
-    for name, mean, point in zip(FREE, means.derivatives[some].T, points.T, strict=True):
+    points = recorded_friction(MOTION, AT, FREE, drive, reading_at(at))[1]
+    points = points.reshape(20, 50, -1).mean(axis=1)
+    for name, mean, point in zip(FREE, slopes[some].T, points.T, strict=True):
         # That to the time of the step jumps within a fiftieth of a block.
         np.testing.assert_allclose(mean, point, atol=1e-2 * np.abs(point).max(), err_msg=name)
 
 
 def test_a_motion_that_runs_away_is_no_motion():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4))
-    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
     # A twentieth of the critical stiffness (B - A)/D0.
-    assert motion({**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
+    assert recorded_friction(MOTION, {**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
+
+
+def test_a_free_radiation_damping_counts():
+    """What it adds to steady friction is eta V/W, and the derivative is that of differences."""
+    motion = run_equations(get_law("rice-ruina"), 3e-6, radiation_damping=True)
+    drive, reading = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4)), reading_at(TIMES)
+    one, more, less = (
+        recorded_friction(motion, {**VALUES, "eta": eta}, ("eta",), drive, reading)
+        for eta in (2e3, 2.002e3, 1.998e3)
+    )
+    np.testing.assert_allclose(one[0][0], VALUES["mu0"] + 2e3 * 3e-6, rtol=1e-9)
+    slope, expected = one[1][:, 0], (more[0] - less[0]) / 4.0
+    np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", population(["regularised", "linker-dieterich", "rice-ruina"]))
@@ -116,9 +128,11 @@ def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
         edges = length * np.array([0.0, 1.0, 1.2])
         drive = Drive(edges, np.array([1.0, 3.0]), nothing, load, nothing)
         times = np.linspace(0, edges[-1], 300)
-        found = RunMotion(get_law(name), V)(values, ("A", "B", "D0", "K"), drive, reading_at(times))
+        motion = run_equations(get_law(name), V)
+        free = ("A", "B", "D0", "K")
+        _, slopes = recorded_friction(motion, values, free, drive, reading_at(times))
         steady = times < length
         slope = np.log(V / values["V0"])
-        expected = np.broadcast_to([slope, -slope, 0.0, 0.0], found.derivatives[steady].shape)
+        expected = np.broadcast_to([slope, -slope, 0.0, 0.0], slopes[steady].shape)
         scale = [A, values["B"], values["D0"], values["K"]]
-        np.testing.assert_allclose(found.derivatives[steady] * scale, expected * scale, atol=2e-6)
+        np.testing.assert_allclose(slopes[steady] * scale, expected * scale, atol=2e-6)

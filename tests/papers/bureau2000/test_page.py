@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from asperity.figures.style import save_picture, style
-from asperity.ledger import Claim, FigureNumbers, find_paper
-from asperity.ledger.page import Plate, PlateGroup, build_page
+from asperity.ledger import Claim, FigureNumbers, Section, find_paper
+from asperity.ledger.page import build_page
 from asperity_papers.bureau2000.figures import SCHEMATICS
 
 WIDTHS = (390, 800, 1400)
@@ -31,17 +31,14 @@ def claims(paper):
 def address(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     paper = find_paper("bureau2000")
+    shown = [paper.words.figure(FigureNumbers(n, pd.DataFrame()), {}) for n in SCHEMATICS]
+    (folder / "figures").mkdir()
     with style():
-        plates = [
-            Plate(
-                paper.words.figure(FigureNumbers(name, pd.DataFrame()), {}),
-                save_picture(draw(), folder / name)[0], (f"{name}.png",),
-            )
-            for name, draw in SCHEMATICS.items()
-        ]  # fmt: skip
-    group = PlateGroup("figures", "Figures", "", plates, "")
+        for name, draw in SCHEMATICS.items():
+            save_picture(draw(), folder / "figures" / name)
     found = claims(paper)
-    text = build_page(paper, [group], found, paper.headlines(found))
+    sections = [(Section("figures", "Figures", ()), shown)]
+    text = build_page(paper, folder, sections, found, paper.headlines(found))
     (folder / "index.html").write_text(text, encoding="utf-8")
     return (folder / "index.html").as_uri()
 
@@ -64,26 +61,35 @@ def visit(chromium, address):
     assert all(url.startswith(("file:", "data:")) for url in fetched)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_is_wider_than_the_screen(visit, width, scheme):
-    page = visit(width, color_scheme=scheme)
+def test_nothing_is_wider_than_the_screen(visit):
+    page = visit()
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true })")
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 844})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_what_is_linked_to_is_not_hidden_under_the_navigation(visit, width):
-    page = visit(width)
+def test_what_is_linked_to_is_there_and_not_hidden_under_the_navigation(visit):
+    page = visit(390)
+    assert page.eval_on_selector_all("details", "all => all.some(d => d.open)") is False
+    missing = page.eval_on_selector_all(
+        "a[href^='#']",
+        "links => links.map(a => a.hash.slice(1)).filter(n => !document.getElementById(n))",
+    )
+    assert missing == []
     targets = page.eval_on_selector_all("nav a", "links => links.map(a => a.hash)")
     assert len(targets) >= 5
     last = page.eval_on_selector_all(".claim", "all => '#' + all[all.length - 1].id")
-    for target in [*targets, last]:
-        page.evaluate(f"location.hash = '{target}'")
-        heading = f"{target} h2" if target in targets else f"{target} summary"
-        bottom = page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom")
-        top = page.evaluate(f"document.querySelector('{heading}').getBoundingClientRect().top")
-        assert top >= bottom, target
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 844})
+        for target in [*targets, last]:
+            page.evaluate(f"location.hash = '{target}'")
+            heading = f"{target} h2" if target in targets else f"{target} summary"
+            bottom = page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom")
+            top = page.evaluate(f"document.querySelector('{heading}').getBoundingClientRect().top")
+            assert top >= bottom, (width, target)
 
 
 def shown(page):
@@ -110,18 +116,10 @@ def test_tiles_show_the_claims_that_they_count(visit, width):
     assert shown(page) == everything
 
 
-def test_claims_are_folded_and_every_link_on_the_page_has_a_target(visit):
+def test_a_phone_does_not_scroll_for_ever_and_a_link_shows_a_reproduced_claim(visit, address):
+    """The head, two figures, 25 claims and the parameters."""
     page = visit(390)
-    assert page.eval_on_selector_all("details", "all => all.some(d => d.open)") is False
-    missing = page.eval_on_selector_all(
-        "a[href^='#']",
-        "links => links.map(a => a.hash.slice(1)).filter(n => !document.getElementById(n))",
-    )
-    assert missing == []
-
-
-def test_a_link_to_a_reproduced_claim_shows_it(visit, address):
-    page = visit(390)
+    assert page.evaluate("document.documentElement.scrollHeight") < 30 * 844
     name = page.eval_on_selector_all(".claim.reproduced", "all => all[0].id")
     page.goto(f"{address}#{name}")
     assert page.is_visible(f"[id='{name}'] summary")
@@ -135,9 +133,3 @@ def test_all_claims_are_printed_with_what_was_computed(visit, tmp_path):
     target = tmp_path / "page.pdf"
     page.pdf(path=target, format="A4")
     assert Path(target).read_bytes().startswith(b"%PDF")
-
-
-def test_folded_claims_do_not_make_a_phone_scroll_for_ever(visit):
-    """The head, two figures, 25 claims and the parameters; the ledger used to be 60 screens."""
-    page = visit(390)
-    assert page.evaluate("document.documentElement.scrollHeight") < 30 * 844

@@ -118,8 +118,8 @@ def test_later_steps_carry_the_errors_of_the_earlier_ones(exact, recovered):
 
 def test_the_bound_on_alpha_is_weaker_without_that_share(recovered):
     numbers = recovered.numbers
-    assert 0 < numbers["alpha"].upper_limit < 0.05
-    assert numbers["alpha, eps_ratio free"].upper_limit > 3 * numbers["alpha"].upper_limit
+    assert 0 < numbers["alpha"].upper_limit_95 < 0.05
+    assert numbers["alpha, eps_ratio free"].upper_limit_95 > 3 * numbers["alpha"].upper_limit_95
 
 
 def test_each_number_stands_beside_that_of_the_paper(recovered):

@@ -255,7 +255,7 @@ def test_the_page_needs_nothing_else(page, report):
     assert page.all("script") == page.all("link") == page.all("iframe") == []
     assert all(image["src"].startswith("data:image/png;base64,") for image in page.all("img"))
     assert len(page.all("img")) == 19
-    style_text = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
+    style_text = files("asperity.outputs").joinpath("page.css").read_text(encoding="utf-8")
     assert "url(" not in style_text
     assert "@import" not in style_text
     for link in page.all("a"):
@@ -384,7 +384,7 @@ def _luminance(colour):
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
 def test_colours_of_text_can_be_read(theme):
-    css = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
+    css = files("asperity.outputs").joinpath("page.css").read_text(encoding="utf-8")
     block = re.findall(r":root \{(.*?)\}", css, re.S)[theme]
     colour = dict(re.findall(r"--([\w-]+): (#\w{6})", block))
     pairs = [(c, back) for c in ("ink", "soft", "link") for back in ("page", "card")]

@@ -28,7 +28,7 @@ def planted(**changes) -> xarray.Dataset:
     attrs = {"x": "epsilon", "y": "K", "x_scale": "linear", "y_scale": "log"}
     coords = {
         "epsilon": ("epsilon", eps, units),
-        "K": ("K", K, {"units": "N/m", "long_name": "K"}),
+        "K": ("K", K, {"units": "N/m", "long_name": "stiffness of the pulling spring"}),
     }
     return xarray.Dataset({k: v for k, v in data.items() if v is not None}, coords, attrs)
 
@@ -65,8 +65,8 @@ def test_points_without_response_are_hatched_and_named() -> None:
     converged[0, 0] = False
     units = {"units": "1", "long_name": "x"}
     found = planted(converged=(("K", "epsilon"), converged, units))
-    assert "no response found" in [entry.get_label() for entry in keys(found)]
-    assert "no response found" not in [entry.get_label() for entry in keys(planted())]
+    assert "no response" in [entry.get_label() for entry in keys(found)]
+    assert "no response" not in [entry.get_label() for entry in keys(planted())]
 
 
 @pytest.mark.parametrize("show", ["phase1", "growth_rate", "delta_mu", "mu1"])
@@ -80,5 +80,5 @@ def test_axes_are_labelled_in_readable_units() -> None:
     assert axis_unit(planted()["K"]) == (1e3, "N/mm")
     with style():
         figure = draw_map(planted())
-    assert figure.axes[0].get_ylabel() == "spring stiffness $K$ (N/mm)"
+    assert figure.axes[0].get_ylabel() == "stiffness of the pulling spring $K$ (N/mm)"
     assert figure.axes[0].get_ylim() == (100.0, 300.0)

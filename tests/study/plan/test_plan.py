@@ -101,7 +101,7 @@ def test_plans_beyond_memory_are_refused_before_anything(
     huge = int(10 ** draw.uniform(9, 18))
     plans = {
         "axes must give at most": {"axes": spans(*rows)},
-        "axis must have from 1 to 1,000,000 rows": {"axes": {"case": {"cases": [lists]}}},
+        "axes.case must have from 1 to 1,000,000 rows": {"axes": {"case": {"cases": [lists]}}},
         "axes must (fit into|give at most)": {"axes": {"sample": drawn}},
         "threshold.scan must fit into": {
             "axes": few, "solve": "threshold", "threshold": {"scan": huge}

@@ -5,14 +5,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 
 from asperity.study import run_sweep, store_status
-from asperity.study.workers import Workers, local_cluster, local_processes
+from asperity.study.workers import local_processes
 from references.closed_form_sweep import (
     ClosedForm,
     InClosedForm,
@@ -87,23 +85,15 @@ def _runs(process: int) -> bool:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no SIGKILL")
-@pytest.mark.parametrize("start", [local_processes, local_cluster])
-def test_one_of_two_workers_is_killed(
-    tmp_path: Path,
-    whole: dict[str, bytes],
-    start: Callable[[int], AbstractContextManager[Workers]],
-) -> None:
-    if start is local_cluster:
-        pytest.importorskip("distributed")
+def test_one_of_two_workers_is_killed(tmp_path: Path, whole: dict[str, bytes]) -> None:
     out, mark = tmp_path / "s.zarr", tmp_path / "killed"
     told: list[str] = []
-    with start(2) as workers:
+    with local_processes(2) as workers:
         found = run_sweep(plan_of(), out, workers=InClosedForm(workers, str(mark)), log=told.append)
     # The worker that made the mark died by SIGKILL in the middle of a task.
     assert mark.exists()
     assert found.points == 60
     assert store_status(out).outcomes == {"converged": 36, "folded": 18, "stopped": 6}
     assert files_of(out) == whole
-    if start is local_processes:
-        assert found.lost == 1
-        assert "died" in told[0]
+    assert found.lost == 1
+    assert "died" in told[0]

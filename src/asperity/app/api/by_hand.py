@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from asperity.app.endpoints import Answer, Question
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
 from asperity.slider.named import slider_from
@@ -51,8 +51,8 @@ def model(question: Driven) -> dict[str, Any]:
     """
     law = get_law(question.law)
     velocity = question.segments[0][1]
-    if not velocity > 0:
-        raise InputError("segments", "begin with sliding", f"{velocity:g} m/s", "cut the recording")
+    rule = "begin with sliding"
+    require(velocity > 0, "segments", rule, f"{velocity:g} m/s", "cut the recording")
     numbers = dict(question.numbers)
     stiffness = numbers.pop("K/W0", None)
     if stiffness is None:

@@ -11,16 +11,18 @@ from asperity.app.api import fits
 from asperity.app.api.recordings import LIMITS, Source
 from asperity.app.endpoints import Answer, Job, Question, Upload
 from asperity.app.uploads import LARGEST, Uploads
+from asperity.parameters import NAMES, Names
 from asperity.questions.recording import Measurement
 from asperity.recording.roles import ROLES
 
 
 class Recording(Question):
-    """A file that was sent, and how to read and to measure it."""
+    """A file that was sent, how to read and to measure it, and the names in its sentences."""
 
     recording: str
     source: Source = Field(default_factory=Source)
     options: Measurement = Field(default_factory=Measurement)
+    names: Names = NAMES[0]
 
 
 class ProtocolText(Question):

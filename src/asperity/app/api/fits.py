@@ -125,7 +125,7 @@ def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
     """The fields, with the place and the name of each recording."""
     files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
-    return {"asked": question.model_dump(mode="json"), "files": places}
+    return {"question": question.model_dump(mode="json"), "files": places}
 
 
 def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
@@ -143,7 +143,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     from asperity.laws import get_law
     from asperity.questions import fit as questions
 
-    question = Fitted(**argument["asked"])
+    question = Fitted(**argument["question"])
     files = argument["files"]
 
     def on_progress(done: int, total: int) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Job
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads import Modulate, Programme, Slide
 from asperity.slider.named import slider_from
@@ -86,8 +86,8 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     """
     question = Motion.model_validate(argument)
     law, values = get_law(question.law), question.values()
-    if not law.rate_dependent:
-        raise InputError("law", "have dynamics", f"'{question.law}'", "its force follows the load")
+    rule = "have dynamics"
+    require(law.rate_dependent, "law", rule, f"'{question.law}'", "its force follows the load")
     epsilon = epsilon_on_contacts(question, values)
     unstable = question.growth_rate is not None and question.growth_rate > 0
     duration = _duration(values, epsilon, question.growth_rate)

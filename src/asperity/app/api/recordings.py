@@ -8,9 +8,10 @@ from __future__ import annotations
 import csv
 import json
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,8 @@ from pydantic import field_validator
 from asperity.app.decimation import extremes
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming, printable
-from asperity.parameters import OUTPUTS
+from asperity.outputs.tables import Section
+from asperity.parameters import NAMES, OUTPUTS, Names, in_names
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
 from asperity.recording.readers.from_file import read_source
@@ -124,7 +126,14 @@ def _measured(
     trace: Any, argument: Mapping[str, Any], report: Callable[..., None]
 ) -> dict[str, Any]:
     from asperity.measurement.from_file import answer_measurement
+    from asperity.measurement.report import amplitude_sections, measured_sections
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+
+    names: Names = argument.get("names", NAMES[0])
+
+    def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
+        words = partial(in_names, names=names)
+        return [section.worded(words).record() for section in sections]
 
     question = questions.Measurement(**argument["options"])
     name = argument["name"]
@@ -135,11 +144,13 @@ def _measured(
     measured: dict[str, Any]
     if modulated:
         measured = _modulated(trace, measurement, question, name)
+        measured["amplitudes"] = described(amplitude_sections(measured["rows"], name))
     elif isinstance(measurement, StickSlipMeasurement):
         measured = _stick_slip_record(measurement, name)
         question = question.model_copy(update={"stick_slip": True, "modulated": None})
     else:
         measured = {**_sliding_record(measurement, name), "note": note}
+    measured["sections"] = described(measured_sections(measurement, name, names))
     source = Source(**argument["source"])
     command = ["asperity measure", shlex.quote(name), *source_options(source)]
     command += measure_options(question, modulated=modulated or bool(question.stick_slip))

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from asperity.app.words import in_labels
-from asperity.errors import InputError, naming
+from asperity.errors import InputError, naming, require
 from asperity.outputs.json import to_json
 
 try:
@@ -164,8 +164,7 @@ def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Even
 
 def _function(job: str) -> Callable[[Any, Report], Any]:
     module, _, name = job.partition(":")
-    if not module.startswith(_ROOM):
-        raise InputError(f"job must be one of the page's, got '{job}'; name one")
+    require(module.startswith(_ROOM), "job", "be one of the page's", f"'{job}'", "name one")
     result: Callable[[Any, Report], Any] = getattr(importlib.import_module(module), name)
     return result
 

@@ -35,7 +35,6 @@ from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import (
-    Forward,
     LockInTerm,
     all_converged,
 )
@@ -529,10 +528,10 @@ def what_would_tell(first: Fit, second: Fit) -> str:
     Looks at the operating points of the data with velocity, amplitude and frequency changed by
     factors up to 4, and at differences in units of the median uncertainty of each observable.
     """
-    tables = [term.table for term in first.objective.terms_of(LockInTerm)]
-    if not tables:
+    terms = first.objective.terms_of(LockInTerm)
+    if not terms:
         return ""
-    (table,) = tables
+    table, motion = terms[0].table, terms[0].motion
     largest = float(table.points["epsilon"].max())
     ratio = max(float(_value(f, "eps_ratio")) for f in (first, second))
     trials = []
@@ -547,12 +546,9 @@ def what_would_tell(first: Fit, second: Fit) -> str:
         trial = LockInTable(table.name, changed, table.values, typical)
         predictions = []
         for f in (first, second):
-            forward = Forward(
-                f.objective.law,
-                trial,
-                {**f.objective.fixed, **{n: v for n, v in changed.items() if n not in f.values}},
-            )
-            predicted, _, outcome = forward(f.values)
+            points = {n: v for n, v in changed.items() if n not in f.values}
+            term = LockInTerm(trial, f.objective.law, {**f.objective.fixed, **points}, **motion)
+            predicted, _, outcome = term.predicted(f.values)
             predictions.append(predicted if all_converged(outcome) else None)
         if None in predictions:
             continue

@@ -135,20 +135,6 @@ class CycleTerm(DataTerm):
             self.cycle.log_scale,
         )  # fmt: skip
 
-    def chi2_of_many(
-        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
-    ) -> Float:
-        """Sums of squared residuals at many sets of parameters; see `DataTerm`."""
-        result = []
-        for numbers in values:
-            cycle = self.limit_cycle(numbers)
-            if cycle.end is CycleEnd.REPEATS:
-                _, off, space = self._laid_over(cycle)
-                result.append(float(np.sum((space.T @ off) ** 2)))
-            else:
-                result.append(np.inf)
-        return np.array(result)
-
     def observed(self) -> Mapping[str, Float]:
         """Bins of the averaged cycle."""
         middles = (self.cycle.edges[1:] + self.cycle.edges[:-1]) / 2

@@ -20,7 +20,7 @@ from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.objective import Objective
 from asperity.inference.tables.residuals import Prediction, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable
-from asperity.inference.tables.term import Forward, LockInTerm, on_contacts
+from asperity.inference.tables.term import LockInTerm, on_contacts
 from asperity.orbit import Outcome, periodic_response
 from asperity.parameters.parameter import RULES
 from asperity.slider.named import slider_from
@@ -218,7 +218,7 @@ def predicted(
     for start in range(0, total, _BLOCK):
         block = some_of(points, slice(start, start + _BLOCK))
         table = LockInTable(plan.name, block, {}, {})
-        parts.append(_forward(plan, hypothesis, table)(values, search=True))
+        parts.append(_term(plan, hypothesis, table).predicted(values, search=True))
         progress(min(start + _BLOCK, total), total)
     columns = [
         [np.concatenate(column) for column in zip(*some, strict=True)]
@@ -234,9 +234,9 @@ def predicted(
     return Predicted(whole, dict(zip(hypothesis.names, slopes, strict=True)), seen)
 
 
-def _forward(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> Forward:
+def _term(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> LockInTerm:
     fixed = {**hypothesis.fixed, **table.points}
-    return Forward(hypothesis.law, table, fixed, **plan.motion)
+    return LockInTerm(table, hypothesis.law, fixed, **plan.motion)
 
 
 def expected_readings(
@@ -287,7 +287,6 @@ def with_readings(
     plan: DesignPlan, hypothesis: Objective, readings: LockInTable, counts: Float
 ) -> Objective:
     """The hypothesis with readings to be fitted, each the mean of several, shape (rows,)."""
-    forward = _forward(plan, hypothesis, readings)
-    forward.uses_search = True
-    term = LockInTerm(readings, forward).weighted(np.sqrt(counts))
-    return replace(hypothesis, terms=(term,))
+    term = _term(plan, hypothesis, readings)
+    term.use_search(True)
+    return replace(hypothesis, terms=(term.weighted(np.sqrt(counts)),))

@@ -376,7 +376,7 @@ def _refitted(
 ) -> Minimum | None:
     """The minimum for other readings at the same points; None where it was not reached."""
     (term,) = objective.terms_of(LockInTerm)
-    other = LockInTerm(readings, term.forward).weighted(np.sqrt(counts))
+    other = term.with_table(readings).weighted(np.sqrt(counts))
     objective = replace(objective, terms=(other,))
     end = objective.minimise(u)
     reached = math.isfinite(end.chi2) and objective.expected_decrease(end.u) < _LEFT

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.inference.fitting.description import RIVAL
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import RunTerm
 
@@ -22,8 +23,10 @@ _ROUNDS, _STILL = 8, 0.03
 _ONE_END = 1.0
 #: Standard deviations of the parameters within which two starts lead to the same minimum.
 _ALLOWED = 5.0
-#: Relative change of the coordinates that ends the way to a minimum of the search.
+#: Relative change of the coordinates that ends the way to a minimum before the last.
 _COARSE = 1e-4
+#: Evaluations under white noise, which is but a place to begin at.
+_EVALUATIONS = 30
 
 
 def under_drift(objective: Objective) -> Objective:
@@ -51,16 +54,16 @@ def with_noise(
     bool
     """
     starts: list[Float] = []
-    for u, value in minima:
-        white = objective.minimise(u).u
+    for u in _apart(searched, [minimum.u for minimum in minima]):
+        white = objective.minimise(u, tolerance=_COARSE, evaluations=_EVALUATIONS).u
         # Chi-squared of a drift says how large it is: noise has one a sample.
-        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        allowed = searched.chi2(u) * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
     ends: list[_End] = []
     for u in _apart(objective, starts):
-        ends += _with_own_noise(objective, u, ends)
+        ends += _with_own_noise(objective, u, ends, _COARSE)
     ends.sort(key=lambda end: end.deviance)
-    best = ends[0]
+    (best,) = _with_own_noise(ends[0].objective, ends[0].u, (), objective.tolerance)
     objective.terms = best.objective.terms
     objective.forget()
     chi2 = objective.chi2(best.u)
@@ -86,17 +89,21 @@ class _End(NamedTuple):
     """A minimum, and the objective under its own noise."""
 
     u: Float
-    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
     deviance: float
     objective: Objective
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> list[_End]:
+def _with_own_noise(
+    objective: Objective, u: Float, known: Sequence[_End], tolerance: float
+) -> list[_End]:
     """Noise and parameters in turn, until the parameters stay where they are.
 
-    Empty where they come to an end that is known.
+    Empty where they come to an end that is known, or will not come to one that matters: each round
+    gains a part of what the last one gained.
     """
+    lowest = min((end.deviance for end in known), default=math.inf)
+    deviance = math.inf
     objective = replace(objective, terms=tuple(copy(term) for term in objective.terms))
     noisy = objective.terms_of(RunTerm)
     agreed = False
@@ -105,7 +112,7 @@ def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> li
         for term in noisy:
             term.update_noise(objective.named(begin))
         objective.forget()
-        u, value = objective.minimise(begin)
+        u, value = objective.minimise(begin, tolerance=tolerance)
         if not math.isfinite(value):
             break
         begin, u = objective.ordered(begin), objective.ordered(u)
@@ -113,11 +120,18 @@ def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> li
         # The first noise holds the misfit of the start.
         if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
             return []
+        before, deviance = deviance, _deviance(objective, u)
+        if deviance - _ROUNDS * (before - deviance) > lowest + RIVAL:
+            return []
         away = jacobian @ (u - begin)
         # chi-squared of the change, under the noise as it is now.
         if agreed := float(away @ away) < _STILL**2:
             break
+    return [_End(u, _deviance(objective, u), objective, agreed)]
+
+
+def _deviance(objective: Objective, u: Float) -> float:
+    """Twice the negative logarithm of likelihood and priors, and twice the numbers of the noise."""
     priors = objective.prior_residuals(u)[0]
-    deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
-    deviance += 2 * sum(term.profiled for term in noisy)
-    return [_End(u, deviance, objective, agreed)]
+    profiled = sum(term.profiled for term in objective.terms)
+    return -2 * objective.log_likelihood(u) + float(priors @ priors) + 2 * profiled

@@ -27,127 +27,99 @@ from asperity.inference.runs.steps import (
     Free,
     arranged,
     integrated,
-    law_fields,
     with_values,
 )
 from asperity.laws import Law
+from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening
-from asperity.slider import Slider
 from asperity.slider.motion import Motion
+from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
 
 Float = NDArray[np.float64]
 
 #: Room for steps: the last where no start is computed in the first. A motion that needs more is
 #: taken to slip in events that no fit of smooth sliding can follow.
-_ROOMS = (2048, 32768)
+ROOMS = (2048, 32768)
 #: Derivatives beyond this, whose squares overflow, are those of a motion that runs away.
 _STEEPEST = 1e100
 #: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
 _GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
 
 
-class Motions(NamedTuple):
-    """Recorded friction with its derivatives.
-
-    Attributes
-    ----------
-    friction : array, shape (n,)
-        Spring force over the instantaneous applied load, F/W.
-    derivatives : array, shape (n, parameters)
-    steps : int
-        Steps of the integrator.
-    """
-
-    friction: Float
-    derivatives: Float
-    steps: int
-
-
-class RunMotion:
-    """Friction at the samples of a run as a function of its parameters.
+def run_equations(
+    law: type[Law],
+    velocity: float,
+    fixed: Mapping[str, float] | None = None,
+    *,
+    inertia: bool = False,
+    radiation_damping: bool = False,
+) -> Motion:
+    """Equation of motion of a recording, whose numbers are those that `through` is given.
 
     Parameters
     ----------
     law : type of Law
     velocity : float
         Pulling velocity of the first piece (m/s), which is sliding.
+    fixed : mapping of str to float, optional
+        Numbers that stay: asperities are not elastic where lambda is fixed to 0.
     inertia, radiation_damping : bool
         What counts in the equation of motion.
+
+    Raises
+    ------
+    InputError
+        If what counts is fixed to 0.
     """
+    # Arrays: as numbers they would be part of the compiled program.
+    names = (*law_parameters(law), "M", "eta")
+    numbers = {n: jnp.asarray((fixed or {}).get(n, 1.0), float) for n in names}
+    slider = slider_from(law, numbers | {"K": 1.0, "W0": 1.0})
+    V, eta = jnp.asarray(float(velocity)), numbers["eta"] if radiation_damping else None
+    return equation_of_motion(slider, V, 1.0, inertia=inertia, eta=eta)
 
-    def __init__(
-        self,
-        law: type[Law],
-        velocity: float,
-        *,
-        inertia: bool = False,
-        radiation_damping: bool = False,
-    ) -> None:
-        self.law, self.velocity = law, float(velocity)
-        self.inertia, self.damped = inertia, radiation_damping
-        self._room = 0
-        self._equations: Motion | None = None
 
-    def __call__(
-        self, values: Mapping[str, float], free: tuple[str, ...], drive: Drive, reading: Reading
-    ) -> Motions | None:
-        """Friction as recorded; None where the motion runs away or stops being computable.
+def recorded_friction(
+    motion: Motion,
+    values: Mapping[str, float],
+    free: tuple[str, ...],
+    drive: Drive,
+    reading: Reading,
+    room: int = ROOMS[0],
+) -> tuple[Float, Float] | None:
+    """Friction at the samples of a run; None where the motion runs away or cannot be computed.
 
-        Parameters
-        ----------
-        values : mapping of str to float
-            Parameters of the law, K, W0, M, eta, eps_ratio; `gain` of the gauge; `start_force` and
-            `start_state_i`, departures of the initial states from steady sliding (0 where not
-            given); `shift_j`, delay of the j-th edge of the drive (s).
-        free : tuple of str
-            Names for derivatives, of those.
-        drive : Drive
-        reading : Reading
-        """
-        given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
-        motion, drive = self.equations(given), filled_up(drive)
-        arrays, wanted = arranged(given, free, motion.size, len(drive.edges))
-        friction, slopes, steps, done = through(
-            motion, wanted, arrays, drive, reading.filled_up(), room=self.room
-        )
-        if not bool(done):
-            return None
-        n = len(reading.index)
-        f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
-        # NaN and infinity are not below it either.
-        if not (np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()):
-            return None
-        return Motions(f, jacobian, int(steps))
+    Parameters
+    ----------
+    motion : Motion
+        As `run_equations` returns it.
+    values : mapping of str to float
+        Parameters of the law, K, W0, M, eta, eps_ratio; `gain` of the gauge; `start_force` and
+        `start_state_i`, departures of the initial states from steady sliding (0 where not given);
+        `shift_j`, delay of the j-th edge of the drive (s).
+    free : tuple of str
+        Names for derivatives, of those.
+    drive : Drive
+    reading : Reading
+    room : int
+        Steps of the integrator at most.
 
-    def equations(self, given: Mapping[str, Any]) -> Motion:
-        """Equation of motion, whose numbers are replaced by those that `through` is given."""
-        if self._equations is None:
-            self._equations = self._template(given)
-        return self._equations
-
-    @property
-    def room(self) -> int:
-        """Steps of the integrator at most."""
-        return _ROOMS[self._room]
-
-    def allow_more_steps(self) -> None:
-        """Take as many steps as there is memory for, from now on."""
-        self._room = len(_ROOMS) - 1
-
-    def _template(self, given: Mapping[str, Any]) -> Motion:
-        fields = law_fields(self.law)
-        law = self.law(**{field: jnp.asarray(given[name]) for name, field in fields.items()})
-        slider = Slider(
-            law,
-            spring=float(given["K"]),
-            load=float(given["W0"]),
-            mass=float(given.get("M", 0.0)),
-        )
-        eta = float(given["eta"]) if self.damped else None
-        # An array: as a number it would be part of the compiled program.
-        V = jnp.asarray(self.velocity)
-        return equation_of_motion(slider, V, 1.0, inertia=self.inertia, eta=eta)
+    Returns
+    -------
+    friction : array, shape (n,)
+        Spring force over the instantaneous applied load, F/W.
+    derivatives : array, shape (n, parameters)
+    """
+    given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
+    drive = filled_up(drive)
+    arrays, wanted = arranged(given, free, motion.size, len(drive.edges))
+    friction, slopes, done = through(motion, wanted, arrays, drive, reading.filled_up(), room=room)
+    n = len(reading.index)
+    f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
+    # NaN and infinity are not below it either.
+    good = bool(done) and np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()
+    return (f, jacobian) if good else None
 
 
 @eqx.filter_jit
@@ -159,7 +131,7 @@ def through(
     reading: Reading,
     *,
     room: int,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Friction as recorded under given numbers, differentiated forwards.
 
     Parameters
@@ -181,7 +153,6 @@ def through(
     friction : array, shape (n,)
     derivatives : array, shape (derivatives, n)
         Along the directions of `free`.
-    steps : array, shape ()
     done : array, shape ()
         Whether the end was reached.
     """
@@ -193,12 +164,12 @@ def through(
 
     f = friction(curve, x)
     if not len(free.directions):
-        return f, jnp.zeros((0, f.size)), steps, done
+        return f, jnp.zeros((0, f.size)), done
 
     def along(change: Curve, direction: Array) -> Array:
         return jax.jvp(friction, (curve, x), (change, direction))[1]
 
-    return f, jax.vmap(along)(slopes, free.directions), steps, done
+    return f, jax.vmap(along)(slopes, free.directions), done
 
 
 def _recorded(

@@ -264,8 +264,7 @@ def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
     for cut in cuts:
         i = int(np.clip(np.searchsorted(time, cut.time), 1, time.size - 1))
         interval = float(np.median(np.diff(time[max(0, i - 3) : i + 3])))
-        # Found between so many samples, a time is known worse than their interval.
-        uncertain.append(max(interval, cut.doubt / 2) if time.size > LONGEST else interval)
+        uncertain.append(max(interval, cut.doubt / 2))
     return tuple(uncertain)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from typing import Any
 
@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.motion import RunArrays, RunMotion, RunResiduals
+from asperity.inference.runs.motion import (
+    ROOMS,
+    RunArrays,
+    RunResiduals,
+    recorded_friction,
+    run_equations,
+)
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
@@ -96,19 +102,25 @@ class RunTerm(DataTerm):
         radiation_damping: bool = False,
         order: int | None = None,
     ) -> None:
-        self.run, self.law, self.fixed, self.name = run, law, dict(fixed), run.name
+        self.run, self.law, self.name = run, law, run.name
+        self._known = {*law_parameters(law), "K", "W0", "M", "eps_ratio"}
+        self._known |= {"eta"} if radiation_damping else set()
+        self.fixed = {n: v for n, v in fixed.items() if n in self._known} | {"W0": run.W0}
         self.linear, self.nuisances = linear, nuisances
         self._own = dict(own or {})
         self._order = order
-        self.motion = RunMotion(
-            law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
+        # In a list, which copies share: whatever the noise, the motion takes as many steps.
+        self._room = [ROOMS[0]]
+        self.motion = run_equations(
+            law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
-        self._known = {*law_parameters(law), "K", "W0", "M", "eta", "eps_ratio"}
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
-        self.models = [self._first_noise(a, b) for a, b in run.stretches]
+        steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
+        none = np.zeros(0)
+        self.models = [Autoregression(none, max(float(np.mean(s**2)) / 2, 1e-300)) for s in steps]
         self._prepare()
 
     @property
@@ -149,9 +161,8 @@ class RunTerm(DataTerm):
         return result
 
     def use_search(self, always: bool) -> None:
-        """Let the motion take more steps, from now on."""
-        if always:
-            self.motion.allow_more_steps()
+        """Let the motion take as many steps as there is memory for, from now on."""
+        self._room[:] = [ROOMS[-1]] if always else self._room
 
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
@@ -196,33 +207,25 @@ class RunTerm(DataTerm):
 
         Those are zero without `slopes`.
         """
-        given = {**self.fixed, "W0": self.run.W0}
-        free = []
-        for name in values:
-            inner = self.inner(name)
-            if inner is not None:
-                given[inner] = values[name]
-                free.append(name)
-        inner_names = tuple(str(self.inner(name)) for name in free) if slopes else ()
-        computed = self.motion(given, inner_names, self.run.drive, self.reading)
+        inner = self._inner_names(values)
+        given = self.fixed | {inside: values[name] for name, inside in inner.items()}
+        free = tuple(inner.values()) if slopes else ()
+        drive, reading = self.run.drive, self.reading
+        computed = recorded_friction(self.motion, given, free, drive, reading, *self._room)
         if computed is None:
             return None
         jacobian = np.zeros((self.run.time.size, len(values)))
         if slopes:
-            jacobian[:, [name in free for name in values]] = computed.derivatives
-        return computed.friction - self.run.friction, jacobian
+            jacobian[:, [name in inner for name in values]] = computed[1]
+        return computed[0] - self.run.friction, jacobian
 
     def compiled(self, names: tuple[str, ...]) -> tuple[RunResiduals, RunArrays]:
         """As in `DataTerm`."""
-        inner = tuple((n, result) for n in names if (result := self.inner(n)) is not None)
-        fixed = {n: np.float64(v) for n, v in {**self.fixed, "W0": self.run.W0}.items()}
-        # Any numbers serve for the template: those of the parameters take their place.
-        template = {**{name: np.float64(1.0) for _, name in inner}, **fixed}
-        arrays, equation = eqx.partition(self.motion.equations(template), eqx.is_array_like)
-        stretches = tuple(self.run.stretches)
-        return RunResiduals(equation, inner, stretches, self.motion.room), RunArrays(
+        inner, stretches = tuple(self._inner_names(names).items()), tuple(self.run.stretches)
+        arrays, equation = eqx.partition(self.motion, eqx.is_array_like)
+        return RunResiduals(equation, inner, stretches, *self._room), RunArrays(
             jax.tree.map(np.asarray, arrays),
-            fixed,
+            {n: np.float64(v) for n, v in self.fixed.items()},
             filled_up(self.run.drive),
             self.reading,
             self.run.friction,
@@ -346,15 +349,10 @@ class RunTerm(DataTerm):
             "makes; replaced by the line between the neighbours"
         )
 
-    def inner(self, name: str) -> str | None:
-        """Name of a parameter in the motion; None if this run does not depend on it."""
-        if name in self._own:
-            return self._own[name]
-        return name if name in self._known and name not in self._own.values() else None
-
-    def _first_noise(self, a: int, b: int) -> Autoregression:
-        steps = np.diff(self.run.friction[a:b])
-        return Autoregression(np.zeros(0), max(float(steps @ steps) / (2 * steps.size), 1e-300))
+    def _inner_names(self, names: Iterable[str]) -> dict[str, str]:
+        """Names in the motion of those parameters that this run depends on."""
+        shared = self._known - set(self._own.values())
+        return {n: self._own.get(n, n) for n in names if n in self._own or n in shared}
 
     def _prepare(self) -> None:
         self.basis, self._triangle = np.linalg.qr(self._whitened(self._columns))

@@ -35,6 +35,7 @@ from asperity.orbit import (
     response_function,
 )
 from asperity.parameters import law_parameters
+from asperity.slider.named import law_from
 
 Float = NDArray[np.float64]
 
@@ -52,18 +53,49 @@ class LockInTerm(DataTerm):
     Parameters
     ----------
     table : LockInTable
-    forward : Forward
-        Predictions at the rows of the table.
+    law : type of Law
+    fixed : mapping of str to array, shape () or (rows,)
+        All parameters that are not free, in SI.
+    inertia, radiation_damping : bool
+        What counts in the equation of motion.
+
+    Attributes
+    ----------
+    searches : bool
+        Whether every call searches for the orbits that the fast method does not find.
+    coarse : bool
+        Whether orbits are of the coarse model of `response_function`, to look for minima with.
     """
 
+    searches: bool = False
+    affordable = _SAMPLES
     failure = (
         "no start has a periodic orbit at every operating point; give start values, or fix "
         "parameters for which sliding is stable"
     )
 
-    def __init__(self, table: LockInTable, forward: Forward) -> None:
-        self.table, self.forward = table, forward
+    def __init__(
+        self,
+        table: LockInTable,
+        law: type[Law],
+        fixed: Mapping[str, Any],
+        *,
+        inertia: bool = False,
+        radiation_damping: bool = False,
+    ) -> None:
+        self.table, self.law = table, law
         self.name, self.observables = table.name, table.observables
+        self.motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
+        self.fixed = {
+            n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
+        }
+        # Whatever rows are asked for, the programs are those of the whole table.
+        function = partial(response_function, law, **self.motion, least_points=table.rows)
+        self._functions: dict[bool | str, ResponseFunction] = {
+            way: function(search=way) for way in (False, "direct", "coarse")
+        }
+        self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
+        self.coarse = False
         self._weights: Weights | None = None
 
     @property
@@ -83,7 +115,7 @@ class LockInTerm(DataTerm):
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None if a row has no periodic orbit."""
-        predicted, derivatives, outcome = self.forward(values, search=search, every=True)
+        predicted, derivatives, outcome = self.predicted(values, search=search, every=True)
         if not all_converged(outcome):
             return None
         result = residuals_of(self.weights, predicted, derivatives)
@@ -95,19 +127,26 @@ class LockInTerm(DataTerm):
         self, names: tuple[str, ...]
     ) -> tuple[CompiledResiduals, tuple[dict[str, Float], Weights]]:
         """As in `DataTerm`."""
-        f = self.forward
-        compiled = _CompiledResiduals(f.law, f.inertia, f.radiation_damping, f.uses_search)
-        return compiled, (f.fixed, self.weights)
+        way = tuple(self.motion.items())
+        return _CompiledResiduals(self.law, way, self.searches), (self.fixed, self.weights)
 
     def with_rows(self, kept: NDArray[np.bool_], *, coarse: bool = False) -> LockInTerm:
-        """The same for some of the rows, by the coarse model on request."""
-        forward = self.forward.with_rows(kept)
-        forward.coarse = coarse
-        return LockInTerm(forward.table, forward)
+        """The same for some of the rows with their orbits, by the coarse model on request."""
+        part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
+        part.fixed = {n: v[kept] for n, v in self.fixed.items()}
+        part._visited = [(free, known.picked(rows)) for free, known in self._visited]
+        part.coarse = coarse
+        return part
+
+    def with_table(self, table: LockInTable) -> LockInTerm:
+        """The same with other readings at the same operating points."""
+        result = copy(self)
+        result.table, result._weights = table, None
+        return result
 
     def weighted(self, weights: Float) -> LockInTerm:
         """The same with the residuals of each row multiplied by a weight, shape (rows,)."""
-        result, own = LockInTerm(self.table, self.forward), self.weights
+        result, own = copy(self), self.weights
         result._weights = own._replace(
             matrix=own.matrix * weights[:, None, None], target=own.target * weights[:, None]
         )
@@ -119,26 +158,16 @@ class LockInTerm(DataTerm):
         """chi-squared at many sets of parameters, by one call; see `DataTerm`."""
         weights, rows, sets = self.weights, self.table.rows, len(values)
         free = {n: np.repeat([v[n] for v in values], rows) for n in values[0]}
-        predicted, outcome = self.forward.predicted(free, repeats=sets, near=near)
+        predicted, outcome = self.predicted_at_many(free, repeats=sets, near=near)
         residuals = weights.compared(columns_of(predicted).reshape(sets, rows, -1))
         solved = (outcome == Outcome.CONVERGED).reshape(sets, rows)
         share = np.maximum(solved.mean(1), 1 / rows)
         total = np.sum(np.where(solved[..., None], residuals, 0.0) ** 2, (1, 2)) / share
         return np.where(share >= least, np.nan_to_num(total, nan=np.inf), np.inf)
 
-    @property
-    def searches(self) -> bool:
-        """Whether every call searches for the orbits that the fast method does not find."""
-        return self.forward.uses_search
-
     def use_search(self, always: bool) -> None:
         """Search for the orbits that the fast method does not find at every call, or no more."""
-        self.forward.uses_search = always
-
-    @property
-    def affordable(self) -> int:
-        """Evaluations that an integral may take."""
-        return _SEARCHED_SAMPLES if self.searches else _SAMPLES
+        self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
 
     @property
     def _count(self) -> int:
@@ -196,61 +225,10 @@ class LockInTerm(DataTerm):
                     )
         return said
 
-
-class Forward:
-    """Periodic responses of a law at the rows of a table as a function of parameters.
-
-    Parameters
-    ----------
-    law : type of Law
-    table : LockInTable
-    fixed : mapping of str to array, shape () or (rows,)
-        All parameters that are not free, in SI.
-    inertia, radiation_damping : bool
-        What counts in the equation of motion.
-
-    Attributes
-    ----------
-    uses_search : bool
-        Whether every call searches for the orbits that the fast method does not find.
-    coarse : bool
-        Whether these are of the coarse model of `response_function`, to look for minima with.
-    """
-
-    def __init__(
-        self,
-        law: type[Law],
-        table: LockInTable,
-        fixed: Mapping[str, Any],
-        *,
-        inertia: bool = False,
-        radiation_damping: bool = False,
-    ) -> None:
-        self.law, self.table = law, table
-        self.inertia, self.radiation_damping = inertia, radiation_damping
-        self.fixed = {
-            n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
-        }
-        # Whatever rows are asked for, the programs are those of the whole table.
-        function = partial(
-            response_function,
-            law,
-            inertia=inertia,
-            radiation_damping=radiation_damping,
-            least_points=table.rows,
-        )
-        self._fast, self._direct, self._coarse = (
-            function(search=search) for search in (False, "direct", "coarse")
-        )
-        self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
-        self.uses_search = self.coarse = False
-
     def _function(self, *, search: bool, coarse: bool) -> ResponseFunction:
-        if not search:
-            return self._fast
-        return self._coarse if coarse else self._direct
+        return self._functions[("coarse" if coarse else "direct") if search else False]
 
-    def __call__(
+    def predicted(
         self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
     ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
         """Prediction, its derivatives to the free parameters, and the outcome of every row.
@@ -264,7 +242,7 @@ class Forward:
         every : bool
             Whether to give up, and to leave out derivatives, once a row has no orbit.
         """
-        search = self.uses_search if search is None else search
+        search = self.searches if search is None else search
         applied = self.fixed["epsilon"]
         function = self._function(search=search, coarse=self.coarse)
         given = parameters_at(self.fixed, free, function)
@@ -278,26 +256,20 @@ class Forward:
         predicted = Prediction(
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
         )
-        derivatives = {}
-        none = Prediction(
-            np.zeros(self.table.rows),
-            np.zeros(self.table.rows),
-            np.zeros((self.table.rows, 2), complex),
-        )
+        derivatives, zero = {}, np.zeros(self.table.rows)
+        # Nothing depends on a parameter of other data.
+        none: Any = Prediction(zero, zero, np.zeros((zero.size, 2), complex))
         for name in free:
             source, factor = ("epsilon", applied) if name == "eps_ratio" else (name, 1.0)
-            if source not in slopes:
-                derivatives[name] = none  # a parameter of other data
-                continue
-            slope = slopes[source]
+            slope = slopes.get(source, none)
             derivatives[name] = Prediction(
                 np.asarray(slope.mean_friction) * factor,
-                mu_slopes.get(name, np.zeros(self.table.rows)),
+                mu_slopes.get(name, zero),
                 np.asarray(slope.harmonics) * np.reshape(factor, (-1, 1)),
             )
         return predicted, derivatives, np.asarray(values.outcome)
 
-    def predicted(
+    def predicted_at_many(
         self, free: Mapping[str, Float], repeats: int, *, near: bool = False
     ) -> tuple[Prediction, NDArray[np.int64]]:
         """Predictions of many sets of parameters, without derivatives.
@@ -312,7 +284,7 @@ class Forward:
             Whether orbits are like those of the last call with derivatives, and begun there. They
             are of the coarse model then, except where it has none.
         """
-        function = self._function(search=self.uses_search, coarse=self.coarse or near)
+        function = self._function(search=self.searches, coarse=self.coarse or near)
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
         given = parameters_at(fixed, free, function)
         last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
@@ -320,11 +292,12 @@ class Forward:
         for start in range(0, repeats * self.table.rows, together):
             part = {n: v[start : start + together] for n, v in given.items()}
             rows = np.arange(start, start + len(part["V"])) % self.table.rows
-            known = last.picked(rows) if near and self.uses_search else None
+            known = last.picked(rows) if near and self.searches else None
             values, mu_ss = function(part, known), _steady(self.law, part, together)[0]
             left = np.flatnonzero(np.asarray(values.outcome) != Outcome.CONVERGED)
             if known is not None and not self.coarse and left.size:
-                more = self._direct({n: v[left] for n, v in part.items()}, last.picked(rows[left]))
+                beyond = {n: v[left] for n, v in part.items()}
+                more = self._functions["direct"](beyond, last.picked(rows[left]))
                 columns: list[Any] = [np.array(column) for column in values]
                 for column, searched in zip(columns, more, strict=True):
                     column[left] = searched
@@ -334,14 +307,6 @@ class Forward:
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
         )
         return Prediction(mean, steady, harmonics), outcome
-
-    def with_rows(self, kept: NDArray[np.bool_]) -> Forward:
-        """The same for some of the rows, with their orbits."""
-        forward, rows = copy(self), np.flatnonzero(kept)
-        forward.table = self.table.without(~kept)
-        forward.fixed = {n: v[kept] for n, v in self.fixed.items()}
-        forward._visited = [(free, known.picked(rows)) for free, known in self._visited]
-        return forward
 
     @property
     def _most_visited(self) -> int:
@@ -423,8 +388,7 @@ def _steady_slopes(given: Mapping[str, Array], *, law: type[Law]) -> tuple[Array
 
 def steady_friction(law: type[Law], given: Mapping[str, Array]) -> Array:
     """mu_ss(V) at each row, for parameters of shape (rows,)."""
-    fields = {f.rstrip("_"): f for f in law.__dataclass_fields__}
-    return law(**{fields[n]: given[n] for n in law_parameters(law)}).mu_ss(given["V"])
+    return law_from(law, given).mu_ss(given["V"])
 
 
 @dataclass(frozen=True)
@@ -432,18 +396,12 @@ class _CompiledResiduals:
     """Residuals of a table within compiled programs."""
 
     law: type[Law]
-    inertia: bool
-    radiation_damping: bool
+    motion: tuple[tuple[str, Any], ...]
     search: bool
 
     def __call__(self, values: Mapping[str, Array], data: tuple[dict[str, Any], Weights]) -> Array:
         fixed, weights = data
-        function = response_function(
-            self.law,
-            inertia=self.inertia,
-            radiation_damping=self.radiation_damping,
-            search=self.search,
-        )
+        function = response_function(self.law, **dict(self.motion), search=self.search)
         given = parameters_at(fixed, values, function)
         result = function(given)
         mu_ss = steady_friction(self.law, given)

@@ -188,7 +188,7 @@ def measure_sliding(
     time, friction = signals.time, signals.friction
     times = _given_cuts(time, steps, holds)
     if times is None:
-        cut = partition(time, signals.displacement, friction)
+        cut = partition(time, signals.displacement)
     else:
         cut = partition_at(time, signals.displacement, np.array(times))
         cut = _with_holds(cut, time, holds)

@@ -1,55 +1,48 @@
 """Segments of constant pulling velocity.
 
-Laboratories step the velocity over decades, at equal slip, and often change the sampling rate with
-it. A recording is therefore first divided into cells of a little slip each, a time limit for what
-stands still; log velocity over cells is cut by optimal partitioning (Killick, Fearnhead and
-Eckley, J. Am. Stat. Assoc. 107, 1590, 2012); and the instant of each cut is refined, first where
-the lines of displacement on its two sides intersect, then by the kink of the friction.
+Within a segment the displacement is a straight line, and a parabola while the motor changes its
+velocity; what is left is noise of known strength. The means of the displacement over short blocks
+are cut into such pieces by optimal partitioning (Killick, Fearnhead and Eckley, J. Am. Stat. Assoc.
+107, 1590, 2012), which is exact for this model. Two things are not in it: a motor does not run
+evenly, and takes its time between velocities. Neighbours of nearly one velocity are therefore one
+segment, and short pieces between two segments are their transition. A cut lies where the lines on
+its two sides intersect.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+#: First sample of a piece, and the one after its last.
+Piece = tuple[int, int]
 
-#: Parts of a recording of which a quarter is quiet, and spans of the longest difference in a part.
-_QUIET_PARTS, _PER_PART = 16, 6
-#: Slip of a cell, in standard deviations of the displacement's noise; 12 tell its velocity to 12 %.
-_CELL_NOISE = 12.0
-_CELLS = 4000
-#: A cell lasts at most this share of the recording, moving or not.
-_LONGEST = 0.02
+#: Blocks of equal time, as many of equal numbers of samples and of equal slip; and parts of a
+#: block next to a change.
+_BLOCKS, _PARTS = 300, 12
+#: Means of which the noise is found, and parts of a recording of which a quarter is quiet.
+_MEANS, _QUIET_PARTS = 96, 16
+#: Of the penalty of the Bayesian information criterion for a piece: real noise is not white.
+_PENALTY = 2.0
 #: Neighbours with a smaller ratio of velocities are one segment; up to the second it is doubtful.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
-#: Of recordings with more samples than this, the lines next to a cut are fitted
-#: to so many means where they hold more samples than the third number.
-_LONG, _MEANS, _MANY = 20_000, 64, 1024
-#: A cut must explain so many standard deviations of a cell's log velocity.
-_SIGNIFICANT = 5.0
-#: A piece with less than this share of its neighbours' slip and of their time is their transition.
-_TRANSITION = 0.05
-#: A piece after which the velocity returns to what it was is a disturbance up to this share.
-_DISTURBANCE = 0.1
-#: A piece of a steady rise or fall with less than this share of both its ends is a ramp.
-_RAMP = 0.15
-#: Unclear changes next to a piece with less than this share of the slip about them are ripple.
-_RIPPLE = 0.08
-#: A piece next to a larger change, with less than this share of a neighbour and up to this ratio of
-#: its velocity, is the settling of a step.
-_SETTLING, _SETTLING_RATIO = 0.3, 2.0
-#: Pieces of so few cells, of a velocity between those of their neighbours, are transitions too.
-_FEW_CELLS = 3
-#: A cell that moved by less than so many standard deviations stands still.
-_STILL = 3.0
-#: Slower than this share of its neighbours, or within the noise, a segment is a hold...
+#: Pieces between two velocities are a transition with less than this share of the time and slip on
+#: both sides; and up to the second, in doubt, if the velocity changes within them as in a ramp.
+_TRANSITION, _RAMP = 0.15, 0.5
+#: Pieces of another velocity than between those of their neighbours are overshoot up to this share.
+_OVERSHOOT = 0.05
+#: Slip that lines differ by at the far ends of the parts that are intersected, over the noise.
+_LINE = 50.0
+#: Samples of a piece.
+_FEWEST = 4
+#: A segment stands still that moves by no more than so many standard deviations of the noise.
+_STILL = 6.0
+#: Slower than this share of its neighbours a segment is a hold, unless it slides steadily.
 _HOLD = 5e-3
-#: ...and up to this share it might be meant as one.
-_MAYBE_HOLD = 0.02
 
 
 @dataclass(frozen=True)
@@ -62,8 +55,8 @@ class Cut:
         Seconds.
     sample : int
     doubt : float
-        Twice what the noise of the displacement leaves open about the time (s); 0 where it was
-        given.
+        Twice the standard uncertainty of the time (s) from the noise of the displacement; 0 where
+        the time was given.
     """
 
     time: float
@@ -92,38 +85,44 @@ class Partition:
     doubts: tuple[str, ...] = ()
 
 
-def partition(time: Array, displacement: Array | None, friction: Array) -> Partition:
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A displacement over time, and its noise.
+
+    Attributes
+    ----------
+    time, displacement : array, (n,)
+    noise : float
+        Standard deviation of a sample (m).
+    slow_noise : float
+        Standard deviation (m) that a sample would have, were the noise of means over many samples
+        white.
+    step : float
+        Of a coarse recorder (m); 0 of a fine one.
+    """
+
+    time: Array
+    displacement: Array
+    noise: float
+    slow_noise: float
+    step: float
+
+
+def partition(time: Array, displacement: Array | None) -> Partition:
     """Cut a recording where its velocity changes.
 
     Parameters
     ----------
-    time, displacement, friction : array, (n,)
-        Seconds, metres or None, and a pure number.
+    time, displacement : array, (n,)
+        Seconds, and metres or None.
     """
     if displacement is None:
         return Partition((), (np.nan,), (False,))
-    noise = displacement_noise(time, displacement)
-    edges = _cells(time, displacement, noise)
-    duration, slip = np.diff(time[edges]), np.diff(displacement[edges])
-    # The logarithm of what stands still is that of its noise.
-    log_speed = np.log(np.maximum(np.abs(slip), _STILL * noise) / duration)
-    backward = slip < -2 * _STILL * noise
-    bounds = _change_points(log_speed + 20.0 * backward)
-    bounds, settled = _without_transitions(time, displacement, bounds, edges, noise)
-    pieces = [(int(edges[a]), int(edges[b])) for a, b in pairwise(bounds)]
-    cuts = [
-        _refined(time, displacement, friction, before, after, edges)
-        for before, after in pairwise(pieces)
-    ]
-    # Two cuts may be refined towards each other.
-    cuts = [c for k, c in enumerate(cuts) if not k or c.sample >= cuts[k - 1].sample + 4]
-    pieces = list(pairwise([0, *(c.sample for c in cuts), time.size]))
-    speeds = [_velocity(time, displacement, *p) for p in pieces]
-    doubts = settled + _small_changes(time, pieces, speeds)
-    # What moves by no more than noise is a stop, however slow the pieces next to it are.
-    speeds = _without_rounding(time, pieces, speeds, noise)
-    holds, unsure = _holds(time, displacement, pieces, speeds, noise)
-    return Partition(tuple(cuts), tuple(speeds), tuple(holds), tuple(doubts + unsure))
+    motion = _motion(time, displacement)
+    pieces, doubts = _segments(motion, _pieces(motion))
+    speeds, holds, unsure = _speeds(motion, pieces)
+    cuts = tuple(_intersection(motion, before, after) for before, after in pairwise(pieces))
+    return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
 
 def partition_at(time: Array, displacement: Array | None, times: Array) -> Partition:
@@ -139,379 +138,320 @@ def partition_at(time: Array, displacement: Array | None, times: Array) -> Parti
     cuts = tuple(Cut(float(t), int(i)) for t, i in zip(times, at, strict=True))
     if displacement is None:
         return Partition(cuts, (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1))
-    noise = displacement_noise(time, displacement)
-    bounds = [0, *at.tolist(), time.size]
-    pieces = list(pairwise(bounds))
-    speeds = [_velocity(time, displacement, *p) for p in pieces]
-    holds, _ = _holds(time, displacement, pieces, speeds, noise)
-    speeds = _without_rounding(time, pieces, speeds, noise)
-    return Partition(cuts, tuple(speeds), tuple(holds))
+    pieces = list(pairwise([0, *at.tolist(), time.size]))
+    speeds, holds, _ = _speeds(_motion(time, displacement), pieces)
+    return Partition(cuts, speeds, holds)
 
 
 def displacement_noise(time: Array, displacement: Array) -> float:
     """Standard deviation of a displacement's noise (m), its resolution included.
 
-    From second differences at even steps of time, which velocity does not touch and its changes
-    hardly. Noise of a gauge is correlated over many samples, hums and wanders: neighbours are
-    nearer to each other than samples far apart. Differences are therefore taken over 1, 2, 4, ...
-    samples, and the largest counts, each in the quietest parts of the recording, where the motion
-    is even or rests.
+    Parameters
+    ----------
+    time, displacement : array, (n,)
     """
-    moved = np.abs(np.diff(displacement))
-    smallest = float(moved[moved > 0].min()) if moved.any() else 0.0
-    spread, lag = 0.0, 1
-    while True:
-        spread = max(spread, _spread_over(time, displacement, lag))
-        lag *= 2
-        if lag * _QUIET_PARTS * _PER_PART > time.size:
-            break
+    return _motion(time, displacement).noise
+
+
+def _motion(time: Array, displacement: Array) -> _Motion:
+    """The noise of a displacement, from second differences of means over 1, 2, 4, ... samples.
+
+    Velocity does not touch them, and its changes hardly in the quietest parts of a recording.
+    Means over many samples scatter more than white noise has them if the noise of a gauge is
+    correlated, hums or wanders.
+    """
+    noise, slow, n = 0.0, 0.0, 1
+    while n == 1 or n * _MEANS <= time.size:
+        t = time[: time.size // n * n : n]
+        x = displacement[: t.size * n].reshape(t.size, n).mean(axis=1)
+        lengths = np.diff(t)
+        even = np.abs(np.diff(lengths)) < 0.05 * lengths[1:]
+        second = np.abs(np.diff(x, 2))[even]
+        if second.size:
+            parts = np.array_split(second, max(1, min(_QUIET_PARTS, second.size // 24)))
+            usual = np.sort([np.median(part) for part in parts])
+            spread = float(usual[usual.size // (2 if n == 1 else 4)]) * 1.4826 / np.sqrt(6)
+            noise, slow = max(noise, spread), max(slow, spread * np.sqrt(n))
+        n *= 2
     # Of a coarse recorder most differences are zero: its step is the noise.
-    stands = moved.size and float(np.mean(moved == 0)) > 0.2
+    moved = np.abs(np.diff(displacement))
+    step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
     floor = 1e-9 * float(np.ptp(displacement)) + 1e-300
-    return max(spread, smallest / np.sqrt(12) if stands else 0.0, floor)
+    return _Motion(
+        time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step
+    )
 
 
-def _spread_over(time: Array, displacement: Array, lag: int) -> float:
-    """Standard deviation of samples so far apart about even motion, in the quietest parts."""
-    t, x = (values[:: max(1, lag // 4)] for values in (time, displacement))
-    k = min(lag, 4)
-    if t.size <= 2 * k:
-        return 0.0
-    before, after = t[k:-k] - t[: -2 * k], t[2 * k :] - t[k:-k]
-    second = np.abs(x[2 * k :] - 2 * x[k:-k] + x[: -2 * k])[np.abs(after - before) < 0.05 * after]
-    if not second.size:
-        return 0.0
-    parts = np.array_split(second, max(1, min(_QUIET_PARTS, second.size // (4 * _PER_PART))))
-    usual = np.sort([np.median(part) for part in parts])
-    return float(usual[usual.size // 4]) * 1.4826 / np.sqrt(6)
+def _pieces(motion: _Motion) -> list[Piece]:
+    """Lines and parabolas: cut at coarse blocks first, then at fine ones next to the changes."""
+    edges = _blocks(motion)
+    bounds = edges[_change_points(motion, edges)]
+    near = np.unique(np.clip(np.searchsorted(edges, bounds[1:-1])[:, None] + [-1, 0, 1], 0, None))
+    fine = [
+        np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp)
+        for k in near
+        if k + 1 < edges.size
+    ]
+    # Elsewhere four blocks are one.
+    edges = np.unique(np.concatenate([edges[::4], edges[-1:], bounds, *fine]))
+    bounds = edges[_change_points(motion, edges)].tolist()
+    # A spike or a jump of the gauge is no motion.
+    kept = [(a, b) for a, b in pairwise(bounds) if b - a >= _FEWEST]
+    return kept or [(0, motion.time.size)]
 
 
-def _cells(time: Array, displacement: Array, noise: float) -> NDArray[np.intp]:
-    """Samples that bound the cells, the first and the last one among them."""
-    path = float(np.sum(np.abs(np.diff(displacement[:: max(1, time.size // 20_000)]))))
-    size = max(_CELL_NOISE * noise, path / _CELLS)
-    longest = max(_LONGEST * float(time[-1] - time[0]), 4 * float(np.median(np.diff(time))))
-    edges = [0]
-    at, n = 0, time.size
-    while at < n - 1:
-        latest = int(np.searchsorted(time, time[at] + longest))
-        stop = min(max(latest, at + 3), n - 1)
-        reach = 64
-        # The first sample that is far enough, looked for in growing pieces.
-        edge, begin = stop, at + 3
-        while begin < stop:
-            end = min(begin + reach, stop)
-            far = np.abs(displacement[begin:end] - displacement[at]) >= size
-            if far.any():
-                edge = begin + int(np.argmax(far))
-                break
-            begin, reach = end, 4 * reach
-        at = edge
-        edges.append(at)
-    if len(edges) > 2 and edges[-1] - edges[-2] < 3:
-        del edges[-2]
-    return np.array(edges, dtype=np.intp)
+def _blocks(motion: _Motion) -> NDArray[np.intp]:
+    """Samples that bound blocks, the number of samples among them."""
+    n = motion.time.size
+    m = max(1, n // 20_000)
+    at = np.arange(n // m) * m
+    means = motion.displacement[: at.size * m].reshape(-1, m).mean(axis=1)
+    # Noise moves neighbours too.
+    moved = np.abs(np.diff(means)) - 3 * motion.noise * np.sqrt(2 / m)
+    path = np.concatenate([[0.0], np.cumsum(np.maximum(moved, 0.0))])
+    edges = [np.array([0, n])]
+    for measure in (motion.time[at], at.astype(float), path):
+        levels = np.linspace(measure[0], measure[-1], _BLOCKS + 1)[1:-1]
+        edges.append(at[np.searchsorted(measure, levels)])
+    return np.unique(np.concatenate(edges))
 
 
-def _change_points(series: Array) -> list[int]:
-    """Optimal partitioning of a series into pieces of constant level, both ends included."""
-    n = series.size
-    if n < 2:
-        return [0, n]
-    scatter = 1.4826 * float(np.median(np.abs(np.diff(series)))) / np.sqrt(2)
-    scatter = max(scatter, 0.05)
-    penalty = (_SIGNIFICANT * scatter) ** 2 * (1 + np.log(n) / 10)
-    sums = np.concatenate([[0.0], np.cumsum(series)])
-    squares = np.concatenate([[0.0], np.cumsum(series**2)])
-    best = np.full(n + 1, np.inf)
-    best[0] = -penalty
-    last = np.zeros(n + 1, dtype=np.intp)
-    starts = np.array([0], dtype=np.intp)
+def _change_points(motion: _Motion, edges: NDArray[np.intp]) -> list[int]:
+    """Bounds of the pieces, as places in edges: the least sum of squares and penalties."""
+    size = np.diff(edges)
+    t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
+    x = np.add.reduceat(motion.displacement - motion.displacement[0], edges[:-1]) / size
+    # What the recorder rounds is the same in all samples of a slow block.
+    weight = 1 / (motion.slow_noise**2 / size + motion.step**2 / 12)
+    t /= float(np.median(np.diff(t)))
+    n = size.size
+    parameter = _PENALTY * np.log(n)
+    best, last = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=np.intp)
+    best[0] = 0.0
+    starts = np.empty(0, dtype=np.intp)
+    # For each start: sums of w, wu, wu2, wu3, wu4, wy, wyu, wyu2, wy2, from its block on.
+    sums = np.empty((9, 0))
     for end in range(1, n + 1):
-        count = end - starts
-        cost = squares[end] - squares[starts] - (sums[end] - sums[starts]) ** 2 / count
-        total = best[starts] + cost + penalty
+        starts = np.append(starts, end - 1)
+        sums = np.concatenate([sums, np.zeros((9, 1))], axis=1)
+        u, y = t[end - 1] - t[starts], x[end - 1] - x[starts]
+        powers = np.stack([np.ones_like(u), u, u**2, u**3, u**4, y, y * u, y * u**2, y**2])
+        sums += weight[end - 1] * powers
+        line, parabola = _misfits(sums)
+        total = best[starts] + np.minimum(line, parabola + parameter) + 3 * parameter
         at = int(np.argmin(total))
         best[end], last[end] = total[at], starts[at]
         # A start that is worse than the best by the penalty can never become the best.
-        starts = np.append(starts[total - penalty <= best[end]], end)
+        keep = total - 3 * parameter <= best[end]
+        starts, sums = starts[keep], sums[:, keep]
     bounds = [n]
     while bounds[-1] > 0:
         bounds.append(int(last[bounds[-1]]))
     return bounds[::-1]
 
 
-def _velocity(time: Array, displacement: Array, first: int, stop: int) -> float:
-    """Slope of displacement over a piece, m/s; parts of equal time count equally."""
-    t, x = time[first:stop], displacement[first:stop]
+def _misfits(sums: Array) -> tuple[Array, Array]:
+    """Sums of squares that a line and a parabola leave, by orthogonal polynomials."""
+    s0, s1, s2, s3, s4, y0, y1, y2, yy = sums
+    first = s2 - s1 * s1 / s0
+    some = first > 1e-9 * s2
+    first = np.where(some, first, np.inf)
+    slope = (y1 - s1 * y0 / s0) / first
+    line = yy - y0 * y0 / s0 - slope**2 * np.where(some, first, 0.0)
+    bend = (s3 - s1 * s2 / s0) / first
+    second = s4 - s2 * s2 / s0 - bend * (s3 - s1 * s2 / s0)
+    some = some & (second > 1e-9 * s4)
+    product = y2 - s2 * y0 / s0 - bend * (y1 - s1 * y0 / s0)
+    parabola = line - np.where(some, product**2 / np.where(some, second, 1.0), 0.0)
+    return np.maximum(line, 0.0), np.maximum(parabola, 0.0)
+
+
+def _velocity(motion: _Motion, piece: Piece) -> float:
+    """Slope of the displacement over a piece, m/s."""
+    t, x = motion.time[slice(*piece)], motion.displacement[slice(*piece)]
     if t.size < 2:
         return np.nan
-    if t.size > 400:
-        at = np.linspace(t[0], t[-1], 201)
-        x, t = np.interp(at, t, x), at
     away = t - t.mean()
     return float(away @ (x - x.mean()) / (away @ away))
 
 
-def _without_transitions(
-    time: Array,
-    displacement: Array,
-    bounds: list[int],
-    edges: NDArray[np.intp],
-    noise: float,
-) -> tuple[list[int], list[str]]:
-    """Bounds of pieces, in cells, without transitions and small changes; and doubts."""
-    bounds, doubts = list(bounds), []
-    while len(bounds) > 2:
-        at = [int(edges[b]) for b in bounds]
-        duration = np.diff(time[at])
-        path = np.abs(np.diff(displacement[at]))
-        speeds = [_velocity(time, displacement, a, b + 1) for a, b in pairwise(at)]
-        transition = _transition(bounds, duration, path, speeds, noise)
-        if transition is not None:
-            k, near, share = transition
-            if share > _DISTURBANCE:
-                doubts.append(
-                    f"{duration[k]:.3g} s at {1e6 * abs(speeds[k]):.3g} um/s from "
-                    f"{time[at[k]]:.6g} s on are read as the settling of a step, and may be a "
-                    "segment"
-                )
-            del bounds[max(k, near)]
+def _duration(motion: _Motion, piece: Piece) -> float:
+    """Seconds from the first sample of a piece to its last."""
+    return float(motion.time[piece[1] - 1] - motion.time[piece[0]])
+
+
+def _velocity_change(motion: _Motion, piece: Piece) -> tuple[float, float]:
+    """Velocity at the end of a piece less that at its beginning, and its uncertainty (m/s)."""
+    n = piece[1] - piece[0]
+    m = max(1, n // _MEANS)
+    stop = piece[0] + n // m * m
+    t = motion.time[piece[0] : stop].reshape(-1, m).mean(axis=1)
+    x = motion.displacement[piece[0] : stop].reshape(-1, m).mean(axis=1)
+    span = _duration(motion, piece)
+    away = (t - t.mean()) / span
+    bend = float(np.polyfit(away, x - x.mean(), 2)[0])
+    return 2 * bend / span, float(np.sqrt(720 / n)) * motion.slow_noise / span
+
+
+def _still(motion: _Motion, piece: Piece, speed: float) -> bool:
+    """Whether noise explains all of a motion."""
+    return abs(speed) * _duration(motion, piece) <= _STILL * motion.noise
+
+
+def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[str]]:
+    """Pieces without transitions and small changes; and doubts."""
+    doubts: list[str] = []
+    speeds = [_velocity(motion, piece) for piece in pieces]
+    while len(pieces) > 1:
+        rounded = [
+            0.0 if _still(motion, *each) else each[1] for each in zip(pieces, speeds, strict=True)
+        ]
+        ratios = np.array([_log_ratio(*pair) for pair in pairwise(rounded)])
+        spans = np.array([_duration(motion, piece) for piece in pieces])
+        both = np.stack([spans, spans * np.abs(speeds)])
+        # A motor or a contact does not move evenly: short parts of nearly one velocity are noise.
+        sides = both[:, :-1], both[:, 1:]
+        share = np.max(np.minimum(*sides) / np.maximum(np.maximum(*sides), 1e-300), axis=0)
+        allowed = np.where(share < _TRANSITION, np.log(_CLEAR_RATIO), np.log(_RATIO))
+        least = int(np.argmin(ratios / allowed))
+        if ratios[least] < allowed[least]:
+            whole = pieces[least][0], pieces[least + 1][1]
+            pieces[least : least + 2] = [whole]
+            speeds[least : least + 2] = [_velocity(motion, whole)]
             continue
-        ratios = np.array([_log_ratio(a, b) for a, b in pairwise(speeds)])
-        ratios[_of_ripple(ratios, path)] = 0.0
-        ratios[_of_one_stop(np.array(speeds), duration, noise)] = 0.0
-        least = int(np.argmin(ratios))
-        if ratios[least] >= np.log(_RATIO):
+        transition = _transition(motion, pieces, speeds)
+        if transition is None:
+            doubts += [
+                f"the velocity changes by a factor of {np.exp(ratio):.3g} only at "
+                f"{motion.time[first]:.6g} s, which may be no step"
+                for ratio, (first, _) in zip(ratios, pieces[1:], strict=True)
+                if ratio < np.log(_CLEAR_RATIO)
+            ]
             break
-        del bounds[least + 1]
-    return bounds, doubts
-
-
-def _of_ripple(ratios: Array, path: Array) -> NDArray[np.bool_]:
-    """Unclear changes next to a piece with little of the slip at about its velocity."""
-    unclear = ratios < np.log(_CLEAR_RATIO)
-    # Pieces between clear changes are one group.
-    group = np.concatenate([[0], np.cumsum(~unclear)])
-    share = path / np.maximum(np.bincount(group, path)[group], 1e-300)
-    return np.asarray(unclear & (np.minimum(share[1:], share[:-1]) < _RIPPLE))
-
-
-def _of_one_stop(speeds: Array, duration: Array, noise: float) -> NDArray[np.bool_]:
-    """Changes within one stop: noise moves both pieces, or a gauge that wanders to and fro.
-
-    What wanders is slow as a hold is: the next faster pieces on both sides say.
-    """
-    speed = np.abs(speeds)
-    still = speed * duration <= 2 * _STILL * noise
-    one = still[1:] & still[:-1]
-    for k in np.flatnonzero((still[1:] | still[:-1] | (speeds[1:] * speeds[:-1] < 0)) & ~one):
-        fastest = max(speed[k], speed[k + 1])
-        sides = (side[side > fastest] for side in (speed[:k][::-1], speed[k + 2 :]))
-        faster = [float(side[0]) for side in sides if side.size]
-        one[k] = bool(faster) and fastest < _HOLD * min(faster)
-    return np.asarray(one)
-
-
-def _share_of_ramp(
-    k: int, duration: Array, path: Array, speeds: list[float], noise: float
-) -> float:
-    """Share that a piece has of the largest pieces at the two ends of its change of velocity."""
-    rising = abs(speeds[k + 1]) > abs(speeds[k])
-    ends = []
-    for step in (-1, 1):
-        j, largest = k + step, [0.0, 0.0]
-        towards = rising if step > 0 else not rising
-        last = abs(speeds[k])
-        while 0 <= j < len(speeds) and (abs(speeds[j]) > last) == towards:
-            largest = [max(largest[0], float(duration[j])), max(largest[1], float(path[j]))]
-            last, j = abs(speeds[j]), j + step
-        ends.append(largest)
-    span, slid = (min(end[n] for end in ends) for n in (0, 1))
-    return float(max(duration[k] / max(span, 1e-300), path[k] / max(slid, 10 * noise)))
+        i, j, share = transition
+        doubts += [
+            f"{_duration(motion, pieces[k]):.3g} s at {1e6 * abs(speeds[k]):.3g} um/s from "
+            f"{motion.time[pieces[k][0]]:.6g} s on are read as the transition between two "
+            "velocities, and may be a segment"
+            for k in range(i + 1, j)
+            if share > _TRANSITION
+            or _course(motion, pieces[k], speeds[k], (speeds[i], speeds[j])) == "even"
+        ]
+        del pieces[i + 1 : j], speeds[i + 1 : j]
+    return pieces, doubts
 
 
 def _transition(
-    bounds: list[int], duration: Array, path: Array, speeds: list[float], noise: float
+    motion: _Motion, pieces: list[Piece], speeds: list[float]
 ) -> tuple[int, int, float] | None:
-    """The least of the transitions, the neighbour to join it to, and its share of that."""
-    least: tuple[int, int, float] | None = None
-    for k in range(len(speeds)):
-        neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
-        speed = abs(speeds[k])
-        if len(neighbours) == 2 and speed < 0.2 * min(abs(speeds[j]) for j in neighbours):
-            continue  # a stop is no transition, however short
-        spans, paths = (
-            [float(duration[j]) for j in neighbours],
-            [float(path[j]) for j in neighbours],
-        )
-        same = len(neighbours) == 2 and _log_ratio(speeds[k - 1], speeds[k + 1]) < np.log(_RATIO)
-        span, slid = (sum(spans), sum(paths)) if same else (min(spans), min(paths))
-        share = max(duration[k] / max(span, 1e-300), path[k] / max(slid, 10 * noise))
-        between = len(neighbours) == 2 and min(abs(speeds[j]) for j in neighbours) < speed < max(
-            abs(speeds[j]) for j in neighbours
-        )
-        if between:
-            share = min(share, _share_of_ramp(k, duration, path, speeds, noise))
-        few = between and bounds[k + 1] - bounds[k] <= _FEW_CELLS
-        near = min(neighbours, key=lambda j: _log_ratio(speeds[k], speeds[j]))
-        # Displacement of the contact, not of the machine, overshoots and settles after a step.
-        relative = max(
-            duration[k] / max(duration[near], 1e-300), path[k] / max(path[near], 10 * noise)
-        )
-        settles = (
-            len(neighbours) == 2
-            and relative < _SETTLING
-            and _log_ratio(speeds[k], speeds[near]) < np.log(_SETTLING_RATIO)
-            and _log_ratio(speeds[k], speeds[near])
-            < 0.7 * max(_log_ratio(speeds[k], speeds[j]) for j in neighbours)
-        )
-        limit = _RAMP if between else _DISTURBANCE if same else _TRANSITION
-        if share < limit or few:
-            relative = 0.0
-        elif not settles:
+    """The pieces on the two sides of the shortest transition, and its share of them."""
+    spans = [_duration(motion, piece) for piece in pieces]
+    slips = [abs(speed) * span for speed, span in zip(speeds, spans, strict=True)]
+    still = [_still(motion, *each) for each in zip(pieces, speeds, strict=True)]
+    shortest, transition = np.inf, None
+    for i, j in combinations(range(len(pieces)), 2):
+        low, high = sorted((speeds[i], speeds[j]))
+        inner = range(i + 1, j)
+        between = all(low <= speeds[k] <= high for k in inner)
+        span = float(motion.time[pieces[j][0]] - motion.time[pieces[i][1] - 1])
+        if not inner or not (between or j == i + 2) or span >= shortest:
             continue
-        if least is None or relative < least[2]:
-            least = k, near, float(relative)
-    return least
+        # A stop is no transition, however short.
+        slowest = min(abs(low), abs(high))
+        if any(still[k] and not _still(motion, pieces[k], slowest / 2) for k in inner):
+            continue
+        kinds = [_course(motion, pieces[k], speeds[k], (low, high)) for k in inner]
+        limit = _RAMP if "even" not in kinds else _TRANSITION
+        sides = [i, j]
+        if not between:
+            limit = _TRANSITION if kinds == ["settling"] else _OVERSHOOT
+            if kinds == ["settling"]:
+                sides = [min(sides, key=lambda k: _log_ratio(speeds[k], speeds[i + 1]))]
+        of = sum if _log_ratio(low, high) < np.log(_RATIO) else min
+        moved = [slips[k] for k in sides if not still[k]]
+        share = span / of(spans[k] for k in sides)
+        share = max(share, sum(slips[k] for k in inner) / of(moved) if moved else np.inf)
+        if share < limit:
+            shortest, transition = span, (i, j, share)
+    return transition
 
 
-def _small_changes(time: Array, pieces: list[tuple[int, int]], speeds: list[float]) -> list[str]:
-    return [
-        f"the velocity changes by a factor of {np.exp(_log_ratio(a, b)):.3g} only at "
-        f"{time[first]:.6g} s, which may be no step"
-        for (a, b), (first, _) in zip(pairwise(speeds), pieces[1:], strict=True)
-        if _log_ratio(a, b) < np.log(_CLEAR_RATIO)
-    ]
+def _course(motion: _Motion, piece: Piece, speed: float, ends: tuple[float, float]) -> str:
+    """Whether a velocity is "even" and none of those at the ends, "settling" to one, or either."""
+    change, uncertainty = _velocity_change(motion, piece)
+    between = min(ends) <= speed <= max(ends)
+    whole = abs(ends[1] - ends[0]) if between else min(abs(speed - end) for end in ends)
+    other = min(_log_ratio(speed, end) for end in ends) > np.log(_CLEAR_RATIO)
+    if other and abs(change) + 2 * uncertainty < whole / 2:
+        return "even"
+    return "settling" if abs(change) - 2 * uncertainty > whole / 2 else ""
 
 
 def _log_ratio(a: float, b: float) -> float:
-    """Log of the ratio of two speeds; infinite where they differ in direction."""
-    small, large = sorted((abs(a), abs(b)))
-    if large <= 0:
+    """Log of the ratio of two speeds; infinite where they differ in direction, or one is zero."""
+    if a == b:
         return 0.0
-    if a * b < 0 and small > 0.05 * large:
-        return np.inf
-    return float(np.log(large / max(small, 1e-12 * large)))
+    return float(abs(np.log(a / b))) if a * b > 0 else np.inf
 
 
-def _refined(
-    time: Array,
-    displacement: Array,
-    friction: Array,
-    before: tuple[int, int],
-    after: tuple[int, int],
-    edges: NDArray[np.intp],
-) -> Cut:
-    """The instant of a change of velocity."""
-    cut = after[0]
-    cell = int(np.searchsorted(edges, cut))
-    lines = []
-    first, last = (int(np.searchsorted(edges, end)) for end in (before[0], after[1]))
-    if time.size > _LONG:
-        # The cells at the ends of a piece, long ones in a hold, may hold a part of the next one.
-        first, last = first + (first > 0), last - (last < edges.size - 1)
+def _intersection(motion: _Motion, before: Piece, after: Piece) -> Cut:
+    """Where the lines of displacement on the two sides of a cut intersect."""
+    middles = [(piece[0] + piece[1]) // 2 for piece in (before, after)]
+    step = abs(_velocity(motion, after) - _velocity(motion, before))
+    # A motor does not run evenly: the lines are as long as noise asks for.
+    long = _LINE * max(motion.slow_noise, motion.step) / max(step, 1e-300)
+    time = motion.time
+    first = int(np.searchsorted(time, time[before[1] - 1] - long))
+    last = int(np.searchsorted(time, time[after[0]] + long))
     sides = (
-        (before, int(edges[max(cell - 8, first)]), int(edges[max(cell - 1, 0)])),
-        (after, int(edges[min(cell + 1, edges.size - 1)]), int(edges[min(cell + 8, last)])),
+        (max(before[0], min(first, before[1] - 16)), before[1]),
+        (after[0], min(after[1], max(last, after[0] + 16))),
     )
-    for piece, low, high in sides:
-        if high - low < 4 or low < piece[0] or high > piece[1]:
-            # A piece of few cells, such as a short hold: all but its ends.
-            margin = (piece[1] - piece[0]) // 5
-            low, high = piece[0] + margin, piece[1] - margin
-        if high - low < 4:
-            return Cut(float(time[cut]), cut)
-        t, x = time[low:high], displacement[low:high]
-        slope = _velocity(time, displacement, low, high)
-        middle = float(t.mean())
-        left = x - x.mean() - slope * (t - middle)
-        if time.size > _LONG and left.size > _MANY:
-            # Of many samples, what counts is the scatter of their means.
-            left = left[: left.size // _MEANS * _MEANS].reshape(_MEANS, -1).mean(axis=1)
-        lines.append((slope, float(x.mean()) - slope * middle, float(left.std()), low, high))
-    (v1, c1, s1, low, _), (v2, c2, s2, _, high) = lines
+    (v1, t1, x1, s1), (v2, t2, x2, s2) = (
+        (
+            _velocity(motion, side),
+            float(time[slice(*side)].mean()),
+            float(motion.displacement[slice(*side)].mean()),
+            2 * motion.slow_noise / np.sqrt(side[1] - side[0]),
+        )
+        for side in sides
+    )
+    middle = float(time[before[1] - 1] + time[after[0]]) / 2
     if v1 == v2:
-        return Cut(float(time[cut]), cut)
-    at = (c1 - c2) / (v2 - v1)
-    if not time[low] < at < time[high - 1]:
-        at = float(time[cut])
-    doubt = 2 * float(np.hypot(s1, s2)) / abs(v2 - v1)
-    at = _kink_of_friction(
-        time, friction, at, doubt, float(time[before[0]]), float(time[after[1] - 1])
-    )
-    sample = int(np.clip(np.searchsorted(time, at), before[0] + 4, after[1] - 4))
-    return Cut(at, sample, doubt)
+        return Cut(middle, after[0])
+    at = middle + (x1 - x2 + v1 * (middle - t1) - v2 * (middle - t2)) / (v2 - v1)
+    if not time[middles[0]] < at < time[middles[1]]:
+        at = middle
+    doubt = 2 * float(np.hypot(np.hypot(s1, s2), motion.step / np.sqrt(12))) / abs(v2 - v1)
+    return Cut(at, int(np.searchsorted(time, at)), doubt)
 
 
-def _kink_of_friction(
-    time: Array, friction: Array, at: float, doubt: float, first: float, last: float
-) -> float:
-    """The time near `at` at which friction begins to change; `at` if none stands out."""
-    near = int(np.searchsorted(time, at))
-    steps = np.diff(time[max(near - 12, 0) : near + 12])
-    if not steps.size or doubt < float(steps.min()):
-        return at
-    reach = 2 * doubt
-    low, high = max(at - 6 * reach, first), min(at + 4 * reach, last)
-    a, b = np.searchsorted(time, [low, high])
-    t, f = time[a:b], friction[a:b]
-    calm = t < at - reach
-    if t.size < 16 or calm.sum() < 3:
-        return at
-    # Up to the peak friction leaves its level in one direction.
-    away = np.abs(np.convolve(f - np.median(f[calm]), np.ones(3) / 3, mode="same"))
-    away[calm] = 0.0
-    peak = max(int(np.argmax(away)) + 1, int(calm.sum()) + 8)
-    t, f = t[:peak], f[:peak]
-    if t.size < 12:
-        return at
-    tried = np.linspace(max(at - reach, t[2]), min(at + reach, t[-4]), 61)
-    best, kink = np.inf, at
-    level = float(np.sum((f - np.polyval(np.polyfit(t - at, f, 1), t - at)) ** 2))
-    for begin in tried:
-        turn = np.clip(t - begin, 0, None)
-        # A straight beginning that may bend: the peak may lie within reach.
-        columns = np.stack([np.ones_like(t), turn, turn**2], axis=1)
-        beta, *_ = np.linalg.lstsq(columns, f)
-        misfit = float(np.sum((f - columns @ beta) ** 2))
-        if misfit < best:
-            best, kink = misfit, float(begin)
-    # Correlated noise makes a kink too: half of the scatter has to go.
-    return kink if best < 0.5 * level else at
-
-
-def _holds(
-    time: Array,
-    displacement: Array,
-    pieces: list[tuple[int, int]],
-    speeds: list[float],
-    noise: float,
-) -> tuple[list[bool], list[str]]:
-    holds, doubts = [], []
-    for k, (first, stop) in enumerate(pieces):
+def _speeds(
+    motion: _Motion, pieces: list[Piece]
+) -> tuple[tuple[float, ...], tuple[bool, ...], list[str]]:
+    """Velocities, zero where noise explains the motion; which segments are holds; and doubts."""
+    speeds = [_velocity(motion, piece) for piece in pieces]
+    speeds = [
+        0.0 if _still(motion, *each) else each[1] for each in zip(pieces, speeds, strict=True)
+    ]
+    holds, doubts = [False] * len(pieces), []
+    for k, (piece, speed) in enumerate(zip(pieces, speeds, strict=True)):
         neighbours = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
         if not neighbours:
-            holds.append(False)
             continue
-        share = abs(speeds[k]) / max(min(neighbours), 1e-300)
-        moved = abs(float(displacement[stop - 1] - displacement[first]))
-        still = share < _HOLD or (share < 0.2 and moved < _CELL_NOISE * noise)
-        holds.append(bool(still))
-        if not still and share < _MAYBE_HOLD:
+        share = abs(speed) / max(min(neighbours), 1e-300)
+        change, uncertainty = _velocity_change(motion, piece)
+        since = f"from {motion.time[piece[0]]:.6g} s on the velocity"
+        # What creeps in a hold slows down.
+        steady = abs(change) + 2 * uncertainty < abs(speed) / 2
+        holds[k] = speed == 0 or (share < _HOLD and not steady)
+        if holds[k]:
+            continue
+        if share < _HOLD:
             doubts.append(
-                f"from {time[first]:.6g} s on the velocity is {100 * share:.2g} % of its "
-                "neighbours': read as sliding, it may be meant as a hold"
+                f"{since} is {100 * share:.2g} % of its neighbours': read as sliding, it may be "
+                "meant as a hold"
             )
-    return holds, doubts
-
-
-def _without_rounding(
-    time: Array, pieces: list[tuple[int, int]], speeds: list[float], noise: float
-) -> list[float]:
-    """Velocities, zero where the displacement moves by no more than its noise."""
-    kept = []
-    for (first, stop), speed in zip(pieces, speeds, strict=True):
-        moved = abs(speed) * float(time[stop - 1] - time[first])
-        kept.append(0.0 if moved <= 2 * _STILL * noise else speed)
-    return kept
+        if abs(change) - 3 * uncertainty > np.log(_CLEAR_RATIO) * abs(speed):
+            doubts.append(f"{since} changes by {100 * abs(change / speed):.2g} % within a segment")
+    return tuple(speeds), tuple(holds), doubts

@@ -227,9 +227,9 @@ def _between(
     a, b = np.searchsorted(time, span)
     tenth = max((b - a) // 10, 1)
     rise = float(np.mean(force[b - tenth : b]) - np.mean(force[a : a + tenth])) / 0.9
-    loads = rise > _LOADED * slope * (span[1] - span[0])
-    kind: Kind = "loading" if loads else "steady sliding"
-    share = rise / (slope * (span[1] - span[0]))
+    load = slope * (span[1] - span[0])
+    share = rise / load if load else np.nan
+    kind: Kind = "loading" if rise > _LOADED * load else "steady sliding"
     text = f"no event in {(span[1] - span[0]) / cycle:.3g} cycles"
     if np.isfinite(share):
         text += f", and the force rises by {100 * share:.2g} % of what the sticks load in that time"

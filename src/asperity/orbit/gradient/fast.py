@@ -1,7 +1,7 @@
 """The fast methods within a compiled program: orbits without derivatives, then their response.
 
-Orbits, and the periodic factors of their fundamental matrices, are fixed points of contractions:
-`asperity.algebra.contraction` has the rule of their derivatives.
+Orbits are fixed points of contractions: `asperity.algebra.contraction` has the rule of their
+derivatives. The multipliers are functions of the Jacobian along the orbit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations, contracted, implicit_solution
 from asperity.algebra.small_systems import Matrix, inverse_points
-from asperity.orbit.floquet import differentiable_log_multipliers
+from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.balance import BalanceEquations, balanced_orbit
 from asperity.orbit.methods.fourier import (
@@ -33,6 +33,7 @@ from asperity.orbit.methods.fourier import (
     load_cycle,
     orbit_error,
     rates_on,
+    stretched,
     together,
 )
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
@@ -58,8 +59,6 @@ class FastOrbits(NamedTuple):
     ----------
     unknowns : pytree
         Of the equations of the method.
-    floquet : pytree or None
-        Of those of the Floquet factor, where multipliers are wanted.
     prepared : tuple
         Data of the linear systems of the derivatives.
     valid, converged : bool array, shape (points,)
@@ -67,7 +66,6 @@ class FastOrbits(NamedTuple):
     """
 
     unknowns: Any
-    floquet: Any
     prepared: tuple
     valid: Array
     converged: Array
@@ -122,47 +120,30 @@ def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Arra
     cycle = load_cycle(load, _NODES, _GRADING)
     good &= orbit_error(system, cycle, orbit, program.harmonics) < _ERROR
     unknowns = FourierUnknowns(orbit.mean, orbit.zero_mean)
-    floquet, more_steps = None, jnp.zeros_like(orbit.steps)
     if program.multipliers:
-        J = _stretched(FourierEquations(_NODES, _GRADING), problem, unknowns)
-        floquet, converged, more_steps = floquet_factor(_NODES, J, _MOST_STEPS)
-        good &= converged
-        floquet = jax.tree.map(lambda a: jnp.where(good, a, 0.0), floquet)
+        J = FourierEquations(_NODES, _GRADING).jacobian(problem, unknowns)
+        good &= floquet_form(stretched(cycle, J), cycle.integral, factor=True).converged
     # Other points get states with finite equations, so that no NaN reaches a good point.
     steady = system.steady()
     mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
     zero_mean = tuple(jnp.where(good, a, 0.0) for a in orbit.zero_mean)
-    return FastOrbits(
-        FourierUnknowns(mean, zero_mean), floquet, (orbit.steps, more_steps), valid, good
-    )
+    return FastOrbits(FourierUnknowns(mean, zero_mean), (orbit.steps,), valid, good)
 
 
 def _fourier_values(
     problem: Problem, fast: FastOrbits, program: Program
 ) -> tuple[Array, Array, Array]:
     equations = FourierEquations(_NODES, _GRADING)
-    unknowns = implicit_solution(equations, (problem, fast.prepared[0]), fast.unknowns)
+    unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
+    cycle = equations.cycle(problem)
     mean, harmonics = force_spectrum(
-        problem.system,
-        equations.cycle(problem),
-        unknowns.mean,
-        unknowns.zero_mean,
-        program.harmonics,
+        problem.system, cycle, unknowns.mean, unknowns.zero_mean, program.harmonics
     )
     logs = jnp.zeros((0, *mean.shape), dtype=complex)
     if program.multipliers:
-        J = _stretched(equations, problem, unknowns)
-        floquet = FloquetEquations(_NODES)
-        q = implicit_solution(floquet, (J, fast.prepared[1]), fast.floquet)
-        exponent = jnp.stack([jnp.stack(row) for row in means(floquet.product(J, q))])
-        logs = differentiable_log_multipliers(2 * jnp.pi * exponent)
+        J = stretched(cycle, equations.jacobian(problem, unknowns))
+        logs = log_multipliers_along(J, cycle.integral)
     return mean, harmonics, logs
-
-
-def _stretched(equations: FourierEquations, problem: Problem, unknowns: FourierUnknowns) -> Any:
-    """Derivatives of the rates per unit of tau."""
-    stretch = equations.cycle(problem).stretch[:, None]
-    return [[stretch * entry for entry in row] for row in equations.jacobian(problem, unknowns)]
 
 
 def _balanced_orbits(problem: Problem, program: Program, valid: Array, good: Array) -> FastOrbits:
@@ -180,7 +161,7 @@ def _balanced_orbits(problem: Problem, program: Program, valid: Array, good: Arr
     steady = equations.steady(problem)
     unknowns = jax.tree.map(lambda a, s: jnp.where(good, a, s), orbit.unknowns, steady)
     prepared = jax.tree.map(lambda a: jnp.where(good, a, 0.0), orbit.prepared)
-    return FastOrbits(unknowns, None, (prepared, orbit.steps), valid, good)
+    return FastOrbits(unknowns, (prepared, orbit.steps), valid, good)
 
 
 def _balanced_values(
@@ -194,8 +175,6 @@ def _balanced_values(
 
 #: Iterations of a linear system in addition to those that the orbit took.
 _MORE_STEPS = 1
-#: Last change of the Floquet factor.
-_FLOQUET_TOLERANCE = 1e-11
 
 
 class FourierUnknowns(NamedTuple):
@@ -289,66 +268,6 @@ class FourierEquations(Equations):
         contract = backwards if transposed else forwards
         turned = jax.tree.map(jnp.transpose, right)
         return jax.tree.map(jnp.transpose, contracted(contract, turned, steps, points_first=True))
-
-
-@dataclass(frozen=True)
-class FloquetEquations(Equations):
-    """Equations of the periodic factor Q = 1 + q of the fundamental matrix, q of zero mean.
-
-        dq/dtau = J (1 + q) - (1 + q) L,     L = < J (1 + q) >.
-
-    The parameters are J, [i][j] of shape (nodes, points), per unit of tau, and the steps to take.
-    """
-
-    nodes: int
-
-    def product(self, J: Matrix, q: Matrix) -> Matrix:
-        """J (1 + q)."""
-        n = range(len(J))
-        return [[J[i][c] + sum(J[i][j] * q[j][c] for j in n) for c in n] for i in n]
-
-    def slope(self, J: Matrix, q: Matrix) -> Matrix:
-        """dq/dtau."""
-        n, P = range(len(J)), self.product(J, q)
-        L = means(P)
-        return [[P[i][c] - L[i][c] - sum(q[i][k] * L[k][c] for k in n) for c in n] for i in n]
-
-    def prepare(self, parameters: tuple[Matrix, Array], unknowns: Matrix) -> tuple[None, Array]:
-        """The steps to take."""
-        return None, parameters[1] + _MORE_STEPS
-
-    def residual(self, parameters: tuple[Matrix, Array], unknowns: Matrix, at: None) -> Matrix:
-        """Q minus the result of one iteration step from it."""
-        integral = grid(self.nodes)[1]
-        slope = self.slope(parameters[0], unknowns)
-        return [
-            [q - integral @ s for q, s in zip(*rows, strict=True)]
-            for rows in zip(unknowns, slope, strict=True)
-        ]
-
-
-def floquet_factor(nodes: int, J: Matrix, max_steps: int) -> tuple[Matrix, Array, Array]:
-    """q, whether it converged (points,), and the number of steps."""
-    equations, integral = FloquetEquations(nodes), grid(nodes)[1]
-    zero = [[jnp.zeros_like(entry) for entry in row] for row in J]
-
-    def body(carry: tuple) -> tuple:
-        q, _, steps = carry
-        new = [[integral @ s for s in row] for row in equations.slope(J, q)]
-        change = jnp.stack([jnp.abs(d).max(0) for d in jax.tree.leaves(_less(new, q))]).max(0)
-        return new, change, steps + 1
-
-    def unfinished(carry: tuple) -> Array:
-        _, change, steps = carry
-        return (steps < max_steps) & jnp.any((change > _FLOQUET_TOLERANCE) & (change < 1e3))
-
-    q, change, steps = jax.lax.while_loop(unfinished, body, (zero, jnp.ones(J[0][0].shape[1]), 0))
-    return q, change <= _FLOQUET_TOLERANCE, steps
-
-
-def means(entries: Matrix) -> Matrix:
-    """Means over tau, entries of shape (points,)."""
-    return [[entry.mean(0) for entry in row] for row in entries]
 
 
 def _less(a: Any, b: Any) -> Any:

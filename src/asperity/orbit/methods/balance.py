@@ -22,13 +22,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from asperity.algebra.contraction import Equations
 from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
-from asperity.loads import Excitation
+from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
+    error_of,
     grid,
     load_cycle,
     spectrum,
@@ -51,8 +53,6 @@ FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
 _AVERAGED_TOLERANCE = 1e-2
-#: Share of the elastic swing below which it is beyond a resonance with the modulation.
-_LEAST_SWING = 0.2
 
 
 class BalanceUnknowns(NamedTuple):
@@ -386,9 +386,7 @@ def _iterate(
         far = jnp.any((last > _NEAR) & ~jnp.isnan(last))
         at = jax.lax.cond(far, prepare, lambda _: at, unknowns)
         new, change = equations.bounded_step(problem, cycle, unknowns, at)
-        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-        error = jnp.where(change < _ROUND_OFF, change, error)
+        error = error_of(change, last, _ROUND_OFF)
         # Further steps change converged points by round-off only.
         error = jnp.where(reached <= tolerance, reached, error)
         return new, at, change, error, steps + 1
@@ -413,23 +411,58 @@ def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
 
 def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
     """The averaged limit of a slider that swings on its asperities without slip."""
-    system, _ = problem
+    system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
-    cycle, D, c = equations.cycle(problem), equations.derivative, _coefficients(problem)
-    matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (c.damping * c.elastic)
-    matrix = matrix + np.eye(equations.nodes)[..., None] * (cycle.at.w + c.ratio)[:, None]
-    inverse = inverse_by_elimination(matrix)
-    swing = inverse.sum(1)
-    usable = (swing * (1 + c.ratio) > _LEAST_SWING).all(0)
-    swing = jnp.where(usable, swing, 1 / (cycle.at.w + c.ratio))
-    shear = _times(inverse, cycle.at.shear + jnp.zeros_like(swing))
-    shear = jnp.where(usable, shear / swing, cycle.at.shear)
-    averaged = averaged_limit(
-        quasi_static,
-        cycle.at._replace(w=1 / swing - c.ratio, shear=shear),
-        cycle.share,
-        tolerance=_AVERAGED_TOLERANCE,
-    )
+    cycle, c = equations.cycle(problem), _coefficients(problem)
+    swing = 1 / (cycle.at.w + c.ratio)
+    if isinstance(load, Harmonic):
+        turn = 1j * SWING_ORDERS[:, None]
+        impedance = turn * c.elastic * (turn * c.inertness + c.damping)
+        elastic, _ = elastic_swing(load, impedance, 1 + c.ratio, cycle.theta[:, None])
+        usable = (elastic * (1 + c.ratio) > LEAST_SWING).all(0)
+        swing = jnp.where(usable, elastic, swing)
+    at = cycle.at._replace(w=1 / swing - c.ratio)
+    averaged = averaged_limit(quasi_static, at, cycle.share, tolerance=_AVERAGED_TOLERANCE)
     zero = jnp.zeros_like(swing)
-    friction = swing * (averaged.centre[0] + shear)
+    friction = swing * (averaged.centre[0] + cycle.at.shear)
     return BalanceUnknowns(averaged.centre, (zero,) * len(averaged.centre), friction)
+
+
+#: Orders of the harmonics of the elastic swing.
+SWING_ORDERS = np.arange(1, 13)
+#: Share of the elastic swing below which it is beyond a resonance with the modulation.
+LEAST_SWING = 0.2
+
+
+def elastic_swing(
+    load: Harmonic, impedance: Array, carried: ArrayLike, theta: np.ndarray
+) -> tuple[Array, Array]:
+    """F_i/W of a joint that sticks, over the force that stretches spring and joint.
+
+    Its harmonics obey (carried + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0}, a
+    three-term recurrence, whose minimal solution is a continued fraction.
+
+    Parameters
+    ----------
+    load : Harmonic
+    impedance : complex array, shape (orders, points)
+        Of `SWING_ORDERS`.
+    carried : array, shape (points,)
+        The same at rest.
+    theta : array, shape (nodes, 1)
+
+    Returns
+    -------
+    swing : array, shape (nodes, points)
+    waves : complex array, shape (orders, nodes, points)
+        Its parts, of which the real parts count.
+    """
+    half, ratios = 0.5 * load.epsilon, []
+    last = jnp.zeros_like(impedance[0])
+    for at_order in impedance[::-1]:
+        last = -half / (carried + at_order + half * last)
+        ratios.append(last)
+    mean = 1 / (carried + 2 * half * last.real)
+    harmonics = 2 * mean * jnp.cumprod(jnp.stack(ratios[::-1]), axis=0)
+    waves = harmonics[:, None] * np.exp(1j * SWING_ORDERS[:, None, None] * theta)
+    return mean + waves.real.sum(0), waves

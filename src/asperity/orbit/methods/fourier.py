@@ -17,9 +17,7 @@ Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the
 States and rates are tuples with an array for each state, not stacks: a stack is written to memory
 before it is read, and access to memory limits these programs.
 
-Mean, harmonics and the logarithm of the monodromy matrix are read on the same grid. A periodic
-change of variables makes the linearised equations ones of constant coefficients L (Floquet); the
-multipliers are exp(2 pi eig L).
+Mean, harmonics and the logarithm of the monodromy matrix are read on the same grid.
 """
 
 from __future__ import annotations
@@ -38,6 +36,7 @@ from asperity._jax import jit_large
 from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
+from asperity.orbit.floquet import floquet_form
 from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.observables import Observables, waveform
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -59,7 +58,10 @@ _LOOKED_AT = slice(1, None, 3)
 
 
 class FourierOrbit(NamedTuple):
-    """A `PeriodicOrbit` on the grid theta = tau + g sin(tau), one array for each state.
+    """An orbit on the grid theta = tau + g sin(tau), one array for each state.
+
+    A zero-mean part of 1e-9 of the mean keeps its digits, and hundreds of points fit into the cache
+    of a core; `asperity.orbit.mesh.mesh.Orbit` is for orbits that are steep.
 
     Attributes
     ----------
@@ -187,6 +189,13 @@ def _largest_change(change: States, new: States, old: States, kappa: Array) -> A
     return jnp.stack([moved[0] / size, *moved[1:], *map(jnp.abs, change)]).max(0)
 
 
+def error_of(change: Array, last: Array, round_off: float) -> Array:
+    """Error after a change, from the one before: r / (1 - r) of it if a step contracts by r."""
+    contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
+    error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
+    return jnp.where(change < round_off, change, error)
+
+
 def fourier_orbit(
     system: QuasiStatic,
     load: Modulation,
@@ -239,13 +248,9 @@ def fourier_orbit(
         rates, push = jax.linearize(rates_of, *together(mean, zero_mean))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
         change = _largest_change(moved, new, zero_mean, system.kappa)
-        # The error of a contraction by r is r / (1 - r) times the last change.
-        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-        error = jnp.where(change < _ROUND_OFF, change, error)
+        error = error_of(change, last, _ROUND_OFF)
         # Further steps change converged points by round-off only.
-        error = jnp.where(reached <= tolerance, reached, error)
-        return mean, new, change, error, steps + 1
+        return mean, new, change, jnp.where(reached <= tolerance, reached, error), steps + 1
 
     mean, zero_mean, change, error, steps = jax.lax.while_loop(
         unfinished, body, (averaged.centre, zero, far, far, 0)
@@ -255,8 +260,9 @@ def fourier_orbit(
     )
 
 
-#: Estimated error of L.
-_FLOQUET_ERROR = 1e-10
+def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:
+    """Derivatives of the rates per unit of tau, from those per radian."""
+    return [[cycle.stretch[:, None] * entry for entry in row] for row in J]
 
 
 def fourier_observables(
@@ -265,7 +271,6 @@ def fourier_observables(
     orbit: FourierOrbit,
     *,
     harmonics: int,
-    max_steps: int,
 ) -> tuple[Observables, Array]:
     """Observables of a converged orbit, and their estimated error, (points,).
 
@@ -278,8 +283,6 @@ def fourier_observables(
     orbit : FourierOrbit
     harmonics : int
         Their number.
-    max_steps : int
-        Bound on the steps of the Floquet iteration.
     """
     cycle = load_cycle(load, len(orbit.zero_mean[0]), orbit.grading)
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
@@ -287,20 +290,20 @@ def fourier_observables(
     _, push = jax.linearize(rates_on(system, cycle), *states)
     J = jacobian(push, states)
     trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
-    exponent, converged = _floquet_exponent(cycle, J, max_steps)
+    floquet = floquet_form(stretched(cycle, J), cycle.integral)
     error = orbit_error(system, cycle, orbit, harmonics)
     zero = jnp.zeros_like(mean)
     observables = Observables(
         mean,
         phasors,
-        jnp.full_like(exponent, jnp.nan),
+        jnp.full_like(floquet.exponent, jnp.nan),
         zero,
         2 * jnp.pi * trace,
-        2 * jnp.pi * exponent,
+        floquet.exponent,
         jnp.full_like(mean, jnp.inf),
         orbit.start,
     )
-    return observables, jnp.where(converged, error, jnp.inf)
+    return observables, jnp.where(floquet.converged, error, jnp.inf)
 
 
 def orbit_error(
@@ -358,63 +361,6 @@ def truncation(waves: Array, harmonics: int) -> Array:
     return power[2:].max(0) / (scale + 1e-300)
 
 
-def _floquet_exponent(cycle: LoadCycle, J: Matrix, max_steps: int) -> tuple[Array, Array]:
-    """A matrix L such that exp(2 pi L) is similar to the monodromy matrix.
-
-    Parameters
-    ----------
-    cycle : LoadCycle
-    J : matrix of arrays, shape (nodes, points)
-        Derivatives of the rates to the states, from `jacobian`.
-    max_steps : int
-        Bound on the number of steps.
-
-    Returns
-    -------
-    L : array, shape (size, size, points)
-    converged : bool array, shape (points,)
-
-    Notes
-    -----
-    Let J be per unit of tau, L its mean and q the zero-mean antiderivative of J - L. With
-    y = (1 + q) z, the equation dy/dtau = J y becomes
-
-        dz/dtau = R z,      R = (1 + q)^-1 (L + J q),
-
-    and R varies less than J by a factor of the size of L and q. A step does this with the R of the
-    last one. By averaging, the error of L is the square of what still varies.
-    """
-    n = range(len(J))
-
-    def step(carry: tuple) -> tuple:
-        R, L, last, _, steps = carry
-        q = [[cycle.integral @ (R[i][j] - L[i][j]) for j in n] for i in n]
-        driven = [[L[i][j] + sum(R[i][k] * q[k][j] for k in n) for j in n] for i in n]
-        inverse = inverse_points([[q[i][j] + float(i == j) for j in n] for i in n])
-        R = [[sum(inverse[i][k] * driven[k][j] for k in n) for j in n] for i in n]
-        new = _means(R)
-        change = jnp.stack([jnp.abs(new[i][j] - L[i][j]) for i in n for j in n]).max(0)
-        return R, new, change, jnp.minimum(change, change**2 / (last + 1e-300)), steps + 1
-
-    def unfinished(carry: tuple) -> Array:
-        *_, change, error, steps = carry
-        # What diverges becomes large or NaN, and ends the iteration.
-        going = (error > _FLOQUET_ERROR) & (change < 1e3)
-        return (steps < max_steps) & jnp.any(going)
-
-    J = [[cycle.stretch[:, None] * entry for entry in row] for row in J]
-    none = jnp.zeros(J[0][0].shape[1])
-    start = (J, _means(J), none + 1.0, none + 1.0, 0)
-    _, L, _, error, _ = jax.lax.while_loop(unfinished, step, start)
-    return jnp.stack([jnp.stack(row) for row in L]), error <= _FLOQUET_ERROR
-
-
-def _means(entries: Matrix) -> Matrix:
-    """Means over tau, as products with a vector: XLA's reductions would be slower."""
-    share = np.full(len(entries[0][0]), 1 / len(entries[0][0]))
-    return [[share @ entry for entry in row] for row in entries]
-
-
 @partial(jit_large, static_argnames=("nodes", "grading", "harmonics"))
 def fast_solve(
     problem: Problem, *, nodes: int, grading: float, harmonics: int
@@ -441,7 +387,7 @@ def _fast_block(
     orbit = fourier_orbit(
         system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
     )
-    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics, max_steps=40)
+    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics)
     each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
     return observables, error, orbit._replace(**each)
 

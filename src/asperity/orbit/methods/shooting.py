@@ -1,4 +1,4 @@
-"""Shooting: Newton's method on a coarse division of the period, and refinement of the orbit.
+"""Shooting: Newton's method on the states at theta = 0.
 
 1. Newton's method from the averaged limit, on a coarse division of the period.
 2. The orbit on finer divisions, each with twice the steps of the one before, until mean, harmonics
@@ -12,20 +12,12 @@ of Dormand and Prince, all operating points in lock step and without step-size c
 S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (Springer, 1993),
 section II.5. The derivatives at the end of the period are the monodromy matrix.
 
-The initial guess is the averaged limit of a slider that swings on its asperities. While the joint
-sticks, spring force f and slider obey
-
-    dv/dtheta = m (f - w g - d v),      dg/dtheta = s v - c (g - <g>),
-
-g = F_i/W, m the mobility, d the damping, s the strain, c a mean relaxation by slip. Under
-w = 1 + eps cos(theta) the harmonics of g = f G follow from a three-term recurrence, whose minimal
-solution is a continued fraction. The averaged limit under the load 1/G, which asks the same
-friction of the contacts, then gives f and the states of the law.
+The initial guess is the averaged limit of a slider that swings on its asperities, as that of
+`asperity.orbit.methods.balance`, with a mean relaxation by slip.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -37,11 +29,12 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.runge_kutta import dormand_prince_8
-from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns
+from asperity.algebra.small_systems import jacobian_columns, solve_columns
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import Indices, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
+from asperity.orbit.methods.balance import LEAST_SWING, SWING_ORDERS, elastic_swing
 from asperity.orbit.observables import Observables, response_gap, waveform_of
 from asperity.orbit.solution import Float, Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
@@ -49,11 +42,8 @@ from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 from asperity.theory.averaged import averaged_limit
 
-#: Samples of the load for the averaged limit, and harmonics of G.
-_NODES, _HARMONICS = 48, 12
-
-#: G below this is beyond a resonance with the modulation itself, where the start means nothing.
-_LEAST = 0.2
+#: Samples of the load for the averaged limit.
+_NODES = 48
 
 
 @jit_large
@@ -67,12 +57,15 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     w, velocity = at.w * points, jnp.zeros((_NODES, 1))
     softening = _softening(problem, points)
     if isinstance(load, Harmonic):
-        swing, velocity_swing = _elastic_swing(problem, system.strain * softening, theta)
-        usable = (swing > _LEAST).all(0)
+        relaxing = 1j * SWING_ORDERS[:, None] + system.strain * softening
+        drag = 1j * SWING_ORDERS[:, None] / system.mobility + system.damping
+        swing, waves = elastic_swing(load, drag * relaxing / system.strain, 1.0, theta)
+        usable = (swing > LEAST_SWING).all(0)
         # Without inertia the joint carries z / (w + l): the load under which that is z G / (1 + l).
         ratio = quasi_static.compliance_ratio
         w = jnp.where(usable, (1 + ratio) / jnp.where(usable, swing, 1.0) - ratio, w)
-        velocity = jnp.where(usable, velocity_swing, 0.0)
+        moving = (waves * relaxing[:, None]).real.sum(0) / system.strain
+        velocity = jnp.where(usable, moving, 0.0)
     centre = averaged_limit(quasi_static, at._replace(w=w), np.full(_NODES, 1 / _NODES)).centre
     Y = jnp.stack(centre)[:, None]
     force = quasi_static.force(Y, Excitation(points)) + 0 * w
@@ -96,25 +89,6 @@ def _softening(problem: Problem, points: Array) -> Array:
     return jax.jvp(lambda Y: system.log_slip(Y, Excitation(points)), (steady,), (carried,))[1]
 
 
-def _elastic_swing(problem: Problem, relaxation: Array, theta: np.ndarray) -> tuple[Array, Array]:
-    """G and the part of v/V that follows f, over f, at the phases `theta`, (nodes, points)."""
-    system, half = problem.system, 0.5 * problem.load.epsilon
-    ratios: list[Array] = []  # of a harmonic to the one before, highest first
-    last = jnp.zeros_like(relaxation, dtype=complex)
-    for n in range(_HARMONICS, 0, -1):
-        inertia = (1j * n / system.mobility + system.damping) * (1j * n + relaxation)
-        last = -half / (1 + inertia / system.strain + half * last)
-        ratios.append(last)
-    harmonic = 1 / (1 + 2 * half * last.real) + 0j
-    swing, velocity = harmonic.real, 0.0
-    for n, ratio in enumerate(reversed(ratios), 1):
-        harmonic = harmonic * ratio
-        wave = 2 * harmonic * np.exp(1j * n * theta)
-        swing = swing + wave.real
-        velocity = velocity + ((1j * n + relaxation) * wave).real
-    return swing, velocity / system.strain
-
-
 class _Divisions(NamedTuple):
     """Numbers of steps in the period, coarse to fine."""
 
@@ -136,14 +110,14 @@ _DIVISIONS = (
 #: arrays share cache lines.
 _CHUNK, _FEW = 240, 24
 
-#: Newton steps on the coarse division, the largest change of an exponent in one, and the change
-#: below which its square is small enough to go on.
-_NEWTON_STEPS, _LARGEST_CHANGE, _NEAR = 12, 3.0, 2e-2
+#: Newton steps on a division, and the largest change of an exponent in one.
+_NEWTON_STEPS, _LARGEST_CHANGE = 12, 3.0
+#: Newton change on the coarse division below which its square is small enough to go on, and largest
+#: ones where a finer division is compared with the next, and where it is the finer of two.
+_NEAR, _CLOSED, _ACCEPTED = 2e-2, 1e-6, 1e-9
 #: Chord steps on a finer division, which shrink a change by a hundred and more, and the change
 #: below which there need be no further one.
 _CHORDS, _NEARLY_CLOSED = 4, 1e-5
-#: Largest remaining Newton change: where two divisions are compared, and on the finer one.
-_CLOSED, _ACCEPTED = 1e-6, 1e-9
 #: Agreement of two divisions, relative; the finer one is then good to 2e-6 / 2^8.
 _AGREEMENT = 2e-6
 #: Agreement of the determinant with Liouville's formula, a check of the finer division alone.
@@ -173,130 +147,115 @@ class Shooting(Method):
         rows = np.argsort(relaxation, kind="stable")
         for divisions in _DIVISIONS:
             chosen = rows[relaxation[rows] <= divisions.fastest]
-            if len(chosen):
-                _Refinement(problem, solution, options, divisions, guess.copy()).run(chosen)
+            _refine(problem, solution, options, divisions, guess.copy(), chosen)
             rows = rows[~solution.converged[rows]]
         return solution
 
 
-class _Refinement:
-    """The orbits of some points on finer and finer divisions; arrays have points last."""
+def _refine(
+    problem: Problem,
+    solution: Solution,
+    options: SearchOptions,
+    divisions: _Divisions,
+    first: Float,
+    rows: Indices,
+) -> None:
+    """Solve the points that divisions resolve, on finer and finer ones until two agree.
 
-    def __init__(
-        self,
-        problem: Problem,
-        solution: Solution,
-        options: SearchOptions,
-        divisions: _Divisions,
-        guess: Float,
-    ) -> None:
-        size, points = guess.shape
-        self.problem, self.solution = problem, solution
-        self.options, self.divisions = options, divisions
-        self.first = guess
-        self.inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
-        # Results on the previous division; NaN where the orbit did not close.
-        self.numbers = np.full((1 + options.harmonics, points), np.nan + 0j)
-        self.logs = np.full((size, points), np.nan + 0j)
-
-    def run(self, rows: Indices) -> None:
-        """Refine the orbits of `rows` from the coarse division to the first two that agree."""
-        rows = self._near_orbits(rows)
-        for count in self.divisions.finer:
-            rows, left = self._closed(rows, count), []
-            for members, reached in self._passes(rows, count):
-                resolved = self._compare(members, reached, count)
-                good = ~resolved & np.isfinite(reached.step).all(0)
-                self.first[:, members[good]] += reached.step[:, good]
-                left.append(members[good])
-            rows = _joined(left)
-
-    def _steps(self, count: int) -> Steps:
-        return period_steps(count, self.divisions.grading, self.options.harmonics)
-
-    def _passes(self, rows: Indices, count: int) -> Iterator[tuple[Indices, PeriodIntegration]]:
-        """Integrate `rows` on `count` steps; the inverse is kept for chord steps."""
-        solve = partial(newton_pass, steps=self._steps(count))
-        for members, reached in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
-            self.inverse[..., members] = reached.inverse
-            yield members, reached
-
-    def _near_orbits(self, rows: Indices) -> Indices:
-        """Newton's method on the coarse division; returns the rows that it brings near an orbit."""
-        near = []
+    Parameters
+    ----------
+    problem : Problem
+    solution : Solution
+        Receives orbits.
+    options : SearchOptions
+    divisions : _Divisions
+    first : array, shape (size, points)
+        Guess of the first states; changed.
+    rows : array of int
+        In the order in which they are solved.
+    """
+    size, points = first.shape
+    inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
+    # Results on the previous division; NaN before the first.
+    numbers = np.full((1 + options.harmonics, points), np.nan + 0j)
+    logs = np.full(first.shape, np.nan + 0j)
+    limits = (_NEAR, _CLOSED, *[_ACCEPTED] * len(divisions.finer))
+    for count, limit in zip((divisions.coarse, *divisions.finer), limits, strict=False):
+        steps = period_steps(count, divisions.grading, options.harmonics)
+        if limit < _NEAR:
+            rows = _chords(problem, first, inverse, rows, steps)
+        unresolved = []
         for _ in range(_NEWTON_STEPS):
             far = []
-            for members, reached in self._passes(rows, self.divisions.coarse):
-                leap = reached.leap
-                good = np.isfinite(leap) & np.isfinite(reached.step).all(0)
-                damping = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(leap[good], 1e-300))
-                self.first[:, members[good]] += damping * reached.step[:, good]
-                near.append(members[good & (leap < _NEAR)])
-                far.append(members[good & (leap >= _NEAR)])
-            rows = _joined(far)
-        return _joined(near)
-
-    def _closed(self, rows: Indices, count: int) -> Indices:
-        """Chord steps on a finer division; returns the rows whose orbits they close."""
-        solve, closed = partial(chord_step, steps=self._steps(count)), []
-        for _ in range(_CHORDS):
-            far = []
-            inputs = (self.problem, self.first, self.inverse)
-            for members, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
-                good = np.isfinite(change)
-                self.first[:, members[good]] = start[:, good]
-                closed.append(members[change < _NEARLY_CLOSED])
-                far.append(members[good & (change >= _NEARLY_CLOSED)])
-            rows = _joined(far)
-        return _joined(closed)
-
-    def _compare(
-        self, members: Indices, reached: PeriodIntegration, count: int
-    ) -> NDArray[np.bool_]:
-        """Compare with the division before; writes the points that agree and returns which do."""
-        zero = np.zeros(len(members))
-        observables = Observables(
-            reached.mean_friction,
-            reached.harmonics,
-            reached.monodromy,
-            zero,
-            reached.log_determinant,
-            np.full_like(reached.monodromy, np.nan),
-            zero,
-            self.first[:, members],
-        )
-        numbers, logs = observables.numbers, observables.log_multipliers
-        determinant = np.linalg.det(np.moveaxis(reached.monodromy, -1, 0))
-        with np.errstate(all="ignore"):
-            liouville = np.abs(determinant * np.exp(-reached.log_determinant) - 1)
-        resolved = (reached.change <= _ACCEPTED) & (liouville <= _LIOUVILLE)
-        resolved &= response_gap(self.numbers[:, members], numbers) <= _AGREEMENT
-        resolved &= multiplier_gap(self.logs[:, members], logs) <= _AGREEMENT
-        self.numbers[:, members] = np.where(reached.change <= _CLOSED, numbers, np.nan)
-        self.logs[:, members] = logs
-        kept = np.flatnonzero(resolved)
-        rows = members[kept]
-        if len(rows):
-            self.solution.store(rows, take(observables, kept), logs[:, kept])
-            self._sample(rows, count)
-            self.solution.iterations[rows] = count
-            self.options.progress(len(rows))
-        return resolved
-
-    def _sample(self, rows: Indices, count: int) -> None:
-        phases = self.options.phases
-        if phases:
-            solve = partial(
-                shot_waveform,
-                steps=self._steps(count),
-                count=count,
-                grading=self.divisions.grading,
-                phases=phases,
-            )
-            for members, samples in run_chunks(
-                solve, (self.problem, self.first), rows, _chunk(rows)
+            for members, reached in run_chunks(
+                partial(newton_pass, steps=steps), (problem, first), rows, _chunk(rows)
             ):
-                self.solution.waveform[..., members] = samples
+                inverse[..., members] = reached.inverse
+                finite = np.isfinite(reached.leap) & np.isfinite(reached.step).all(0)
+                closed = np.flatnonzero(finite & (reached.change <= limit))
+                at, agreed = members[closed], np.zeros(len(closed), bool)
+                if limit < _NEAR:
+                    observed = take(reached.observables, closed)
+                    agreed = _agreed(observed, numbers[:, at], logs[:, at])
+                    agreed &= reached.change[closed] <= _ACCEPTED
+                    numbers[:, at], logs[:, at] = observed.numbers, observed.log_multipliers
+                    kept = np.flatnonzero(agreed)
+                    solution.store(at[kept], take(observed, kept))
+                    solution.iterations[at[kept]] = count
+                    options.progress(len(kept))
+                    _sample(problem, solution, first, at[kept], steps, divisions.grading)
+                shortened = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(reached.leap, 1e-300))
+                first[:, members[finite]] += (shortened * reached.step)[:, finite]
+                unresolved.append(at[~agreed])
+                far.append(members[finite & (reached.change > limit)])
+            rows = _joined(far)
+        rows = _joined(unresolved)
+
+
+def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps: Steps) -> Indices:
+    """Chord steps with the matrices of a coarser division, in place; the rows left finite."""
+    solve, nearly = partial(chord_step, steps=steps), []
+    for _ in range(_CHORDS):
+        far = []
+        inputs = (problem, first, inverse)
+        for members, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
+            good = np.isfinite(change)
+            first[:, members[good]] = start[:, good]
+            nearly.append(members[change < _NEARLY_CLOSED])
+            far.append(members[good & (change >= _NEARLY_CLOSED)])
+        rows = _joined(far)
+    return _joined([*nearly, rows])
+
+
+def _agreed(
+    observed: Observables, numbers: NDArray[np.complex128], logs: NDArray[np.complex128]
+) -> NDArray[np.bool_]:
+    """Which points have the numbers of the division before, and Liouville's determinant."""
+    determinant = np.linalg.det(np.moveaxis(observed.monodromy, -1, 0))
+    with np.errstate(all="ignore"):
+        liouville = np.abs(determinant * np.exp(-observed.log_determinant) - 1)
+    agreed = response_gap(numbers, observed.numbers) <= _AGREEMENT
+    agreed &= multiplier_gap(logs, observed.log_multipliers) <= _AGREEMENT
+    return np.asarray(agreed & (liouville <= _LIOUVILLE))
+
+
+def _sample(
+    problem: Problem,
+    solution: Solution,
+    first: Float,
+    rows: Indices,
+    steps: Steps,
+    grading: float,
+) -> None:
+    """Write the waveforms of the points `rows`, if any are wanted."""
+    phases = solution.waveform.shape[1]
+    if not phases:
+        return
+    solve = partial(
+        shot_waveform, steps=steps, count=int(steps.number), grading=grading, phases=phases
+    )
+    for members, samples in run_chunks(solve, (problem, first), rows, _chunk(rows)):
+        solution.waveform[..., members] = samples
 
 
 def _chunk(rows: Indices) -> int:
@@ -322,16 +281,27 @@ class Steps(NamedTuple):
 
 
 class PeriodIntegration(NamedTuple):
-    """Result of an integration over the period from given initial states."""
+    """Result of an integration over the period from given initial states.
 
-    step: Array  # (size, points): Newton's, to be added to the first states
-    leap: Array  # (points,): what it does to the slip exponent and logarithmic states
-    change: Array  # (points,): what it does to these and to the velocity; inf if the slider sticks
-    inverse: Array  # (size, size, points): of 1 less the monodromy matrix
-    monodromy: Array  # (size, size, points)
-    log_determinant: Array  # of the monodromy matrix, by Liouville's formula
-    mean_friction: Array
-    harmonics: Array  # complex, (harmonics, points)
+    Attributes
+    ----------
+    observables : Observables
+        Of an orbit if the period closes.
+    step : array, shape (size, points)
+        Newton's, to be added to the first states.
+    leap : array, shape (points,)
+        What it does to the slip exponent and logarithmic states.
+    change : array, shape (points,)
+        What it does to these and to the velocity; inf if the slider sticks.
+    inverse : array, shape (size, size, points)
+        Of 1 less the monodromy matrix.
+    """
+
+    observables: Observables
+    step: Array
+    leap: Array
+    change: Array
+    inverse: Array
 
 
 def period_steps(count: int, grading: float, harmonics: int) -> Steps:
@@ -390,17 +360,7 @@ def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
 def chord_step(
     problem: Problem, start: Array, inverse: Array, *, steps: Steps
 ) -> tuple[Array, Array]:
-    """One chord step: first states, and the change as in `PeriodIntegration`.
-
-    Parameters
-    ----------
-    problem : Problem
-    start : array, shape (size, points)
-        First states.
-    inverse : array, shape (size, size, points)
-        `PeriodIntegration.inverse` of orbits close by.
-    steps : Steps
-    """
+    """First states, and the change as in `PeriodIntegration`, by its `inverse` of orbits nearby."""
 
     def body(k: Array, flow: Any) -> Any:
         return _advance(problem, steps, k, flow)
@@ -438,26 +398,25 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
     (end, monodromy), spectrum, trace, slips = jax.lax.fori_loop(
         0, steps.number, body, ((start, identity), *nothing, jnp.ones(points, dtype=bool))
     )
-    inverse = _stacked(inverse_points([list(row) for row in identity - monodromy]))
+    inverse = solve_columns(identity - monodromy, identity)
     step = (inverse * (end - start)[None]).sum(1)
     leap, change = _changes(problem, start, step)
     constant, _ = problem.system.force_split(start, jnp.zeros_like(start), problem.load.at(0.0))
     cosine, sine = jnp.split(spectrum[1:], 2)
-    return PeriodIntegration(
-        step,
-        leap,
-        # An interface that sticks for part of the period has kinks, which no high order resolves.
-        jnp.where(slips, change, jnp.inf),
-        inverse,
-        monodromy,
-        2 * jnp.pi * trace,
+    zero = jnp.zeros_like(trace)
+    observables = Observables(
         constant + spectrum[0],
         2 * jax.lax.complex(cosine, sine),
+        monodromy,
+        zero,
+        2 * jnp.pi * trace,
+        jnp.full_like(monodromy, jnp.nan),
+        zero,
+        start,
     )
-
-
-def _stacked(matrix: Matrix) -> Array:
-    return jnp.stack([jnp.stack(row) for row in matrix])
+    # An interface that sticks for part of the period has kinks, which no high order resolves.
+    change = jnp.where(slips, change, jnp.inf)
+    return PeriodIntegration(observables, step, leap, change, inverse)
 
 
 def _trace(problem: Problem, theta: Array, states: Array) -> Array:

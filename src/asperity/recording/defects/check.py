@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.recording.defects.levels import saturated
+from asperity.recording.defects.levels import CROWDED, saturated
 from asperity.recording.defects.sampling import check_sampling, even_rate, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "usable_rows"]
+__all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "saturation", "usable_rows"]
 
 #: Names of the findings of `check`; a reader has further ones.
 CHECKED = frozenset(
@@ -70,7 +70,7 @@ def check(trace: Trace) -> tuple[Finding, ...]:
         findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
         for name, channel in trace.channels.items():
             findings += _missing(channel.values, trace.time, name)
-            findings += _saturation(channel.values, trace.time, name)
+            findings += saturation(channel.values, trace.time, name)
             findings += _spikes(channel.values, trace.time, name)
     return tuple(findings)
 
@@ -99,8 +99,17 @@ def _missing(values: Array, time: Array, name: str) -> list[Finding]:
     return findings
 
 
-def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
-    """Findings ``"saturation"`` for the top and the bottom, or ``"constant"``."""
+def saturation(values: Array, time: Array, name: str, crowded: float = CROWDED) -> list[Finding]:
+    """Findings ``"saturation"`` for the top and the bottom, or ``"constant"``.
+
+    Parameters
+    ----------
+    values, time : array, (n,)
+    name : str
+        Of the channel.
+    crowded : float
+        As of `saturated`.
+    """
     finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
     if finite.size < 2:
         return []
@@ -124,7 +133,7 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
             f"{level.side} value, {level.value:.6g}, and at most {level.usual} at any value next "
             "to it: saturated, or kept there by a command.",
         )
-        for level in saturated(values)
+        for level in saturated(values, crowded)
     ]
 
 

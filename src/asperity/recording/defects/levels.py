@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _LEVELS = 3
 #: Saturation needs this ratio of samples at the extreme to samples at the next level. A quantised
 #: smooth extreme has a ratio up to 2.4 (parabola) or 5.3 (fourth power).
-_CROWDED = 8
+CROWDED = 8
 _FEWEST = 5
 #: So many equal samples in a row are no chance where the values next to them occur once.
 _IN_A_ROW = 3
@@ -49,13 +49,15 @@ class Saturated(NamedTuple):
     usual: int
 
 
-def saturated(values: Array) -> list[Saturated]:
+def saturated(values: Array, crowded: float = CROWDED) -> list[Saturated]:
     """Extremes at which the channel has more samples than an unsaturated signal.
 
     Parameters
     ----------
     values : array, shape (n,)
         NaN where unknown. A channel of three values or fewer, such as a switch, has no flat top.
+    crowded : float
+        Ratio of the samples at the extreme to those at the next levels that is saturation.
     """
     finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
     result: list[Saturated] = []
@@ -71,10 +73,10 @@ def saturated(values: Array) -> list[Saturated]:
         if usual is None:
             continue
         rows = np.flatnonzero(at_extreme)
-        crowded = count >= _FEWEST and count > _CROWDED * usual
+        full = count >= _FEWEST and count > crowded * usual
         later = rows[_IN_A_ROW - 1 :]
         in_a_row = bool(np.any(later - rows[: later.size] == _IN_A_ROW - 1))
-        if crowded or (usual == 1 and in_a_row):
+        if full or (usual == 1 and in_a_row):
             result.append(Saturated(side, extreme, rows, usual))
     return result
 

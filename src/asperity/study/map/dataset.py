@@ -16,10 +16,6 @@ from asperity.study.outcome import Answers
 from asperity.study.responses import bifurcation_kinds, is_stable
 from asperity.theory import closed_forms as cf
 
-#: Laws whose steady sliding loses stability at a stiffness known in closed form.
-_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
-_ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
-
 _POINT = "boundary_point"
 _CONVENTION = "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)"
 
@@ -99,21 +95,15 @@ def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
     u = np.linspace(0.0, 1.0, other.count)
     where = np.stack([u, 0 * u] if other is plane.x else [0 * u, u], axis=-1)
     values = plane.values(where)
-    if np.any(values["eta"] > 0):
-        return {}
-    heavy, name = bool(np.any(values["inertia"])), plane.law.name
-    rigid = name in _RIGID or (name in _ELASTIC and not np.any(values["lambda"]))
-    if not rigid and (heavy or name not in _ELASTIC):
+    elastic: Any = values.get("lambda", np.zeros(1))
+    form = cf.critical_stiffness_form(
+        plane.law.name, elastic=bool(np.any(elastic)), inertia=bool(np.any(values["inertia"]))
+    )
+    if form is None or np.any(values["eta"] > 0):
         return {}
     numbers: dict[str, Any] = {n: values[n] for n in ("A", "B", "D0", "K", "W0", "V", "M")}
-    elastic: Any = values.get("lambda", np.zeros(1))
     numbers |= {"mu": values["mu0"], "omega": 2 * np.pi * values["frequency"]}
-    p = cf.SmallModulation(**numbers, lambda_=elastic)
-    if not rigid:
-        critical = cf.critical_stiffness_elastic(p, _ELASTIC[name])
-    else:
-        critical = cf.critical_stiffness_inertial(p) if heavy else cf.critical_stiffness(p)
-    return {other.name: np.asarray(critical)}
+    return {other.name: np.asarray(form(cf.SmallModulation(**numbers, lambda_=elastic)))}
 
 
 def _coordinates(plane: MapPlane, origins: Mapping[str, str]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
@@ -67,20 +67,15 @@ class Axis:
             si = number(value, f"axis of {self.name}", parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
         if not self._ends[0] < self._ends[1]:
-            raise InputError(
-                f"axis of {self.name} must go from a smaller to a larger value, got "
-                f"{self.low:g} to {self.high:g}{_unit(parameter)}; write the smaller end first"
-            )
-        if self.count < 2:
-            raise InputError(
-                f"axis of {self.name} must have at least 2 points, got {self.count}; "
-                "choose 2 or more"
-            )
+            rule = "go from a smaller to a larger value"
+            got = f"{self.low:g} to {self.high:g}{_unit(parameter)}"
+            raise InputError(f"axis of {self.name}", rule, got, "write the smaller end first")
+        rule = "have at least 2 points"
+        require(self.count >= 2, f"axis of {self.name}", rule, self.count, "choose 2 or more")
         if self.log and not self._ends[0] > 0:
-            raise InputError(
-                f"axis of {self.name} must start above zero to be logarithmic, got "
-                f"{self.low:g}{_unit(parameter)}; raise its lower end or make it linear"
-            )
+            rule, got = "start above zero to be logarithmic", f"{self.low:g}{_unit(parameter)}"
+            advice = "raise its lower end or make it linear"
+            raise InputError(f"axis of {self.name}", rule, got, advice)
 
     @classmethod
     def parse(cls, text: str, log: bool = False) -> Axis:
@@ -93,17 +88,12 @@ class Axis:
         """
         match = _AXIS.fullmatch(text + " ")
         if match is None:
-            raise InputError(
-                f"axis must be NAME=LOW:HIGH:COUNT UNIT, got '{text}'; "
-                "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
-            )
+            advice = "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
+            raise InputError("axis", "be NAME=LOW:HIGH:COUNT UNIT", f"'{text}'", advice)
         name, low, high, count, unit = (part.strip() for part in match.groups())
         parameter = _parameter(name)
-        if parameter.unit and not unit:
-            raise InputError(
-                f"axis of {name} must carry a unit, got '{text}'; write it like "
-                f"'{name}={low}:{high}:{count} {parameter.unit}'"
-            )
+        advice = f"write it like '{name}={low}:{high}:{count} {parameter.unit}'"
+        require(not parameter.unit or unit, f"axis of {name}", "carry a unit", f"'{text}'", advice)
         return cls(name, f"{low} {unit}".strip(), f"{high} {unit}".strip(), int(count), log)
 
     @property
@@ -190,11 +180,8 @@ class MapPlane:
         values = {name: np.full(points, float(value)) for name, value in self.fixed.items()}
         values[self.x.name] = self.x.at(where[:, 0])
         values[self.y.name] = self.y.at(where[:, 1])
-        if without_mass(values).any():
-            raise InputError(
-                "M must be positive where inertia is included, got 0 kg; give the mass, as "
-                "M='1.6 kg'"
-            )
+        rule = "be positive where inertia is included"
+        require(not without_mass(values).any(), "M", rule, "0 kg", "give the mass, as M='1.6 kg'")
         return values
 
     def solve(self, where: Float, progress: Callable[[int], None] | None = None) -> Answers:

@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import get_law
 from asperity.operating_point import (
     SourcedNumber,
@@ -172,23 +172,18 @@ def _plane(
     law: str, numbers: Mapping[str, Any], x: Axis, y: Axis
 ) -> tuple[MapPlane, dict[str, str]]:
     """The checked plane, and the origin of each fixed number."""
-    if x.name == y.name:
-        raise InputError(
-            f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
-        )
+    rule = "be two numbers"
+    require(x.name != y.name, "axes", rule, f"'{x.name}' on both", "choose another one for y")
     refuse_foreign(law, {x.name: "", y.name: ""})
     known = point_parameters(get_law(law))
     known_numbers = sourced_numbers(numbers, None, law=law)
     for axis in (x, y):
         if axis.kind != known[axis.name].kind:
-            raise InputError(
-                f"axis of {axis.name} must be {KINDS[known[axis.name].kind].noun} for {law}, got "
-                f"{KINDS[axis.kind].noun}; another registered law has a parameter of that name"
-            )
-        if axis.name in known_numbers:
-            raise InputError(
-                f"{axis.name} must be given once, got an axis and a fixed value; leave one out"
-            )
+            rule = f"be {KINDS[known[axis.name].kind].noun} for {law}"
+            advice = "another registered law has a parameter of that name"
+            raise InputError(f"axis of {axis.name}", rule, KINDS[axis.kind].noun, advice)
+        rule, got = "be given once", "an axis and a fixed value"
+        require(axis.name not in known_numbers, axis.name, rule, got, "leave one out")
     known_numbers |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
     of_law = numbers_for(law, known_numbers)
     defaults = {

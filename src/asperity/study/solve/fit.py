@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law, get_law, registered
 from asperity.operating_point import respond
 from asperity.parameters import (
@@ -89,11 +89,9 @@ class FitSolve(SolveKind):
         table = _table(plan)
         free = _free(table)
         inertia = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
-        if "M" in free and not all(value in (True, "true", "yes", 1) for value in inertia):
-            raise InputError(
-                "fit.free must be parameters of the model, got 'M', which has no influence without "
-                "inertia; add inertia = true to parameters or fix M"
-            )
+        holds = "M" not in free or all(value in (True, "true", "yes", 1) for value in inertia)
+        rule, got = "be parameters of the model", "'M', which has no influence without inertia"
+        require(holds, "fit.free", rule, got, "add inertia = true to parameters or fix M")
         return {
             "free": free,
             "prior": _priors(plan, table, free),
@@ -145,10 +143,8 @@ def data_files(plan: Sweep) -> list[str]:
     """
     axis = [str(name) for name in plan.columns.get("data", ())]
     table = _table(plan)
-    if axis and table.data:
-        raise InputError(
-            "fit.data must be left out where an axis has data, got both; leave one of them out"
-        )
+    rule = "be left out where an axis has data"
+    require(not axis or not table.data, "fit.data", rule, "both", "leave one of them out")
     files = list(dict.fromkeys([*(table.data or ()), *axis]))
     if not files:
         raise InputError(
@@ -174,8 +170,7 @@ def _free(table: FitTable) -> list[str]:
     """Canonical names of the free parameters."""
     known = _known()
     names = [known_name(name, known, "fit.free") for name in table.free or ()]
-    if not names:
-        raise InputError("fit.free must name parameters, got none; write it like ['A', 'B']")
+    require(names, "fit.free", "name parameters", "none", "write it like ['A', 'B']")
     return list(dict.fromkeys(names))
 
 
@@ -190,9 +185,8 @@ def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list
         if prior is None:
             written[str(plan.folder / name) if name.endswith(".toml") else name] = prior
         elif canonical is None or canonical not in free:
-            raise InputError(
-                f"fit.prior must be of free parameters, got '{name}'; free it or leave it out"
-            )
+            rule = "be of free parameters"
+            raise InputError("fit.prior", rule, f"'{name}'", "free it or leave it out")
         else:
             written[canonical] = prior
     priors = priors_of(written, free)
@@ -219,11 +213,9 @@ def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> Loc
     """A table; its file must not have changed since the plan was checked."""
     from asperity.inference import read_table
 
-    if digest and _digest(Path(path)) != digest:
-        raise InputError(
-            f"data must not change while a sweep runs, got '{path}', which has changed since the "
-            "sweep began; restore the file, or choose another store"
-        )
+    rule, advice = "not change while a sweep runs", "restore the file, or choose another store"
+    got = f"'{path}', which has changed since the sweep began"
+    require(not digest or _digest(Path(path)) == digest, "data", rule, got, advice)
     # Without a digest only the columns are read, and any operating numbers serve.
     return read_table(path, dict(for_all) if digest else _OPERATING)
 

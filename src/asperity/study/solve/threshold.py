@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.laws import Law
 from asperity.parameters import Output
 from asperity.questions.sweep import Sweep
@@ -39,11 +39,8 @@ class ThresholdSolve(SolveKind):
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         low, high = plan.threshold.between
-        if not 0 < low < high:
-            raise InputError(
-                f"threshold.between must go from a softer to a stiffer spring, got {low:g} to "
-                f"{high:g}; write it like [0.3, 4.0]"
-            )
+        rule, got = "go from a softer to a stiffer spring", f"{low:g} to {high:g}"
+        require(0 < low < high, "threshold.between", rule, got, "write it like [0.3, 4.0]")
         return {"between": [low, high], "scan": plan.threshold.scan}
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:

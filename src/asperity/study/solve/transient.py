@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.loads import Programme
 from asperity.parameters import EXPERIMENT, Output, all_parameters
@@ -57,11 +57,8 @@ class TransientSolve(SolveKind):
         """As in `SolveKind`."""
         table = plan.transient
         assert table is not None  # a plan has the settings of its solve
-        if not table.numbers:
-            raise InputError(
-                "transient.numbers must have at least one number, got none; write it like "
-                "numbers.peak = { of = 'friction', take = 'max' }"
-            )
+        advice = "write it like numbers.peak = { of = 'friction', take = 'max' }"
+        require(table.numbers, "transient.numbers", "have at least one number", "none", advice)
         numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
         _check_steps(plan, table)
         return {
@@ -75,10 +72,8 @@ class TransientSolve(SolveKind):
     def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """The numbers that the plan names."""
         if plan.outputs is not None:
-            raise InputError(
-                "outputs must be left out where solve is 'transient', got "
-                f"{len(plan.outputs)}; transient.numbers names them"
-            )
+            rule = "be left out where solve is 'transient'"
+            raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
         return tuple(plan.transient.numbers) if plan.transient is not None else ()
 
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
@@ -162,10 +157,8 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     place = f"transient.numbers.{name}"
     one_of(entry.of, CHANNELS, f"{place}.of")
     one_of(entry.take, TAKEN, f"{place}.take")
-    if not name.isidentifier():
-        raise InputError(
-            f"{place} must have a name of letters, digits and underscores, got '{name}'; rename it"
-        )
+    rule = "have a name of letters, digits and underscores"
+    require(name.isidentifier(), place, rule, f"'{name}'", "rename it")
     times = {
         side: None if value is None else number(value, f"{place}.{side}", "time", "not negative")
         for side, value in (("from", entry.from_), ("to", entry.to))
@@ -179,10 +172,8 @@ def _check_steps(plan: Sweep, table: TransientTable) -> None:
     for line in table.steps:
         for _, name, *_ in string.Formatter().parse(line):
             if name is not None and name not in known:
-                raise InputError(
-                    f"transient.steps must name parameters in braces, got '{{{name}}}'; "
-                    f"{closest(name, known)}"
-                )
+                rule = "name parameters in braces"
+                raise InputError("transient.steps", rule, f"'{{{name}}}'", closest(name, known))
     examples = _WithUnits(dict.fromkeys(known, 0.5))
     _, mistakes = planned_steps([line.format_map(examples) for line in table.steps], plan.folder)
     if mistakes:

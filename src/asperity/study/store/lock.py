@@ -87,10 +87,9 @@ def _locked(path: Path) -> int:
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
-            raise InputError(
-                f"out must lie in a folder that can be written, got '{path}' "
-                f"({(error.strerror or str(error)).lower()}); choose another folder"
-            ) from None
+            rule = "lie in a folder that can be written"
+            got = f"'{path}' ({(error.strerror or str(error)).lower()})"
+            raise InputError("out", rule, got, "choose another folder") from None
         holder = _holder_of(path)
         held = _is_held(descriptor, holder, exclusive=True)
         # The last holder may have removed the file between the opening and the locking.

@@ -10,7 +10,6 @@ from asperity.air import (
     NormalContact,
     bessel_ratio,
     mindlin_length_ratio,
-    normal_length,
     shear_viscosity_ratio,
 )
 from asperity.ledger import check
@@ -28,15 +27,6 @@ def only_fitting_parameter(machine: Machine) -> Mixed:
     p = machine.numbers
     fitted = [n for n in ("A", "B", "D0", "lambda", "transmission") if p[n].kind == "fitted"]
     return {"fitted": len(fitted), "names": " and ".join(fitted)}
-
-
-@check("normal-length-of-roughness")
-@check("normal-length")
-def length_of_the_contacts(machine: Machine) -> Numbers:
-    """The unrounded length: the stated 0.4 um has one digit."""
-    p = machine.numbers
-    length = float(normal_length(p.lambda_, p.lambda_over_lambda_z))
-    return {"lambda_z": length, "over the roughness": length / p.roughness}
 
 
 def _contact(machine: Machine) -> NormalContact:
@@ -70,34 +60,6 @@ def measured_lambda(machine: Machine) -> Mixed:
     p = machine.numbers
     lengths = {"measured": str(p["lambda_quasi_static"]), "fitted": str(p["lambda"])}
     return {"quasi-static": p.lambda_quasi_static, **lengths}
-
-
-@check("gap")
-def gap(machine: Machine) -> Numbers:
-    return {"h0": machine.numbers.gap_over_roughness * machine.numbers.roughness}
-
-
-@check("radius-of-area")
-def radius_of_area(machine: Machine) -> Numbers:
-    return {"R": machine.nominal_radius, "area of 3.9 cm": np.pi * machine.numbers.R**2}
-
-
-@check("pressure-over-modulus")
-def pressure_over_modulus(machine: Machine) -> Numbers:
-    p = machine.numbers
-    pressure = p.W0 / p.Sigma0
-    return {"modulus": pressure / p.pressure_over_modulus, "pressure": pressure}
-
-
-@check("contact-pressure")
-def contact_pressure(machine: Machine) -> Numbers:
-    return {"pressure": machine.numbers.W0 / machine.numbers.Sigma0}
-
-
-@check("small-pressure")
-def small_pressure(machine: Machine) -> Numbers:
-    p, (_, epsilon) = machine.numbers, machine.range_of("epsilon_range")
-    return {"eps = 0.5": epsilon * p.W0 / p.Sigma0 / p.P0}
 
 
 # --- The formulas of the air layer, Eqs. (35) to (40) --------------------------------------------
@@ -225,21 +187,6 @@ def air_stiffer_than_contacts(machine: Machine) -> Numbers:
     return {"kappa_air/kappa_z": float(layer.stiffness) * p.lambda_z / p.W0}
 
 
-def _normal_frequency(machine: Machine) -> float:
-    p = machine.numbers
-    return float(np.sqrt(p.W0 / (p.lambda_z * p.M)) / (2 * np.pi))
-
-
-@check("normal-resonance")
-def normal_resonance(machine: Machine) -> Numbers:
-    return {"resonance": _normal_frequency(machine)}
-
-
-@check("normal-inertia")
-def normal_inertia(machine: Machine) -> Numbers:
-    return {"120 Hz": (machine.numbers.frequency / _normal_frequency(machine)) ** 2}
-
-
 @check("squeeze-number")
 def squeeze_number(machine: Machine) -> Numbers:
     layer = machine.air_layer()
@@ -356,8 +303,3 @@ def patch_radius(machine: Machine) -> Numbers:
         "R = 2.5 cm": machine.borne(p.frequency, patch),
         "air over vacuum": machine.borne(p.frequency_vacuum, patch) / vacuum,
     }
-
-
-@check("patch-area")
-def patch_area(machine: Machine) -> Numbers:
-    return {"area fraction": np.pi * machine.numbers.patch_radius**2 / machine.numbers.Sigma0}

@@ -35,19 +35,6 @@ Numbers = dict[str, float]
 # --- II.A: the machine, and the steadiness of sliding --------------------------------------------
 
 
-@check("spring-most-compliant")
-def most_compliant(machine: Machine) -> Numbers:
-    p = machine.numbers
-    lightest, _ = machine.range_of("W0_range")
-    return {"3 N": lightest / p.lambda_ / p.K, "7 N": p.W0 / p.lambda_ / p.K}
-
-
-@check("dead-weight")
-def dead_weight(machine: Machine) -> Numbers:
-    standard_gravity = 9.80665
-    return {"weight": machine.numbers.M * standard_gravity}
-
-
 @check("away-from-resonance")
 def away_from_resonance(machine: Machine) -> Numbers:
     p = machine.numbers
@@ -181,14 +168,6 @@ def two_orders(machine: Machine) -> Numbers:
 
 
 # --- II.B.3: the air under the slider, and the control experiment in vacuo -----------------------
-
-
-@check("sheared-air")
-def sheared_air(machine: Machine) -> Numbers:
-    p = machine.numbers
-    R, V = machine.nominal_radius, machine.velocities[1]
-    viscous = p.eta_air * V * np.pi * R**2 / p.h0
-    return {"10 um/s": viscous / (p.mu0 * p.W0)}
 
 
 @check("larger-in-vacuum")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from asperity.laws import LinkerDieterich
-from asperity.ledger import WORDS, check
+from asperity.ledger import check
 from asperity.theory import ageing_response
 from asperity.theory import closed_forms as cf
 from asperity_papers.bureau2000.checks.features import at_strongest, met, missed, over_the_range
@@ -89,35 +89,7 @@ def elastic_strain_relevant(machine: Machine) -> Numbers:
     return by_speed(a / b for a, b in zip(elastic, rigid, strict=True))
 
 
-@check("transmission-used")
-def transmission_used(machine: Machine) -> Numbers:
-    return {"used": machine.numbers.transmission}
-
-
 # --- The laws and what they imply ----------------------------------------------------------------
-
-
-def _fastness(machine: Machine, V: float) -> float:
-    p = machine.numbers
-    return 2 * np.pi * p.frequency * p.D0 / V
-
-
-@check("fast-at-the-data")
-def fast_at_the_data(machine: Machine) -> Numbers:
-    return by_speed(_fastness(machine, V) for V in machine.velocities)
-
-
-@check("fast-everywhere")
-def fast_everywhere(machine: Machine) -> Numbers:
-    _, top = machine.range_of("V_range")
-    ratio = _fastness(machine, top)
-    return {"100 um/s": ratio, "velocity at 10": top * ratio / WORDS["much larger"]}
-
-
-@check("rate-and-state-order")
-def rate_and_state_order(machine: Machine) -> Numbers:
-    p = machine.numbers
-    return {"A": p.A, "B": p.B, "B - A": p.B - p.A}
 
 
 @check("steady-age")
@@ -189,12 +161,6 @@ def age_jump(machine: Machine) -> Numbers:
         "printed": float(np.exp(law.log_age(state, step) - law.log_age(state, 1.0))),
         "independent": step ** (-machine.numbers.alpha / machine.numbers.B),
     }
-
-
-@check("no-loss-of-contact")
-def no_loss_of_contact(machine: Machine) -> Numbers:
-    _, largest = machine.range_of("epsilon_range")
-    return {"smallest W/W0": 1 - largest}
 
 
 @check("area-proportional-to-load")

@@ -33,11 +33,6 @@ def rice_ruina_drop_velocity(machine: Machine) -> Numbers:
     return {f"eps = {e:g}": relative(at(drop, e)) for e in (0.2, 0.35, STRONGEST)}
 
 
-@check("transmission-divisor")
-def transmission_divisor(machine: Machine) -> Numbers:
-    return {"1/2.1": 1 / machine.numbers.collapse_divisor_120Hz}
-
-
 @check("fitted-transmission")
 def fitted_transmission(machine: Machine) -> Numbers:
     return {"1 um/s": _share_for_the_drop(machine, RR, np.array([0.45, 0.5, 0.55]))}
@@ -113,13 +108,6 @@ def _low_alpha(machine: Machine) -> Outputs:
     return machine.outputs(LD, alpha=machine.numbers.alpha_low)
 
 
-@check("alpha-sizeable")
-def alpha_sizeable(machine: Machine) -> Numbers:
-    low, high = machine.range_of("alpha_granite")
-    mu0 = machine.numbers.mu0_granite
-    return {"alpha = 0.2": low / mu0, "alpha = 0.3": high / mu0}
-
-
 @check("alpha-significant")
 def alpha_significant(machine: Machine) -> Numbers:
     mu = float(machine.small_modulation(machine.velocities[1]).mu)
@@ -127,11 +115,6 @@ def alpha_significant(machine: Machine) -> Numbers:
     return {
         "mu1, small eps": abs(mu - machine.numbers.alpha) / mu - 1, "drop at eps = 0.5": drop
     }  # fmt: skip
-
-
-@check("alpha-estimate")
-def alpha_estimate(machine: Machine) -> Numbers:
-    return {"ratio": machine.numbers.alpha_low / machine.numbers.alpha}
 
 
 @check("drop-depends-on-alpha")
@@ -196,12 +179,6 @@ def alpha_upper_limit(machine: Machine) -> Numbers:
     return {"1 um/s": needed / measured, "needed": needed, "measured": measured, "loss": loss}
 
 
-@check("alpha-inferred")
-def alpha_inferred(machine: Machine) -> Numbers:
-    low, high = machine.range_of("alpha_granite")
-    return {"low": low, "high": high}
-
-
 # --- III.C: the elasto-plastic extension ---------------------------------------------------------
 
 
@@ -245,13 +222,6 @@ def inertia_negligible(machine: Machine) -> Numbers:
         for i, speed in enumerate(SPEEDS)
         for name, column in columns.items()
     }
-
-
-@check("lambda-within-uncertainty")
-def lambda_within_uncertainty(machine: Machine) -> Numbers:
-    p = machine.numbers
-    uncertainty = p["lambda_quasi_static"].si_uncertainty or np.nan
-    return {"distance": (p.lambda_ - p.lambda_quasi_static) / uncertainty}
 
 
 @check("mu1-most-sensitive")

@@ -44,41 +44,6 @@ def critical_pulsation(machine: Machine) -> Numbers:
     return {"printed": float(cf.critical_pulsation(point)), "independent": abs(growth.imag)}
 
 
-@check("inertial-pulsation")
-def inertial_pulsation(machine: Machine) -> Numbers:
-    point = machine.small_modulation(machine.velocities[1], M=machine.numbers.M)
-    return {"sqrt(K/M)": float(cf.inertial_pulsation(point))}
-
-
-@check("contrast")
-def contrast(machine: Machine) -> Numbers:
-    p = machine.numbers
-    return {"(B - A)/A": (p.B - p.A) / p.A}
-
-
-@check("critical-pulsation-number")
-def critical_pulsation_number(machine: Machine) -> Numbers:
-    point = machine.small_modulation(machine.velocities[1])
-    return {"10 um/s": float(cf.critical_pulsation(point))}
-
-
-@check("slow-bifurcation")
-def slow_bifurcation(machine: Machine) -> Numbers:
-    point = machine.small_modulation(machine.velocities[1], M=machine.numbers.M)
-    wc = float(cf.critical_pulsation(point))
-    return {"wc/w": wc / float(point.omega), "wc/w0": wc / float(cf.inertial_pulsation(point))}
-
-
-@check("stiffness-ratio")
-def stiffness_ratio(machine: Machine) -> Numbers:
-    p = machine.numbers
-    point = machine.small_modulation(machine.velocities[0], lambda_=p.lambda_)
-    return {
-        "K/Kc": p.K / float(cf.critical_stiffness(point)),
-        "elastic": p.K / float(cf.critical_stiffness_elastic(point)),
-    }
-
-
 @check("determinant-limit")
 def determinant_limit(machine: Machine) -> Numbers:
     p, V = machine.numbers, machine.velocities[1]
@@ -99,12 +64,6 @@ def inertia_negligible(machine: Machine) -> Numbers:
         )
         changes[name] = float(heavy / light) - 1
     return changes
-
-
-@check("velocity-gain")
-def velocity_gain(machine: Machine) -> Numbers:
-    mu0, (low, high) = machine.numbers.mu0, machine.ends_of("A")
-    return {"mu/A": mu0 / machine.numbers.A, "low": mu0 / high, "high": mu0 / low}
 
 
 @check("perturbation-out-of-reach")

@@ -14,12 +14,6 @@ Numbers = dict[str, float]
 _DAY = 86400.0
 
 
-@check("b-per-decade")
-def b_per_decade(laboratory: Laboratory) -> Numbers:
-    slope = laboratory.numbers.B_5 * DECADE
-    return {"slope": slope, "over about .01": slope / laboratory.numbers.healing_per_decade}
-
-
 @check("velocity-slope-of-gouge")
 def velocity_slope(laboratory: Laboratory) -> Numbers:
     printed = -laboratory.numbers.B_less_A_5 * DECADE
@@ -50,56 +44,12 @@ def slopes_differ(laboratory: Laboratory) -> Numbers:
     return {"low": float(slopes[0]), "high": float(slopes[1]), "model": p.B_5 / p.B_less_A_5}
 
 
-@check("stress-per-decade")
-def stress_per_decade(laboratory: Laboratory) -> Numbers:
-    p = laboratory.numbers
-    return {"MPa": 1e-6 * p.healing_per_decade * p.normal_stress}
-
-
-@check("fault-strength")
-def fault_strength(laboratory: Laboratory) -> Numbers:
-    return {"MPa": 1e-6 * laboratory.numbers.mu0 * laboratory.numbers.normal_stress}
-
-
-@check("complete-stress-drop")
-def complete_stress_drop(laboratory: Laboratory) -> Numbers:
-    p = laboratory.numbers
-    return {"percent": 100 * p.healing_per_decade / p.mu0}
-
-
-@check("seismic-healing")
-def seismic_healing(laboratory: Laboratory) -> Numbers:
-    # A stress drop s that grows to r s in a decade grows by (r - 1) s: s for 1 and 3 MPa.
-    return {
-        f"{rise:g} MPa, factor {r:g}": rise / (r - 1) for rise in (1.0, 3.0) for r in (2.0, 5.0)
-    }
-
-
-@check("scaled-memory-length")
-def scaled_memory_length(laboratory: Laboratory) -> Numbers:
-    return {"mm": 1e3 * laboratory.numbers.zeta * laboratory.numbers.shear_band}
-
-
-@check("shear-band-of-laboratory")
-def shear_band(laboratory: Laboratory) -> Numbers:
-    low, high = laboratory.pair("D0_laboratory")
-    band = 1e3 * np.array([low, high]) / laboratory.numbers.zeta
-    # Over the 0.1 and 1 mm that are printed.
-    return {"low": float(band[0] / 0.1), "high": float(band[1] / 1.0)}
-
-
 @check("intrinsic-and-dilation")
 def intrinsic_and_dilation(laboratory: Laboratory) -> Numbers:
     scan = scans()["figure_7"]
     bare, gouge = scan["bare"][0], np.array(scan["gouge"])
     needed = gouge[:, 0] - bare
     return {"needed low": float(needed.min()), "needed high": float(needed.max())}
-
-
-@check("dilation-too-small")
-def dilation_too_small(laboratory: Laboratory) -> Numbers:
-    low, high = laboratory.pair("strengthening")
-    return {"low": low / laboratory.numbers.dilation, "high": high / laboratory.numbers.dilation}
 
 
 @check("half-of-the-year")

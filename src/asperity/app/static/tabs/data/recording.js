@@ -5,16 +5,15 @@ import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copies, csv, saveFile } from "../../lib/save.js";
 import { Refused, run, sendFile } from "../../lib/server.js";
-import { scrolling, table } from "../../lib/tables.js";
+import { scrolling, sections, table } from "../../lib/tables.js";
 import { digits, quantity, withDoubt } from "../../lib/units.js";
-import { capital, count, ended } from "../../lib/words.js";
-import { stickSlip, stickSlipSentence } from "./stick_slip.js";
+import { capital, count, ended, names, typeset } from "../../lib/words.js";
+import { catalogue, stickSlip, stickSlipSentence } from "./stick_slip.js";
 
 const ROLE_NAMES = {
   time: "time", W: "normal load", F: "shear force", velocity: "velocity",
   displacement: "displacement", friction: "friction",
 };
-let numbered = 0;
 
 export class RecordingCard {
   constructor(page, known, state, { changed, removed }) {
@@ -22,7 +21,6 @@ export class RecordingCard {
     this.state = { key: state.key ?? null, name: state.name || "" };
     this.state.source = { columns: {}, units: {}, channels: {}, ...(state.source || {}) };
     this.state.options = { ...(state.options || {}) };
-    this.number = numbered += 1;
     this.result = null;
     this.recording = null;
     this.left = new Set(state.left || []); // rows that a fit leaves out
@@ -51,7 +49,8 @@ export class RecordingCard {
   }
 
   renamed() {
-    if (this.result) this.#draw();
+    // Tables are worded by the server.
+    if (this.result?.measured) this.measure();
   }
 
   rows() {
@@ -111,12 +110,12 @@ export class RecordingCard {
       const { mode, ...options } = this.state.options;
       if (mode === "stick-slip") options.stick_slip = true;
       else if (mode && mode !== "auto") options.modulated = mode === "modulated";
-      const last = await run("data/measure", { recording: this.state.key, source, options }, (part) => {
+      const last = await run("data/measure", { recording: this.state.key, source, options, names: names() }, (part) => {
         if (signal.aborted) return;
         if (part.waiting) this.#says("Waiting for another recording…");
         if (part.stage === "measuring") this.#says("Measuring…");
         if (part.recording) { this.recording = part.recording; this.#drawForms(); }
-      }, signal, `r${this.number}`);
+      }, signal);
       if (signal.aborted || !last.result) return;
       this.result = last.result;
       this.traced = null;
@@ -248,13 +247,13 @@ export class RecordingCard {
         copies(["Copy as Python", () => this.result.python], ["Copy as command", () => this.result.command]),
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
-      figures.readings,
       record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
         "The fit below uses it, with the window and the velocity steps above").element,
-      record.mode !== "stick-slip" && this.#rowTable(measured.rows),
+      measured.amplitudes && this.#amplitudes(measured),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
-      ...figures.tables || [],
-      this.#checks(record.checks), this.#findings());
+      ...sections(measured.sections, ` of ${this.state.name}`),
+      record.mode === "stick-slip" && catalogue(record, this.state.name),
+      this.#findings());
     for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
     return undefined;
   }
@@ -273,14 +272,10 @@ export class RecordingCard {
     if (measured.record.mode === "modulated") return this.#modulated(measured);
     if (measured.record.mode === "sliding") return this.#sliding(measured);
     const whole = this.#figure("whole", "The recording with its slip events", measured.curves.friction, ["time", "F/W"]);
-    return stickSlip(measured, whole, this.state.name);
+    return stickSlip(measured, whole);
   }
 
   #modulated({ record, curves }) {
-    const names = ["mean_friction", "delta_mu", ...Object.keys(record).filter((n) => /^(mu|phase)\d$/.test(n)), "epsilon", "frequency", "W0"];
-    const units = { frequency: "Hz", W0: record.unit };
-    const readings = el("dl", { class: "readings" }, names.filter((n) => record[n] !== null).map((n) => el("div", {},
-      el("dt", { title: n }, symbol(n)), el("dd", {}, `${withDoubt(record[n], record.uncertainties[n])} ${n.startsWith("phase") ? "rad" : units[n] || ""}`.trim()))));
     const whole = this.#figure("whole", "The recording", curves.force, ["time", "force over W0"]);
     const cycle = this.#figure("cycle", "Mean cycle", { x: curves.cycle.phase, y: curves.cycle.measured }, ["phase", "friction less mean"]);
     const spectrum = this.#figure("spectrum", "Spectrum of the residual", curves.spectrum, ["frequency", "amplitude"]);
@@ -288,7 +283,7 @@ export class RecordingCard {
     const bars = this.#figure("harmonics", "Harmonics", { x: amplitudes.map((_, i) => i + 1), y: amplitudes }, ["harmonic", "amplitude"]);
     const { start, end } = record.window;
     return {
-      readings, list: [whole, cycle, bars, spectrum],
+      list: [whole, cycle, bars, spectrum],
       charts: [
         [whole, { x: { label: "time (s)" }, rows: [
           { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
@@ -313,10 +308,6 @@ export class RecordingCard {
   }
 
   #sliding({ record, curves }) {
-    const readings = el("dl", { class: "readings" },
-      [["mean friction", withDoubt(record.friction.value, record.friction.uncertainty)],
-        ...(record.healing ? [["healing per decade", withDoubt(record.healing.per_decade, record.healing.uncertainty)]] : [])]
-        .map(([t, v]) => el("div", {}, el("dt", {}, t), el("dd", {}, v))));
     const whole = this.#figure("whole", "Friction, segments, steps and holds", curves.friction, ["time", "friction"]);
     const levels = record.segments.filter((s) => !s.hold).flatMap((s) => {
       // The steady level with its drift, and what both are at the beginning of the segment.
@@ -342,7 +333,7 @@ export class RecordingCard {
       const held = record.holds.map((h) => h.hold_time);
       charts.push([healing, { x: { label: "hold time (s)", log: true, range: [Math.min(...held) / 1.6, Math.max(...held) * 1.6] }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
     }
-    return { readings, list, charts };
+    return { list, charts };
   }
 
   #figure(kind, title, curve, [x, y]) {
@@ -361,36 +352,18 @@ export class RecordingCard {
     });
   }
 
-  /** The measured rows, each of which can be left out of a fit. */
-  #rowTable(rows) {
-    const modulated = rows.some((r) => r.kind === "amplitude");
-    const columns = modulated
-      ? [["epsilon", "ε"], ["frequency", "f (Hz)"], ["mean_friction", "mean μ"], ["delta_mu", "Δμ̄"], ["mu1", "μ₁"], ["phase1", "phase₁"], ["mu2", "μ₂"]]
-      : [["velocity_before", "V before"], ["velocity_after", "V after"], ["change", "change"], ["rate_dependence", "A − B"], ["hold_time", "hold (s)"], ["relaxation", "relaxation"], ["healing", "healing"]];
-    if (!rows.length) return el("p");
-    const cell = (row, n) => {
-      const value = row[n];
-      if (value === null || value === undefined) return "–";
-      if (n.startsWith("velocity")) return quantity(value, "velocity", 3);
-      return withDoubt(value, row[`${n}_uncertainty`] ?? (n === "rate_dependence" ? row.rate_uncertainty : null));
-    };
-    return scrolling(`What was measured of ${this.state.name}`, el("table", {},
-      el("thead", {}, el("tr", {}, [modulated ? "In fits" : "", "From (s)", ...columns.map(([, t]) => t), "Verdict"].map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
-      el("tbody", {}, rows.map((row, i) => {
-        const box = el("input", {
-          type: "checkbox", "aria-label": `Use part ${row.part} in fits`, change: () => { if (box.checked) this.left.delete(i); else this.left.add(i); this.changed(); },
-        });
-        box.checked = !this.left.has(i);
-        return el("tr", {}, el("td", {}, modulated && !row.reason ? box : ""), el("td", {}, digits(row.start, 6)),
-          row.reason ? el("td", { colspan: columns.length + 1 }, row.reason) : [...columns.map(([n]) => el("td", {}, cell(row, n))), el("td", { class: row.verdict }, row.verdict)]);
-      }))));
-  }
-
-  #checks(checks) {
-    const worst = checks.filter((c) => c.verdict === "bad" || c.verdict === "suspicious");
-    return el("details", { open: worst.length > 0 }, el("summary", {}, `Checks: ${checks.length - worst.length} good, ${worst.length} doubtful or bad`),
-      el("ul", { class: "checks" }, [...worst, ...checks.filter((c) => !worst.includes(c))].map((c) => el("li", { class: c.verdict },
-        el("span", { class: "badge" }, c.verdict), el("b", {}, c.name), ` ${ended(c.sentence)}`))));
+  /** The modulated parts, each of which can be left out of a fit. */
+  #amplitudes({ rows, amplitudes: [parts, notes] }) {
+    const boxed = parts.rows.map(([part, ...cells]) => {
+      const i = rows.findIndex((row) => String(row.part) === part);
+      const box = el("input", {
+        type: "checkbox", "aria-label": `Use part ${part} in fits`, change: () => { if (box.checked) this.left.delete(i); else this.left.add(i); this.changed(); },
+      });
+      box.checked = !this.left.has(i);
+      return [part, box, ...cells.map(typeset)];
+    });
+    const [first, ...others] = parts.head;
+    return el("div", {}, table([first, "in fits", ...others], boxed, `What was measured of ${this.state.name}`), ...sections([notes]));
   }
 
   #findings() {
@@ -406,13 +379,6 @@ export class RecordingCard {
     fill(this.forms);
     fill(this.body, sent.json ? [] : table(sent.header, sent.rows, sent.name, true));
   }
-}
-
-/** The symbol of a quantity. */
-function symbol(name) {
-  const symbols = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", epsilon: "ε", frequency: "frequency", W0: "W₀" };
-  const lowered = (digit) => "₀₁₂₃₄₅₆₇₈₉"[digit];
-  return symbols[name] || name.replace(/^mu(\d)$/, (_, d) => `μ${lowered(d)}`).replace(/^phase(\d)$/, (_, d) => `phase of μ${lowered(d)}`);
 }
 
 function errorBars(x, y, doubt) {

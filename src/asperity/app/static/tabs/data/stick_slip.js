@@ -4,7 +4,7 @@ import { Figure, series } from "../../lib/charts.js";
 import { el } from "../../lib/dom.js";
 import { csv, saveFile } from "../../lib/save.js";
 import { table } from "../../lib/tables.js";
-import { digits, quantity, withDoubt } from "../../lib/units.js";
+import { digits, withDoubt } from "../../lib/units.js";
 import { capital, count } from "../../lib/words.js";
 
 /** Events that are listed and drawn; the CSV has all. */
@@ -22,18 +22,9 @@ export function stickSlipSentence(record) {
     + (record.recurrence === undefined ? "" : `, every ${digits(record.recurrence, 3)} s`);
 }
 
-/** Readings, figures and tables of a stick-slip recording; `whole` is the figure of its trace. */
-export function stickSlip({ record, curves }, whole, name) {
+/** Figures of a stick-slip recording; `whole` is that of its trace. */
+export function stickSlip({ record, curves }, whole) {
   const events = record.catalogue.slice(0, MOST);
-  const spread = (n) => (record[`${n}_spread`] === null ? digits(record[n], 4) : `${digits(record[n], 3)} (spread ${digits(record[`${n}_spread`], 2)})`);
-  const readings = el("dl", { class: "readings" }, [
-    ["drop of F/W", "drop", ""], ["recurrence", "recurrence", " s"], ["stick time", "stick_duration", " s"], ["slip time", "slip_duration", " s"],
-  ].filter(([, n]) => record[n] !== undefined).map(([label, n, unit]) => [label, `${spread(n)}${unit}`]).concat([
-    ["loading slope", record.loading_slope === null ? "–" : `${withDoubt(record.loading_slope, record.loading_slope_uncertainty)} 1/s`],
-    ["K from the slope", record.stiffness_from_slope === null ? "needs V and the load" : quantity(record.stiffness_from_slope, "stiffness", 4)],
-    ["smallest detectable drop", digits(record.smallest_drop, 2)],
-  ]).map(([label, text]) => el("div", {}, el("dt", {}, label), el("dd", {}, text))));
-
   const ends = (list) => ({
     lines: list.map((e) => ({ x: [e.onset, e.end], y: [e.force_before, e.force_after], cls: series(1), thick: list.length <= 60, name: "slip" })),
     points: [{
@@ -80,14 +71,12 @@ export function stickSlip({ record, curves }, whole, name) {
       }],
     }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest detectable drop.`]);
   }
-  return { readings, list, charts, tables: [regimeTable(record, name), catalogue(record, events, name)] };
+  return { list, charts };
 }
 
-function regimeTable({ regimes }, name) {
-  return table(["From (s)", "To (s)", "Regime", "Evidence"], regimes.map((r) => [digits(r.start, 6), digits(r.end, 6), r.kind, r.evidence]), `Regimes of ${name}`);
-}
-
-function catalogue(record, events, name) {
+/** Events with their numbers; the CSV has all. */
+export function catalogue(record, name) {
+  const events = record.catalogue.slice(0, MOST);
   if (!events.length) return el("p", { class: "note" }, "No slip event: there is no catalogue.");
   const shown = COLUMNS.filter(([n]) => events.some((e) => e[n] !== null));
   const cell = (event, n, factor = 1) => (event[n] === null ? "–" : factor === 1 ? withDoubt(event[n], event[`${n}_uncertainty`] ?? (n === "onset" ? event.timing_uncertainty : null)) : digits(factor * event[n], 4));

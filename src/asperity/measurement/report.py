@@ -1,4 +1,4 @@
-"""Measurements as sections of text."""
+"""Measurements as sections of a report, which terminal and page render."""
 
 from __future__ import annotations
 
