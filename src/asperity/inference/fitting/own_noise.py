@@ -54,7 +54,7 @@ def with_noise(
     bool
     """
     starts: list[Float] = []
-    for u in _apart(searched, [minimum.u for minimum in minima]):
+    for u in _apart(searched, [u for u, _ in minima]):
         white = objective.minimise(u, tolerance=_COARSE, evaluations=_EVALUATIONS).u
         # Chi-squared of a drift says how large it is: noise has one a sample.
         allowed = searched.chi2(u) * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
