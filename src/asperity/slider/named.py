@@ -8,6 +8,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
+from asperity._version import __version__
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation
 from asperity.parameters import Parameter, law_parameters, point_parameters
@@ -56,6 +57,18 @@ def values_as_text(motion: Motion, load: Modulation | None = None) -> str:
     named = equation_parameters(motion, load).values()
     shown = [f"{p.name} = {_shown(value_of(problem, p))} {p.unit}".rstrip() for p in named]
     return "; ".join(shown)
+
+
+def equations_as_text(motion: Motion, parameters: str) -> dict[str, Any]:
+    """Version, law with its source, equation of motion and parameters, as files keep them."""
+    law = type(motion.slider.law)
+    return {
+        "asperity_version": __version__,
+        "law": law.name,
+        "source": law.source,
+        "equation_of_motion": motion.name,
+        "parameters": parameters,
+    }
 
 
 def slider_values(slider: Slider) -> dict[str, Any]:
