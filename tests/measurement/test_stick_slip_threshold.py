@@ -11,9 +11,9 @@ from asperity.measurement.stick_slip.threshold import linear_frequency, threshol
 
 def cycles(drop, period) -> SlipEvents:
     """Events of these drops and recurrences; nothing else of them counts."""
-    fields = {f.name: np.full(drop.size, np.nan) for f in dataclasses.fields(SlipEvents)}
-    fields |= {"drop": drop, "recurrence": period, "timing_uncertainty": 1e-3 * np.ones(drop.size)}
-    return SlipEvents(**fields)
+    fields = {f.name: np.zeros(drop.size) for f in dataclasses.fields(SlipEvents)}
+    fields |= {"force_before": drop, "onset": np.cumsum(np.nan_to_num(period))}
+    return SlipEvents(**fields | {"timing_uncertainty": 1e-3 * np.ones(drop.size)})
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +17,7 @@ from asperity.measurement.verdicts.verdict import percent
 from asperity.outputs import json, written_file
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
@@ -61,12 +61,13 @@ def column(measurement: StickSlipMeasurement, name: str) -> Array:
     return np.asarray(getattr(source, name), dtype=float)
 
 
-def regime_of_events(measurement: StickSlipMeasurement) -> list[str]:
-    """Kind of the regime of each event."""
-    kinds = [""] * len(measurement.events)
-    for regime in measurement.regimes:
-        kinds[regime.first : regime.stop] = [regime.kind] * (regime.stop - regime.first)
-    return kinds
+def _table(measurement: StickSlipMeasurement) -> pd.DataFrame:
+    """Columns of `COLUMNS` and the regime, an event a row."""
+    import pandas as pd
+
+    table = pd.DataFrame({name: column(measurement, name) for name in COLUMNS})
+    counts = [regime.stop - regime.first for regime in measurement.regimes]
+    return table.assign(regime=np.repeat([r.kind for r in measurement.regimes], counts))
 
 
 def catalogue(measurement: StickSlipMeasurement) -> xr.Dataset:
@@ -83,13 +84,11 @@ def catalogue(measurement: StickSlipMeasurement) -> xr.Dataset:
     """
     import xarray as xr
 
-    variables: dict[str, Any] = {
-        name: ("event", column(measurement, name), {"units": unit, "long_name": meaning})
-        for name, (unit, meaning) in COLUMNS.items()
-    }
-    variables["regime"] = ("event", np.array(regime_of_events(measurement), dtype=object))
+    table = xr.Dataset.from_dataframe(_table(measurement).rename_axis("event"))
+    for name, (unit, meaning) in COLUMNS.items():
+        table[name].attrs = {"units": unit, "long_name": meaning}
     title = "slip events of a recording, by asperity measure"
-    return xr.Dataset(variables, attrs={"title": title, "conventions": CONVENTIONS})
+    return table.assign_attrs(title=title, conventions=CONVENTIONS)
 
 
 def write_catalogue(measurement: StickSlipMeasurement, path: Path) -> None:
@@ -107,16 +106,19 @@ def write_catalogue(measurement: StickSlipMeasurement, path: Path) -> None:
         If the ending is another, or the file cannot be written.
     """
     ending = check_catalogue(path)
+    units = {name: unit for name, (unit, _) in COLUMNS.items()}
     with written_file(path, "--events") as file:
         if ending == ".nc":
             catalogue(measurement).to_netcdf(file, engine="h5netcdf")
         elif ending == ".json":
             events = events_record(measurement)
-            units = {name: unit for name, (unit, _) in COLUMNS.items()}
             record = {"units": units, "conventions": CONVENTIONS, "events": events}
             file.write_text(json.to_json(record, indent=2) + "\n", encoding="utf-8")
         else:
-            _write_csv(measurement, file)
+            heads = {name: f"{name} ({unit})" for name, unit in units.items() if unit != "1"}
+            _table(measurement).rename(columns=heads).to_csv(
+                file, index=False, float_format="%.10g", lineterminator="\n"
+            )
 
 
 def check_catalogue(path: Path) -> str:
@@ -132,25 +134,9 @@ def check_catalogue(path: Path) -> str:
     return ending
 
 
-def _write_csv(measurement: StickSlipMeasurement, file: Path) -> None:
-    columns = [column(measurement, name) for name in COLUMNS]
-    heads = [name if unit == "1" else f"{name} ({unit})" for name, (unit, _) in COLUMNS.items()]
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*heads, "regime"])
-        for *numbers, kind in zip(*columns, regime_of_events(measurement), strict=True):
-            cells = [f"{x:.10g}" if math.isfinite(x) else "" for x in numbers]
-            writer.writerow([*cells, kind])
-
-
 def events_record(measurement: StickSlipMeasurement) -> list[dict[str, Any]]:
     """Events as dicts of numbers."""
-    columns = {name: column(measurement, name).tolist() for name in COLUMNS}
-    kinds = regime_of_events(measurement)
-    return [
-        {name: values[k] for name, values in columns.items()} | {"regime": kinds[k]}
-        for k in range(len(kinds))
-    ]
+    return _table(measurement).to_dict("records")
 
 
 def means(measurement: StickSlipMeasurement) -> dict[str, float]:

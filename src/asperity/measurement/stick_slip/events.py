@@ -45,20 +45,14 @@ class SlipEvents:
         Of either (s).
     force_before, force_after : array, (k,)
         At onset and end.
-    drop, drop_uncertainty : array, (k,)
-        force_before - force_after.
-    slip_duration : array, (k,)
-        end - onset (s).
-    stick_duration, recurrence : array, (k,)
-        From the end, and from the onset, of the event before to the onset (s); NaN of the first.
+    drop_uncertainty : array, (k,)
+        Of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
-        Of the first half of the stick before the event (1/s times the unit); NaN of the first.
+        Of the middle half of the stick before the event (1/s times the unit); NaN of the first.
     creep, creep_uncertainty : array, (k,)
         What the force at onset lacks to the line of that slope; NaN of the first.
     fall_rate : array, (k,)
         Steepest fall of the force over a quarter of the slip (1/s times the unit).
-    resolved : bool array, (k,)
-        Whether the slip lasts for two samples or longer; durations and rates of others are bounds.
     """
 
     onset: Array
@@ -66,20 +60,35 @@ class SlipEvents:
     timing_uncertainty: Array
     force_before: Array
     force_after: Array
-    drop: Array
     drop_uncertainty: Array
-    slip_duration: Array
-    stick_duration: Array
-    recurrence: Array
     loading_slope: Array
     slope_uncertainty: Array
     creep: Array
     creep_uncertainty: Array
     fall_rate: Array
-    resolved: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return self.onset.size
+
+    @property
+    def drop(self) -> Array:
+        """Fall of the force from onset to end."""
+        return self.force_before - self.force_after
+
+    @property
+    def slip_duration(self) -> Array:
+        """Seconds from onset to end."""
+        return self.end - self.onset
+
+    @property
+    def stick_duration(self) -> Array:
+        """Seconds from the end of the event before to the onset; NaN of the first."""
+        return self.onset - np.concatenate([[np.nan], self.end])[:-1]
+
+    @property
+    def recurrence(self) -> Array:
+        """Seconds from the onset of the event before to the onset; NaN of the first."""
+        return np.diff(self.onset, prepend=np.nan)
 
 
 class _Sums:
@@ -156,13 +165,12 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - length)
     stop = np.minimum(edges[1:], trough + length)
-    rate = np.zeros(k)
-    if k > 1:
-        # Of the middle half: a slider with inertia bends the force at both ends of the stick.
-        quarter = (peak[1:] - trough[:-1]) // 4
-        _, _, rate[1:] = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
-        rate[0] = rate[1]
-    bounds, rate = (peak, trough, first, stop), np.maximum(rate, 0.0)
+    # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
+    quarter = (peak[1:] - trough[:-1]) // 4
+    stick = (trough[:-1] + quarter, peak[1:] - quarter + 2)
+    lines = _lines(force, *stick) if k > 1 else (np.empty(0),) * 3
+    rate = np.maximum(np.concatenate([lines[2][:1] if k > 1 else [0.0], lines[2]]), 0.0)
+    bounds = peak, trough, first, stop
     large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
     shape, shift = _shape(
         sums,
@@ -180,7 +188,8 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * (np.sqrt(np.median(squares)) / falls.scatter[0] or 1.0)
     shapes = shape.timing, shift
-    events = _measured(time, force, scatter, sums, (onset, end), first, stop, shapes)
+    sticks = (*lines, (stick[1] - stick[0]).astype(float))
+    events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, shapes)
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
     away = 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - 2 * length)
@@ -381,74 +390,58 @@ def _measured(
     scatter: Array,
     sums: _Sums,
     slips: tuple[Array, Array],
-    first: Index,
-    stop: Index,
+    bounds: tuple[Index, Index],
+    sticks: tuple[Array, Array, Array, Array],
     timing_of: tuple[float, float],
 ) -> SlipEvents:
-    onset, end = slips
-    n, k = force.size, onset.size
-    step = float(time[-1] - time[0]) / (n - 1)
-    samples = np.arange(n, dtype=float)
+    """Forces and their uncertainties; of the sticks centre, mean, slope and number of samples."""
+    (onset, end), (first, stop) = slips, bounds
+    step = float(time[-1] - time[0]) / (force.size - 1)
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
     since = np.clip(np.ceil(end).astype(np.intp), None, stop - 2)
-    left, right = sums.line(first, until), sums.line(since, stop)
-    high = left[0] + left[1] * (onset - sums.origin) + sums.level
-    low = right[0] + right[1] * (end - sums.origin) + sums.level
+
+    def level(begin: Index, close: Index, at: Array) -> tuple[Array, Array]:
+        mean, slope, *_ = sums.line(begin, close)
+        return mean + slope * (at - sums.origin) + sums.level, slope
+
+    high, before = level(first, until, onset)
+    low, after = level(since, stop, end)
     drop = high - low
     # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
-    # otherwise, in the mean over the events, is how the stick bends: creep, or a ringing gauge.
-    doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
-    half = sums.line(until - (until - first) // 2, until)
-    creeps = (half[0] + half[1] * (onset - sums.origin) + sums.level - high).sum()
-    half = sums.line(since, since + (stop - since) // 2)
-    rings = (half[0] + half[1] * (end - sums.origin) + sums.level - low).sum()
-    rise = high - np.concatenate([high[:1] - drop[:1], low[:-1]])
+    # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
+    # loaded before, a ringing gauge to the drop.
+    before_doubt = 2 * _of_mean(scatter, until - first)
+    doubt = np.hypot(before_doubt, 2 * _of_mean(scatter, stop - since))
+    creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
+    rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
+    rise = high - np.concatenate([low[:1], low[:-1]])
     doubt = np.hypot(doubt, creeps / rise.sum() * rise - rings / drop.sum() * drop)
-    duration = end - onset
-    long = np.maximum(duration, 2.0)
+    long = np.maximum(end - onset, 2.0)
     fisher, shift = timing_of
     timing = fisher / np.sqrt(2.0) * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0])
     timing = np.hypot(long * np.hypot(timing, shift), _SAMPLING)
-    doubt = np.hypot(doubt, (np.abs(left[1]) + np.abs(right[1])) * timing)
-    # Sticks: from the end of one event to the onset of the next.
-    stick = np.full(k, np.nan)
-    stick[1:] = onset[1:] - end[:-1]
-    slope, slope_doubt, creep, creep_doubt = (np.full(k, np.nan) for _ in range(4))
-    if k > 1:
-        quarter = (onset[1:] - end[:-1]) / 4
-        a = np.ceil(end[:-1] + quarter).astype(np.intp)
-        b = np.maximum((onset[1:] - quarter).astype(np.intp), a + 2)
-        b = np.minimum(b, n)
-        centre, mean, slope[1:] = _lines(force, a, b)
-        count = (b - a).astype(float)
-        mean_doubt = _of_mean(scatter, b - a)
-        # The slope of n samples has a variance of 12/n^2 of that of their mean.
-        slope_doubt[1:] = np.sqrt(12.0) * mean_doubt / count
-        reach = onset[1:] - centre
-        creep[1:] = mean + slope[1:] * reach - high[1:]
-        creep_doubt[1:] = np.sqrt(
-            mean_doubt**2
-            + (slope_doubt[1:] * reach) ** 2
-            + (2 * _of_mean(scatter, until - first)[1:]) ** 2
-        )
-    recurrence = np.concatenate([[np.nan], np.diff(onset)])
+    # Slips unlike their shape begin earlier and end later, or the reverse.
+    doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
+    centre, mean, slope, count = sticks
+    mean_doubt = _of_mean(scatter, count)
+    # The slope of n samples has a variance of 12/n^2 of that of their mean.
+    slope_doubt = np.sqrt(12.0) * mean_doubt / count
+    reach = onset[1:] - centre
+    lag_doubt = np.sqrt(mean_doubt**2 + (slope_doubt * reach) ** 2 + before_doubt[1:] ** 2)
+    samples = np.arange(force.size, dtype=float)
+    none = [np.nan]
     return SlipEvents(
         onset=np.interp(onset, samples, time),
         end=np.interp(end, samples, time),
         timing_uncertainty=timing * step,
         force_before=high,
         force_after=low,
-        drop=drop,
         drop_uncertainty=doubt,
-        slip_duration=duration * step,
-        stick_duration=stick * step,
-        recurrence=recurrence * step,
-        loading_slope=slope / step,
-        slope_uncertainty=slope_doubt / step,
-        creep=creep,
-        creep_uncertainty=creep_doubt,
+        loading_slope=np.concatenate([none, slope / step]),
+        slope_uncertainty=np.concatenate([none, slope_doubt / step]),
+        creep=np.concatenate([none, mean + slope * reach - high[1:]]),
+        creep_uncertainty=np.concatenate([none, lag_doubt]),
         fall_rate=steepest_fall(force, onset, end, drop) / step,
-        resolved=duration >= 2.0,
     )
 
 

@@ -391,88 +391,58 @@ def _hidden(result: StickSlipMeasurement) -> tuple[float, float]:
 
 
 def _checks(result: StickSlipMeasurement) -> list[Check]:
-    events, count = result.events, len(result.events)
-    checks = [
-        judged(
-            "events",
-            float(count),
-            LIMITS["events"],
-            f"{count} complete event{'' if count == 1 else 's'}"
-            + ("" if count >= LIMITS["events"][0] else "; means and spreads of so few say little"),
-        ),
-    ]
+    events, count, least = result.events, len(result.events), result.smallest_drop
+    checks: list[Check] = []
+
+    def ask(name: str, number: float, sentence: str, doubt: str = "", error: float = 0.0) -> None:
+        check = judged(name, number, LIMITS[name], sentence, significant=abs(number) >= 3 * error)
+        checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
+
+    ask("events", count, f"{count} complete events", "; means and spreads of so few say little")
     open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
-    checks.append(
-        judged(
-            "regime",
-            len(open_),
-            LIMITS["regime"],
-            f"cannot tell what {open_[0].start:.4g} to {open_[0].end:.4g} s is: {open_[0].evidence}"
-            if open_
-            else result.kind,
-        )
-    )
+    kind = result.kind
+    for one in open_[:1]:
+        kind = f"cannot tell what {one.start:.4g} to {one.end:.4g} s is: {one.evidence}"
+    ask("regime", len(open_), kind)
     if not count:
         return checks
     drop = float(np.median(events.drop))
     step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
-    least = result.smallest_drop
     near = float(np.mean(events.drop < _NEAR * least))
+    ask(
+        "threshold",
+        near,
+        f"a drop below {least:.2g}, {percent(least / drop)} of the median, may not have been seen; "
+        f"{percent(near)} of the events are smaller than {_NEAR:g} times that",
+        ": some below it may be missing",
+    )
     fast = float(np.mean(events.slip_duration < 2 * step))
-    level = (events.force_before + events.force_after) / 2
-    drift = float(np.ptp(level)) / drop
-    checks += [
-        judged(
-            "threshold",
-            near,
-            LIMITS["threshold"],
-            f"a drop below {least:.2g}, {percent(least / drop)} of the median, may not have been "
-            f"seen; {percent(near)} of the events are smaller than {_NEAR:g} times that"
-            + (": some below it may be missing" if near > LIMITS["threshold"][0] else ""),
-        ),
-        judged(
-            "sampling",
-            fast,
-            LIMITS["sampling"],
-            f"{percent(fast)} of the slips last for less than two samples: their durations and "
-            "velocities are bounds; a higher sampling rate tells more",
-        ),
-        judged(
-            "drift",
-            drift,
-            LIMITS["drift"],
-            f"the middle of the drops varies along the track by {drift:.2g} drops",
-        ),
-    ]
+    ask(
+        "sampling",
+        fast,
+        f"{percent(fast)} of the slips last for less than two samples: their durations and "
+        "velocities are bounds; a higher sampling rate tells more",
+    )
+    drift = float(np.ptp(events.force_before + events.force_after)) / 2 / drop
+    ask("drift", drift, f"the middle of the drops varies along the track by {drift:.2g} drops")
     hidden, error = _hidden(result)
     if np.isfinite(hidden):
-        checks.append(
-            judged(
-                "hidden events",
-                hidden,
-                LIMITS["hidden events"],
-                f"in the first half of a stick the force rises by {percent(abs(hidden))} "
-                f"{'less' if hidden > 0 else 'more'} than the loading slope says"
-                + (
-                    ": small events are missing, or drops are read too small"
-                    if hidden > LIMITS["hidden events"][0]
-                    else ""
-                ),
-                significant=hidden > 3 * error,
-            )
+        ask(
+            "hidden events",
+            hidden,
+            f"in the first half of a stick the force rises by {percent(abs(hidden))} "
+            f"{'less' if hidden > 0 else 'more'} than the loading slope says",
+            ": small events are missing, or drops are read too small",
+            error,
         )
-    stiffness, doubt = result.stiffness_from_slope
+    stiffness, error = result.stiffness_from_slope
     given = result.machine.stiffness
     if given is not None and np.isfinite(stiffness):
-        off = stiffness / given - 1
-        checks.append(
-            judged(
-                "stiffness",
-                abs(off),
-                LIMITS["stiffness"],
-                f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
-                f"{doubt:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m",
-                significant=abs(stiffness - given) > 3 * doubt,
-            )
+        ask(
+            "stiffness",
+            abs(stiffness / given - 1),
+            f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
+            f"{error:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m",
+            error=error / given,
         )
     return checks
