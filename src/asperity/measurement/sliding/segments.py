@@ -176,7 +176,7 @@ def _motion(time: Array, displacement: Array) -> _Motion:
     # Of a coarse recorder most differences are zero: its step is the noise.
     moved = np.abs(np.diff(displacement))
     step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
-    floor = 1e-9 * float(np.ptp(displacement)) + 1e-300
+    floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
     return _Motion(
         time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step
     )
@@ -222,7 +222,9 @@ def _change_points(motion: _Motion, edges: NDArray[np.intp]) -> list[int]:
     t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
     x = np.add.reduceat(motion.displacement - motion.displacement[0], edges[:-1]) / size
     # What the recorder rounds is the same in all samples of a slow block.
-    weight = 1 / (motion.slow_noise**2 / size + motion.step**2 / 12)
+    unit = float(np.hypot(motion.slow_noise, motion.step))
+    weight = 1 / ((motion.slow_noise / unit) ** 2 / size + (motion.step / unit) ** 2 / 12)
+    x /= unit
     t /= float(np.median(np.diff(t)))
     n = size.size
     parameter = _PENALTY * np.log(n)
