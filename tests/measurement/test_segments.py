@@ -160,6 +160,16 @@ def test_a_disturbance_of_the_motor_is_no_step() -> None:
     assert [c.time for c in found.cuts] == pytest.approx([first], abs=0.05)
 
 
+@pytest.mark.parametrize("defect", ["spike", "jump"])
+def test_a_spike_or_a_jump_of_the_gauge_is_no_motion(defect) -> None:
+    time = np.arange(2000) * 0.01
+    slip = 3 * UM * time + 1e-8 * np.random.default_rng(0).standard_normal(time.size)
+    slip[slice(700, 701 if defect == "spike" else None)] += 1e-3
+    cut = partition(time, slip)
+    assert cut.cuts == ()
+    assert cut.velocities == pytest.approx([3 * UM], rel=1e-3)
+
+
 def test_a_small_change_can_be_read_in_two_ways(sliding_trace) -> None:
     time, slip, friction, _ = stepped((3 * UM, 4 * UM), (300 * UM, 300 * UM), (50, 50))
     found = measure_sliding(sliding_trace(time, friction, slip))
