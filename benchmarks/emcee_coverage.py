@@ -16,7 +16,7 @@ import jax
 import numpy as np
 
 from asperity.inference import RunOptions, fit
-from asperity.inference.posterior.sampling import whitened_posterior
+from asperity.inference.posterior.density import Whitened
 from benchmarks.coverage import CASES, TRUE, runs_of
 
 WALKERS = 32
@@ -35,7 +35,7 @@ def main() -> None:
     for k, run in enumerate(runs_of(CASES["steps"], chosen.sets)):
         options = RunOptions(order=0)
         found = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=4, runs=options)
-        whitened = whitened_posterior(found)
+        whitened = Whitened.of(found)
         density, data = whitened.compiled()
         random = np.random.default_rng(k)
         sampler = emcee.EnsembleSampler(

@@ -26,7 +26,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from asperity.inference import Fit, compare, fit, sample_posterior
-from asperity.inference.posterior.sampling import whitened_posterior
+from asperity.inference.posterior.density import Whitened
 from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, runs_of
 from benchmarks.fits import off, print_samplers, timed
 
@@ -87,7 +87,7 @@ def scipy_fit(found: Fit) -> dict[str, float]:
 def emcee_draws(found: Fit, draws: int) -> np.ndarray:
     """Draws of 32 walkers about the fit in its whitened coordinates; (walkers, draws, n)."""
     emcee = importlib.import_module("emcee")
-    whitened = whitened_posterior(found)
+    whitened = Whitened.of(found)
     density, data = whitened.compiled()
     compiled = jax.jit(lambda z: density(z, data))
     rng = np.random.default_rng(1)

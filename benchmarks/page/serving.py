@@ -45,10 +45,10 @@ def serving() -> Iterator[Serving]:
         server.wait()
 
 
-def ask(port: int, path: str, question: dict[str, Any], client: str) -> bytes:
+def ask(port: int, path: str, question: dict[str, Any]) -> bytes:
     """The answer to a question."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
-    headers = {"Content-Type": "application/json", "X-Client": client}
+    headers = {"Content-Type": "application/json"}
     connection.request("POST", f"/api/{path}", json.dumps(question), headers)
     answer = connection.getresponse().read()
     connection.close()

@@ -24,10 +24,10 @@ def question(k: int) -> dict:
     return {**POINT, "numbers": numbers}
 
 
-def user(port: int, name: str, count: int, times: list[float]) -> None:
+def user(port: int, count: int, times: list[float]) -> None:
     for k in range(count):
         start = time.perf_counter()
-        ask(port, "explore", question(k), name)
+        ask(port, "explore", question(k))
         times.append(time.perf_counter() - start)
 
 
@@ -39,7 +39,7 @@ def main() -> None:
     options = parser.parse_args()
     with serving() as server:
         port = server.port
-        while b"preparing" in ask(port, "explore", question(0), "first"):
+        while b"preparing" in ask(port, "explore", question(0)):
             time.sleep(0.5)
         if not options.no_map:
             axes = {"x": {"name": "epsilon", "low": 0.01, "high": 0.5},
@@ -50,15 +50,15 @@ def main() -> None:
                 with contextlib.suppress(
                     http.client.HTTPException, OSError
                 ):  # ends with the server
-                    ask(port, "map", whole, "map")
+                    ask(port, "map", whole)
 
             threading.Thread(target=largest_map, daemon=True).start()
             time.sleep(3)
         for users in dict.fromkeys([1, options.users]):
             times: list[float] = []
             threads = [
-                threading.Thread(target=user, args=(port, f"user-{n}", options.questions, times))
-                for n in range(users)
+                threading.Thread(target=user, args=(port, options.questions, times))
+                for _ in range(users)
             ]
             for thread in threads:
                 thread.start()

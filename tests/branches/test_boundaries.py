@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.branches.stability import BoundaryHalf
 from asperity.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -17,6 +18,14 @@ BOUNDARY = 1e-6
 @pytest.fixture(scope="module")
 def slow(shooting):
     return shooting(K=2e5)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _long_steps():
+    """Each point of a boundary is solved by itself: longer steps leave fewer of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(BoundaryHalf, "control", BoundaryHalf.control._replace(longest=0.08))
+        yield
 
 
 @pytest.fixture(scope="module")

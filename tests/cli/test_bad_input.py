@@ -2,6 +2,7 @@
 
 import math
 import random
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,19 @@ def test_a_missing_option(asperity) -> None:
     refused(asperity("response", *point), "got none for mu0, A, B", "like --set mu0=")
 
 
+def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
+    path = tmp_path / "steps.csv"
+    rows = "".join(
+        f"{t / 10},{max(t, 10 * t - 900) / 1e4},{0.6 + t % 7 / 1e3}\n" for t in range(200)
+    )
+    path.write_text("time (s),displacement (mm),friction\n" + rows)
+    fit = partial(asperity, "fit", path, "--names", "geophysics")
+    refused(fit("--free", "a,b"), "got none for D_c;")
+    refused(fit("--free", "a,b,x"), "--free must be", "choose one of a, b, D_c, k, M, sigma_n")
+    refused(fit("--free", "a,b", "--fix", "Dc=-2 um"), "--fix D_c must be positive, got -2e-06 m")
+    refused(fit("--law", "two-state", "--free", "a", "--start", "b_2=1"), "got 'b_2'; free it")
+
+
 @pytest.mark.parametrize(
     ("command", "header", "advice"),
     [
@@ -94,7 +108,7 @@ def test_a_missing_option(asperity) -> None:
         (
             "measure",
             "time (s),horiz. load (N),vert. load (N)",
-            ['named like a normal load; choose one of horiz. load, vert. load, like --load "horiz'],
+            ['a shear force; choose one of horiz. load, vert. load, like --force "horiz'],
         ),
         (
             "measure",

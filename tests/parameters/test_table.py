@@ -183,7 +183,7 @@ def test_names_of_geophysics_are_those_of_the_table() -> None:
     [
         ("A is not determined beside B: fix one", "a is not determined beside b: fix one"),
         ("A law is excluded. A stretch is steep", "A law is excluded. A stretch is steep"),
-        ("D0 is at its bound; give it by --fix D0=1", "D_c is at its bound; give it by --fix D0=1"),
+        ("D0 is at its bound: use --fix D0=1", "D_c is at its bound: use --fix D_c=1"),
     ],
 )
 def test_sentences_in_names_of_geophysics(text: str, shown: str) -> None:

@@ -1,4 +1,4 @@
-"""Coefficients of Runge-Kutta methods: the explicit one of order 8, and collocation.
+"""Coefficients of Runge-Kutta methods: explicit ones of order 5 and 8, and collocation.
 
 Sources: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
 (Springer, 1993), sections II.5 and II.6; E. Hairer, G. Wanner, Solving Ordinary Differential
@@ -64,6 +64,35 @@ def dormand_prince_8() -> ExplicitTableau:
         extra_C=np.array(table["C_EXTRA"]),
         powers=_power_basis() @ F,
     )
+
+
+class LowOrderTableau(NamedTuple):
+    """The method of order 5 of Dormand and Prince, with dense output of order 4.
+
+    Attributes
+    ----------
+    C : array, shape (7,)
+        Times of the stages in parts of the step.
+    A : array, shape (7, 7)
+        Row k gives the state at stage k; the last row gives the end of the step.
+    E : array, shape (7,)
+        Weights of the error estimate.
+    D : array, shape (7,)
+        Weights of the last term of the dense output.
+    """
+
+    C: Float
+    A: Float
+    E: Float
+    D: Float
+
+
+@cache
+def dormand_prince_5() -> LowOrderTableau:
+    """The coefficients, from a file."""
+    table = tomllib.loads(files(__package__).joinpath("dormand_prince_5.toml").read_text())
+    C, E, D = (np.array(table[name]) for name in "CED")
+    return LowOrderTableau(C, _rows(table["A"], 7), E, D)
 
 
 def _rows(rows: list[list[float]], columns: int) -> Float:

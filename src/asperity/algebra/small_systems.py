@@ -37,14 +37,14 @@ def inverse_points(matrix: Matrix) -> Matrix:
     upper = [row[:2] for row in matrix[:2]], [row[2:] for row in matrix[:2]]
     lower = [row[:2] for row in matrix[2:]], [row[2:] for row in matrix[2:]]
     first = inverse_points(upper[0])
-    across, down = _multiply(first, upper[1]), _multiply(lower[0], first)
-    remaining = inverse_points(_subtract(lower[1], _multiply(lower[0], across)))
-    corner = _multiply(remaining, down)
+    across, down = multiply(first, upper[1]), multiply(lower[0], first)
+    remaining = inverse_points(subtract(lower[1], multiply(lower[0], across)))
+    corner = multiply(remaining, down)
     return [
         *(
             [*a, *(-b for b in c)]
             for a, c in zip(
-                _add(first, _multiply(across, corner)), _multiply(across, remaining), strict=True
+                add(first, multiply(across, corner)), multiply(across, remaining), strict=True
             )
         ),
         *([*(-a for a in b), *c] for b, c in zip(corner, remaining, strict=True)),
@@ -82,16 +82,19 @@ def inverse_by_elimination(matrix: Array) -> Array:
     return jnp.take_along_axis(remaining, jnp.argsort(order, axis=0)[None], 1)
 
 
-def _multiply(a: Matrix, b: Matrix) -> Matrix:
+def multiply(a: Matrix, b: Matrix) -> Matrix:
+    """Product of two matrices of separate entries."""
     columns = list(zip(*b, strict=True))
     return [[sum(x * y for x, y in zip(row, c, strict=True)) for c in columns] for row in a]
 
 
-def _add(a: Matrix, b: Matrix) -> Matrix:
+def add(a: Matrix, b: Matrix) -> Matrix:
+    """Sum of two matrices of separate entries."""
     return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
 
 
-def _subtract(a: Matrix, b: Matrix) -> Matrix:
+def subtract(a: Matrix, b: Matrix) -> Matrix:
+    """Difference of two matrices of separate entries."""
     return [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
 
 

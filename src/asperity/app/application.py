@@ -7,8 +7,8 @@ import contextlib
 import importlib
 import logging
 import os
-import re
 from collections.abc import AsyncIterator, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -23,7 +23,7 @@ from starlette.staticfiles import StaticFiles
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, question_in
 from asperity.app.jobs.processes import Jobs
-from asperity.app.jobs.threads import Lane, Preparation
+from asperity.app.jobs.threads import Preparation
 from asperity.app.security import BODY_LIMIT, Guard, body_too_slow, sentence
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
@@ -31,8 +31,6 @@ from asperity.errors import InputError, naming
 from asperity.outputs.json import to_json
 
 STATIC = Path(__file__).parent / "static"
-
-_CLIENT = re.compile(r"[A-Za-z0-9-]{1,40}")
 
 _log = logging.getLogger("asperity.app")
 
@@ -54,7 +52,8 @@ def build(
         Places of laws outside the package, which worker processes import too.
     """
     modules = [importlib.import_module(f"asperity.app.api.{tab}") for tab in TABS]
-    lane = Lane(threads=min(2, os.cpu_count() or 1))
+    # For short computations; the page asks for one at a time.
+    threads = ThreadPoolExecutor(min(2, os.cpu_count() or 1), "asperity-answers")
     lanes: dict[str, Jobs] = {}
     uploads = Uploads()
     tasks: dict[str, Callable[[], Any]] = {}
@@ -78,7 +77,7 @@ def build(
                 handler = _job(endpoint, jobs, uploads)
                 limits[path] = endpoint.largest or BODY_LIMIT
             else:
-                handler = _answer(endpoint, lane)
+                handler = _answer(endpoint, threads)
             routes.append(Route(path, handler, methods=["POST"]))
     preparation = Preparation(tasks)
     for module in modules:
@@ -111,7 +110,7 @@ def build(
                 await lanes[name].prepare(first)
         yield
         preparation.close()
-        lane.close()
+        threads.shutdown(wait=False, cancel_futures=True)
         for jobs in lanes.values():
             await jobs.close()
         uploads.close()
@@ -127,11 +126,11 @@ def build(
     return Guard(app, port, in_notebook, limits)
 
 
-def _answer(endpoint: Answer, lane: Lane) -> Callable[[Request], Any]:
+def _answer(endpoint: Answer, threads: ThreadPoolExecutor) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
         question = await question_in(request, endpoint.question)
-        client = f"{endpoint.path} {_client(request)}"
-        return _json(await lane.run(client, lambda: to_json(endpoint.answer(question))))
+        run = asyncio.get_running_loop().run_in_executor
+        return _json(await run(threads, lambda: to_json(endpoint.answer(question))))
 
     return handle
 
@@ -170,11 +169,7 @@ def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any
         if endpoint.argument is not None:
             argument = endpoint.argument(question, uploads)
         messages = jobs.run(
-            f"{endpoint.path} {_client(request)}",
-            endpoint.job,
-            argument,
-            limits=endpoint.limits,
-            seconds=endpoint.seconds,
+            endpoint.job, argument, limits=endpoint.limits, seconds=endpoint.seconds
         )
 
         async def lines() -> AsyncIterator[str]:
@@ -185,11 +180,6 @@ def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any
         return StreamingResponse(lines(), media_type="application/x-ndjson")
 
     return handle
-
-
-def _client(request: Request) -> str:
-    name = request.headers.get("x-client", "")
-    return name if _CLIENT.fullmatch(name) else "anonymous"
 
 
 def _json(text: str) -> Response:

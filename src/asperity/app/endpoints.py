@@ -48,7 +48,7 @@ class Answer:
 class Job:
     """A computation of any length in a worker process, answered with a line of JSON per message.
 
-    It ends when the page closes the connection, or begins another job on the same path.
+    It ends when the page closes the connection.
 
     Attributes
     ----------

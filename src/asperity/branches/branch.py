@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity._version import __version__
 from asperity.branches.parameters import fixed_as_text
 from asperity.orbit.floquet import from_logs
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion
+from asperity.slider.named import equations_as_text
 
 if TYPE_CHECKING:
     import xarray
@@ -237,15 +237,10 @@ class Branch(Displayed):
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, equation of motion, fixed parameters, and why the branch ends."""
-        law = type(self.motion.slider.law)
-        fixed = fixed_as_text(law, self.fixed)
+        fixed = fixed_as_text(type(self.motion.slider.law), self.fixed)
         return {
-            "asperity_version": __version__,
-            "law": law.name,
-            "source": law.source,
-            "equation_of_motion": self.motion.name,
+            **equations_as_text(self.motion, fixed),
             "continued_parameter": self.name,
-            "parameters": fixed,
             "periods": self.periods,
             "result": self.result,
             "convention": "F/W0 = mean + sum mu_n cos(n w t / periods + phase_n)",

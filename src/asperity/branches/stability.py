@@ -18,7 +18,6 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from asperity._version import __version__
 from asperity.algebra.continuation import (
     STEPS,
     STUCK,
@@ -54,6 +53,7 @@ from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
+from asperity.slider.named import equations_as_text
 from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:
@@ -381,16 +381,8 @@ class StabilityBoundary(Displayed):
                 "kind of the bifurcation",
             ),
         }
-        law = type(self.motion.slider.law)
-        fixed = fixed_as_text(law, self.fixed)
-        attributes = {
-            "asperity_version": __version__,
-            "law": law.name,
-            "source": law.source,
-            "equation_of_motion": self.motion.name,
-            "parameters": fixed,
-        }
-        return xarray.Dataset(data, attrs=attributes)
+        fixed = fixed_as_text(type(self.motion.slider.law), self.fixed)
+        return xarray.Dataset(data, attrs=equations_as_text(self.motion, fixed))
 
 
 @typed

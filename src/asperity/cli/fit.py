@@ -14,6 +14,7 @@ from asperity.cli.options import (
     law_options,
     option,
     output_options,
+    parameter_name,
     settings_of,
     switch,
 )
@@ -123,6 +124,11 @@ _THEN = (
 )
 
 
+def _with_name(prior: str) -> str:
+    name, equals, value = prior.partition("=")
+    return f"{parameter_name(name.strip())}={value}" if equals else prior
+
+
 def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
@@ -158,9 +164,11 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
                     "data": [{"file": path, "source": source, **of_run} for path in data],
                     "fixed": settings_of(fixed, "--fix"),
                     "start": settings_of(start, "--start"),
-                    "prior": prior,
+                    "prior": [_with_name(text) for text in prior],
                     **{n: v for n in _FIELDS if (v := others.pop(n, None)) is not None},
                 }
+                if "free" in fields:
+                    fields["free"] = ",".join(map(parameter_name, fields["free"].split(",")))
                 return command(fields=fields, **others)
 
         first = (

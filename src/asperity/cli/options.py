@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from asperity.cli.report import Output
+from asperity.cli.report import CHOSEN_NAMES, Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError, require
 from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
@@ -150,9 +150,12 @@ _OUTPUT = (
     option(
         "--names",
         None,
-        "Names on screen and in figures: A, B, D0, K/W0, or geophysics: a, b, D_c, k/sigma_n.",
+        "Names on screen, in figures and options: A, B, D0, K/W0, or geophysics: a, b, D_c, "
+        "k/sigma_n.",
         click.Choice(NAMES),
         default=NAMES[0],
+        is_eager=True,
+        callback=lambda context, option, names: context.meta.setdefault(CHOSEN_NAMES, names),
     ),
     switch("--json as_json", "Print JSON instead of text."),
 )
@@ -254,8 +257,20 @@ def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
         name, _, value = (part.strip() for part in pair.partition("="))
         like = f'write it like {option} "K=0.2 N/um"'
         require(name and value, option, "be NAME=VALUE", f"'{pair}'", like)
-        add_setting(result, name, value)
+        add_setting(result, parameter_name(name), value)
     return result
+
+
+def parameter_name(name: str) -> str:
+    """The one name of a parameter that the user calls as ``--names`` says."""
+    context = click.get_current_context(silent=True)
+    if context is None or context.meta.get(CHOSEN_NAMES, NAMES[0]) == NAMES[0]:
+        return name
+    from asperity.laws import get_law
+    from asperity.parameters.names import parameter_named
+
+    law = context.params.get("law") or next(iter(context.params.get("laws") or ()), "all")
+    return parameter_named(name, None if law == "all" else get_law(law))
 
 
 def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from asperity.outputs.tables import Section
     from asperity.parameters.parameter import Drawn
 
+#: Where click's context keeps the set of names that the user has chosen.
+CHOSEN_NAMES = "asperity.names"
+
 
 @dataclass(frozen=True)
 class Output:

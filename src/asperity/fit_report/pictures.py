@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,6 +31,19 @@ _LABELS = {
 }
 
 
+def _draw_band(axis: Any, one: Series, name: str, color: str, label: str | None = None) -> None:
+    band = one.bands[name]
+    axis.fill_between(band.epsilon, band.low, band.high, color=color, alpha=0.3, lw=0)
+    axis.plot(band.epsilon, band.middle, color=color, lw=1, label=label)
+
+
+def _draw_readings(axis: Any, table: LockInTable, one: Series, name: str, **style: Any) -> None:
+    columns = (
+        c[one.rows] for c in (table.points["epsilon"], table.values[name], table.errors[name])
+    )
+    axis.errorbar(*columns, fmt="o", ms=3, **style)
+
+
 def data_figure(table: LockInTable, series: Sequence[Series]) -> Figure:
     """Readings with error bars, and bands of the fit, against the amplitude."""
     names = [n for n in _LABELS if n in table.values]
@@ -37,20 +51,9 @@ def data_figure(table: LockInTable, series: Sequence[Series]) -> Figure:
         figure = new_figure(6.4, 2.6 * len(names))
         axes = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for axis, name in zip(axes, names, strict=True):
-            for k, (label, at, bands) in enumerate(series):
-                color = f"C{k}"
-                band = bands[name]
-                axis.fill_between(band.epsilon, band.low, band.high, color=color, alpha=0.3, lw=0)
-                axis.plot(band.epsilon, band.middle, color=color, lw=1)
-                axis.errorbar(
-                    table.points["epsilon"][at],
-                    table.values[name][at],
-                    table.errors[name][at],
-                    fmt="o",
-                    ms=3,
-                    color=color,
-                    label=label,
-                )
+            for k, one in enumerate(series):
+                _draw_band(axis, one, name, f"C{k}")
+                _draw_readings(axis, table, one, name, color=f"C{k}", label=one.label)
             axis.set_ylabel(_LABELS[name])
         axes[0].legend(fontsize=8)
         axes[-1].set_xlabel(r"$\epsilon$ as applied")
@@ -74,20 +77,8 @@ def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -
         for row, name in zip(axes, names, strict=True):
             for i, axis in enumerate(row):
                 for k, (law, series) in enumerate(predicted.items()):
-                    _, at, bands = series[i]
-                    band = bands[name]
-                    axis.fill_between(
-                        band.epsilon, band.low, band.high, color=f"C{k}", alpha=0.3, lw=0
-                    )
-                    axis.plot(band.epsilon, band.middle, color=f"C{k}", lw=1, label=law)
-                axis.errorbar(
-                    table.points["epsilon"][at],
-                    table.values[name][at],
-                    table.errors[name][at],
-                    fmt="ko",
-                    ms=3,
-                    lw=0.8,
-                )
+                    _draw_band(axis, series[i], name, f"C{k}", law)
+                _draw_readings(axis, table, series[i], name, color="k", lw=0.8)
             row[0].set_ylabel(_LABELS[name])
         for axis, one in zip(axes[0], next(iter(predicted.values())), strict=True):
             axis.set_title(one.label, fontsize=9)

@@ -5,8 +5,8 @@ from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
 from asperity.inference.design import Design, DesignPlan, design, plan_of, read_plan
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import bounded_interval
+from asperity.inference.fitting.plausibility import shift_of_estimates
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
-from asperity.inference.fitting.shift import shift_of_estimates
 from asperity.inference.fitting.windows import WindowedFit, WindowEstimate, fit_windows
 from asperity.inference.holds.table import HealingTable, healing_table, read_healing
 from asperity.inference.objective import DataTerm, Objective

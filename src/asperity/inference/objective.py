@@ -88,6 +88,8 @@ class DataTerm(ABC):
     searches : bool or None
         Whether orbits that the fast method does not find are searched for at every call. None for
         data that are no periodic responses.
+    affordable : int
+        Evaluations that an integral over the parameters may take.
     """
 
     name: str
@@ -95,6 +97,7 @@ class DataTerm(ABC):
     nuisances: tuple[Unknown, ...] = ()
     failure: str
     searches: bool | None = None
+    affordable: int = 256
 
     @property
     @abstractmethod
@@ -108,11 +111,6 @@ class DataTerm(ABC):
         They count in AICc, BIC and degrees of freedom.
         """
         return 0
-
-    @property
-    def affordable(self) -> int:
-        """Evaluations that an integral over the parameters may take."""
-        return 256
 
     @abstractmethod
     def residuals(

@@ -175,6 +175,28 @@ class Unknown:
         return float(self.to_value(u)) if math.isfinite(u) else u
 
 
+def require_fittable(law: type[Law], free: Sequence[str]) -> None:
+    """Refuse free parameters that are unknown, occur twice or cannot be free.
+
+    Raises
+    ------
+    InputError
+        With the names that can be free.
+    """
+    known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
+    fittable = [n for n, p in known.items() if p.place != "drive" and n not in REFERENCES]
+    fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
+    for name in free:
+        if name in REFERENCES:
+            rule, got = "be parameters that data can determine", f"'{name}': a change of it is"
+            raise InputError("free", rule, f"{got} one of mu0", "free mu0 instead")
+        if name not in fittable:
+            rule, advice = f"be parameters of {law.name}", closest(name, fittable)
+            raise InputError("free", rule, f"'{name}'", advice)
+        if list(free).count(name) > 1:
+            raise InputError("free", "name each parameter once", f"'{name}' twice", "drop one")
+
+
 def unknowns_of(
     law: type[Law],
     free: Sequence[str],
@@ -197,27 +219,8 @@ def unknowns_of(
     priors : mapping of str to Prior
     usual : mapping of str to (float, float), optional
         Ranges of start values that the data suggest, before those of contacts in general.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, occurs twice or cannot be free.
     """
     known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
-    fittable = [n for n, p in known.items() if p.place != "drive" and n not in REFERENCES]
-    fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
-    for name in free:
-        if name in REFERENCES:
-            raise InputError(
-                f"free must be parameters that data can determine, got '{name}': a change of it is "
-                "one of mu0; free mu0 instead"
-            )
-        if name not in fittable:
-            raise InputError(
-                f"free must be parameters of {law.name}, got '{name}'; {closest(name, fittable)}"
-            )
-        if list(free).count(name) > 1:
-            raise InputError(f"free must name each parameter once, got '{name}' twice; drop one")
     ranges = {**_USUAL, **(usual or {})}
     return tuple(
         unknown_of(

@@ -21,7 +21,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large, spare_mappings
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
@@ -71,12 +71,7 @@ class ResponseFunction:
         cls, equations: ParametrisedProblem, *, harmonics: int, multipliers: bool
     ) -> ResponseFunction:
         """The response of given equations of motion; see `response_function`."""
-        law = equations.law
-        if not law.rate_dependent:
-            raise InputError(
-                f"law must depend on the velocity, got {law.name}, whose force follows the load; "
-                "choose another law"
-            )
+        _require_rate_dependence(equations.law)
         return cls(Program(equations, harmonics, multipliers, search=True), {})
 
     @property
@@ -240,6 +235,11 @@ class ResponseFunction:
         return padded, count if long else None
 
 
+def _require_rate_dependence(law: type[Law]) -> None:
+    rule, got = "depend on the velocity", f"{law.name}, whose force follows the load"
+    require(law.rate_dependent, "law", rule, got, "choose another law")
+
+
 def _laid_out(value: Any, *, count: int, size: int, module: Any) -> Any:
     """A parameter of `count` points, the last one repeated up to `size`."""
     flat = module.broadcast_to(module.asarray(value, dtype=float), (count,))
@@ -333,10 +333,7 @@ def response_function(
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
     if modulation is not None:
         modulation = checked_modulation(modulation)
-    if not law_type.rate_dependent:
-        raise InputError(
-            f"law must depend on the velocity, got {law_type.name}; its force follows the load"
-        )
+    _require_rate_dependence(law_type)
     motion: type = QuasiStatic
     if inertia or radiation_damping:
         elastic = law_type.elastic_length is not Law.elastic_length

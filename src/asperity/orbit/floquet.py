@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.algebra.small_systems import Matrix, inverse_points, product
+from asperity.algebra.small_systems import Matrix, add, inverse_points, multiply, product, subtract
 
 #: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
 #: phases, is then unknown, too.
@@ -148,14 +148,14 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
 
     def step(carry: tuple) -> tuple:
         R, L, P, last, _, steps = carry
-        q = [[integral @ (R[i][j] - L[i][j]) for j in n] for i in n]
+        q = [[integral @ a for a in row] for row in subtract(R, L)]
         inverse = inverse_points([[q[i][j] + float(i == j) for j in n] for i in n])
-        R = _times(inverse, _plus(L, _times(R, q)))
+        R = multiply(inverse, add(L, multiply(R, q)))
         new = _means(R)
         change = jnp.stack([jnp.abs(new[i][j] - L[i][j]) for i in n for j in n]).max(0)
         error = jnp.minimum(change, change**2 / (last + 1e-300))
         if factor:
-            P = _plus(P, _times(P, q))
+            P = add(P, multiply(P, q))
             error = jnp.stack([jnp.abs(a) for row in q for a in row]).max((0, 1))
         return R, new, P, change, error, steps + 1
 
@@ -201,19 +201,10 @@ def _logs_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
             if j != m:
                 other = exponent - logs[j] * jnp.eye(len(J))[..., None]
                 projector = product(projector, other / (logs[m] - logs[j]))
-        weights = _times(_times(P, [list(row) for row in projector]), back)
+        weights = multiply(multiply(P, [list(row) for row in projector]), back)
         change = sum(weights[j][i] * dJ[i][j] for i in n for j in n)
         changes.append(2 * jnp.pi * change.mean(0))
     return _turned_back(logs), jnp.stack(changes)
-
-
-def _times(a: Matrix, b: Matrix) -> Matrix:
-    columns = list(zip(*b, strict=True))
-    return [[sum(x * y for x, y in zip(row, c, strict=True)) for c in columns] for row in a]
-
-
-def _plus(a: Matrix, b: Matrix) -> Matrix:
-    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
 
 
 def _means(entries: Matrix) -> Matrix:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from jax import Array
@@ -12,6 +12,10 @@ from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
+
+if TYPE_CHECKING:
+    from asperity.orbit.mesh.mesh import Orbit
+    from asperity.orbit.methods.fourier import FourierOrbit
 
 #: Shares of the first harmonic and of the mean whose round-off a harmonic may have.
 _SMALL_HARMONIC, _SMALL_MEAN = 5e-8, 5e-11
@@ -90,28 +94,7 @@ def response_gap(
     return np.where(np.isfinite(gap), gap, np.inf)
 
 
-class PeriodicOrbit(Protocol):
-    """Interface of an orbit, independent of its representation.
-
-    There are two representations. `FourierOrbit` keeps the mean of each state and its zero-mean
-    part on a grid separately, so that a zero-mean part of 1e-9 of the mean keeps its digits;
-    hundreds of points fit into the cache of a core. `Orbit` has polynomials on a separate mesh for
-    every point, with fine intervals where the orbit is steep; the monodromy matrix follows from its
-    equations. Replacing one by the other would lose digits or range. Code outside of the methods
-    works with either.
-    """
-
-    @property
-    def start(self) -> Array:
-        """States at theta = 0, shape (size, points)."""
-        ...
-
-    def states(self, theta: np.ndarray) -> Array:
-        """States at the phases `theta`, a column: shape (size, phases, points)."""
-        ...
-
-
-def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> NDArray[np.float64]:
+def waveform(problem: Problem, orbit: Orbit | FourierOrbit, phases: int) -> NDArray[np.float64]:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
     theta = even_phases(phases)
     return waveform_of(problem, orbit.states(theta), theta)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
@@ -25,26 +24,16 @@ from asperity.parameters.parameter import (
     parameter_line,
 )
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equation_parameters, value_of, values_as_text
+from asperity.slider.named import (
+    equation_parameters,
+    equations_as_text,
+    value_of,
+    values_as_text,
+)
 from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:
     import xarray
-
-
-def provenance_of(response: PeriodicResponse) -> dict[str, Any]:
-    """Version, law, conventions, tolerance and source of the numbers."""
-    law = type(response.slider.law)
-    return {
-        "asperity_version": __version__,
-        "law": law.name,
-        "source": law.source,
-        "equation_of_motion": response.motion.name,
-        "parameters": values_as_text(response.motion, response.load),
-        "relative_tolerance": 1e-8,
-        "modulation": response.load.formula,
-        "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",
-    }
 
 
 Float = NDArray[np.float64]
@@ -334,7 +323,12 @@ class PeriodicResponse(Drawn):
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, conventions, tolerance and source of the numbers."""
-        return provenance_of(self)
+        return {
+            **equations_as_text(self.motion, values_as_text(self.motion, self.load)),
+            "relative_tolerance": 1e-8,
+            "modulation": self.load.formula,
+            "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",
+        }
 
 
 def dimension_names(

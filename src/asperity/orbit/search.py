@@ -20,7 +20,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.orbit.batches import run_chunks, take
@@ -47,14 +46,9 @@ from asperity.theory.adiabatic import adiabatic_growth
 def mark_out_of_range(problem: Problem, solution: Solution) -> None:
     """Give the points outside the limits the outcome OUT_OF_RANGE."""
     rate, _, unloading = steady_sliding(problem)
-    _mark_outside(solution, ~((rate >= SMALLEST_RATE) & (rate <= LARGEST_RATE)), rate)
-    _mark_outside(solution, ~(unloading <= LARGEST_UNLOADING), unloading)
-
-
-def _mark_outside(
-    solution: Solution, outside: NDArray[np.bool_], values: NDArray[np.float64]
-) -> None:
-    solution.outcome[outside], solution.detail[outside] = Outcome.OUT_OF_RANGE, values[outside]
+    good_rate = (rate >= SMALLEST_RATE) & (rate <= LARGEST_RATE)
+    for outside, values in ((~good_rate, rate), (~(unloading <= LARGEST_UNLOADING), unloading)):
+        solution.outcome[outside], solution.detail[outside] = Outcome.OUT_OF_RANGE, values[outside]
 
 
 #: Points in a call that integrates the growth of disturbances.

@@ -1,6 +1,6 @@
 """Names that tables, figures and sentences are written in: those of the paper, or of geophysics.
 
-Keys of JSON, columns of files, options and coordinates keep the one name of each parameter.
+Keys of JSON, columns of files and coordinates keep the one name of each parameter.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from asperity.parameters.table import EXPERIMENT, INTERFACE, law_parameters, pla
 
 #: Decorations of a formula that a plain name goes without.
 _DECORATIONS = re.compile(r"\\bar|[\\{}]")
-#: Words of a sentence. What an option takes keeps its name, and "A" before a noun is the article.
+#: Words of a sentence. What an option takes keeps its name, unless it is a parameter's, and "A"
+#: before a noun is the article.
 _WORDS = re.compile(
-    r"(?P<kept>--[\w-]+ \S+|(?:^|(?<=[.:;] ))A(?= [a-z]{2})(?! (?:is|and|at|has|of|lies)\b))"
+    r"(?P<kept>--(?!fix|set|start|prior)[\w-]+ \S+"
+    r"|(?:^|(?<=[.:;] ))A(?= [a-z]{2})(?! (?:is|and|at|has|of|lies)\b))"
     r"|(?<!\w)[A-Za-z]\w*"
 )
 
@@ -63,6 +65,16 @@ def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
         return word[0] if word["kept"] else known.get(word[0], word[0])
 
     return _WORDS.sub(renamed, text)
+
+
+def parameter_named(name: str, law: Any = None) -> str:
+    """The name of the parameter that geophysics calls so: D0 for ``D_c`` or ``Dc``."""
+    known = {_folded(usual): parameter for parameter, usual in plain_names(law).items()}
+    return known.get(_folded(name), name)
+
+
+def _folded(name: str) -> str:
+    return name.replace("_", "").casefold()
 
 
 #: Symbols of figures in geophysics, in addition to those of `INTERFACE`.

@@ -8,8 +8,10 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
+from asperity._version import __version__
+from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation
-from asperity.parameters import Parameter, point_parameters
+from asperity.parameters import Parameter, law_parameters, point_parameters
 from asperity.slider.motion import Motion
 from asperity.slider.problem import Problem
 from asperity.slider.slider import Slider
@@ -57,6 +59,18 @@ def values_as_text(motion: Motion, load: Modulation | None = None) -> str:
     return "; ".join(shown)
 
 
+def equations_as_text(motion: Motion, parameters: str) -> dict[str, Any]:
+    """Version, law with its source, equation of motion and parameters, as files keep them."""
+    law = type(motion.slider.law)
+    return {
+        "asperity_version": __version__,
+        "law": law.name,
+        "source": law.source,
+        "equation_of_motion": motion.name,
+        "parameters": parameters,
+    }
+
+
 def slider_values(slider: Slider) -> dict[str, Any]:
     """Parameters of the law, K, W0 and M by name, in SI and of any shape."""
     known = point_parameters(type(slider.law)).values()
@@ -64,7 +78,13 @@ def slider_values(slider: Slider) -> dict[str, Any]:
     return {p.name: _leaf(slider, p.path.removeprefix("system.slider.")) for p in of_slider}
 
 
-def slider_from(law: type[Any], values: Any) -> Slider:
+def law_from(law: type[Law], values: Any) -> Law:
+    """The law with the values that a mapping has by name."""
+    names = law_parameters(law).items()
+    return law(**{p.path.rsplit(".", 1)[-1]: values[name] for name, p in names})
+
+
+def slider_from(law: type[Law], values: Any) -> Slider:
     """The slider with the values, SI or texts with units, that a mapping has by name.
 
     Parameters
@@ -73,12 +93,8 @@ def slider_from(law: type[Any], values: Any) -> Slider:
     values : mapping of str to number, array or str
         Parameters of the law, K, W0, and M unless it is 0.
     """
-    fields = {
-        p.path.rsplit(".", 1)[-1]: values[name]
-        for name, p in point_parameters(law).items()
-        if p.place == "law"
-    }
-    return Slider(law(**fields), spring=values["K"], load=values["W0"], mass=values.get("M", 0.0))
+    numbers = law_from(law, values)
+    return Slider(numbers, spring=values["K"], load=values["W0"], mass=values.get("M", 0.0))
 
 
 def _leaf(owner: Any, path: str) -> Any:

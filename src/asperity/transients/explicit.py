@@ -18,7 +18,7 @@ from jax import Array
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import AcceptedSteps, TrialStep, one_kernel, run_steps
+from asperity.transients.steps import TrialStep, one_kernel, run_steps
 
 _SAFETY = 0.9
 _LIMITS = 0.2, 6.0
@@ -42,8 +42,9 @@ def advance(
     rtol, atol : array
         Tolerances of `SegmentEquations.scale`.
     """
-    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
-    return run.chunk(_dense(system, run.begin, run.length, *run.records))
+    chunk = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    dense = _dense(system, chunk.begin, chunk.length, *chunk.coefficients)
+    return chunk._replace(coefficients=dense)
 
 
 @one_kernel
@@ -56,7 +57,7 @@ def _run(
     longest: Array,
     rtol: Array,
     atol: Array,
-) -> AcceptedSteps:
+) -> StepChunk:
     def attempt(t: Array, Y: Array, h: Array, slope: Array) -> TrialStep:
         return attempt_step(system, t, Y, h, slope, rtol, atol)
 

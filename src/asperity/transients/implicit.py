@@ -26,7 +26,7 @@ from asperity.algebra.small_systems import jacobian_columns, product, solve_colu
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import AcceptedSteps, TrialStep, one_kernel, run_steps
+from asperity.transients.steps import TrialStep, one_kernel, run_steps
 
 STAGES = 5
 _SAFETY = 0.9
@@ -87,8 +87,8 @@ def advance(
     system: SegmentEquations, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
 ) -> StepChunk:
     """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
-    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
-    return run.chunk(run.records[0])
+    chunk: StepChunk = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    return chunk
 
 
 @one_kernel
@@ -101,7 +101,7 @@ def _run(
     longest: Array,
     rtol: Array,
     atol: Array,
-) -> AcceptedSteps:
+) -> StepChunk:
     powers = jnp.asarray(_tableau().powers)
 
     def attempt(t: Array, Y: Array, h: Array, last: _LastStep) -> TrialStep:
@@ -111,9 +111,7 @@ def _run(
         safety = _SAFETY * (2 * _NEWTON_STEPS + 1) / (2 * _NEWTON_STEPS + steps)
         factor = safety * error ** (-1 / (STAGES + 1))
         piece = (powers @ Z.T).at[0].set(Y)
-        return TrialStep(
-            Y + Z[:, -1], error, factor, _LastStep(piece, h), h * slope < _MILD, (piece,)
-        )
+        return TrialStep(Y + Z[:, -1], error, factor, _LastStep(piece, h), h * slope < _MILD, piece)
 
     none = _LastStep(jnp.zeros((STAGES + 1, Y.shape[0])), jnp.zeros(()))
     return run_steps(system, t, Y, h, end, longest, attempt, none, _LIMITS)

@@ -128,7 +128,7 @@ class TrialStep(NamedTuple):
         Passed to the next step if this one is accepted.
     doubtful : array
         Whether the other method might take this step at lower cost.
-    record : tuple of arrays
+    record : pytree of arrays
         Data of the dense output.
     """
 
@@ -137,32 +137,11 @@ class TrialStep(NamedTuple):
     factor: Array
     memory: Any
     doubtful: Array
-    record: tuple[Array, ...]
+    record: Any
 
 
 #: Time, states, length and memory -> a trial.
 StepAttempt = Callable[[Array, Array, Array, Any], TrialStep]
-
-
-class AcceptedSteps(NamedTuple):
-    """Accepted steps; attributes as in `StepChunk`, `records` those of the trials, (STEPS, ...)."""
-
-    t: Array
-    Y: Array
-    next_length: Array
-    memory: Any
-    taken: Array
-    rejected: Array
-    doubtful: Array
-    status: Array
-    begin: Array
-    length: Array
-    records: tuple[Array, ...]
-
-    def chunk(self, coefficients: Array) -> StepChunk:
-        """The chunk, with the polynomials of the steps."""
-        named = {name: getattr(self, name, coefficients) for name in StepChunk._fields}
-        return StepChunk(**named)
 
 
 def run_steps(
@@ -175,8 +154,10 @@ def run_steps(
     attempt: StepAttempt,
     memory: Any,
     limits: tuple[float, float],
-) -> AcceptedSteps:
+) -> StepChunk:
     """Integrate from `t` towards `end`: at most `STEPS` accepted steps of `_TRIALS` that are tried.
+
+    In the place of the coefficients are the records of the trials, (STEPS, ...).
 
     Parameters
     ----------
@@ -199,18 +180,20 @@ def run_steps(
     by_rest = isinstance(system.motion, StiffInertial | ReversingInertial)
     shortest = _SHORTEST if by_rest else 0.0
 
-    def unfinished(run: AcceptedSteps) -> Array:
+    def unfinished(carry: tuple[StepChunk, Any]) -> Array:
+        run, _ = carry
         tried = run.taken + run.rejected
         room = (run.taken < STEPS) & (tried < _TRIALS)
         return (run.t < end) & room & (run.status == GOING_ON)
 
-    def body(run: AcceptedSteps) -> AcceptedSteps:
+    def body(carry: tuple[StepChunk, Any]) -> tuple[StepChunk, Any]:
+        run, memory = carry
         t, i = run.t, run.taken
         h = jnp.minimum(run.next_length, longest)
         target = jnp.minimum(end, system.segment.next_kink(t))
         cut = t + h >= target
         h = jnp.where(cut, target - t, h)
-        trial = attempt(t, run.Y, h, run.memory)
+        trial = attempt(t, run.Y, h, memory)
         good = trial.error < 1
         factor = jnp.clip(trial.factor, *limits)
         factor = jnp.where(jnp.isfinite(trial.error), factor, limits[0])
@@ -224,26 +207,24 @@ def run_steps(
         def kept(value: Array, rows: Array) -> Array:
             return jax.lax.dynamic_update_index_in_dim(rows, value, i, 0)
 
-        return AcceptedSteps(
-            accepted(jnp.where(cut, target, t + h), t),
-            accepted(trial.end, run.Y),
+        chunk = StepChunk(
+            begin=kept(t, run.begin),
+            length=kept(h, run.length),
+            coefficients=jax.tree.map(kept, trial.record, run.coefficients),
+            taken=i + good,
+            t=accepted(jnp.where(cut, target, t + h), t),
+            Y=accepted(trial.end, run.Y),
             # A step cut short at `target` does not limit the next one.
-            jnp.where(good & cut, jnp.maximum(h_next, run.next_length), h_next),
-            jax.tree.map(accepted, trial.memory, run.memory),
-            i + good,
-            run.rejected + ~good,
-            run.doubtful + (good & trial.doubtful),
-            jnp.where(lost, UNDERFLOW, GOING_ON),
-            kept(t, run.begin),
-            kept(h, run.length),
-            jax.tree.map(kept, trial.record, run.records),
+            next_length=jnp.where(good & cut, jnp.maximum(h_next, run.next_length), h_next),
+            rejected=run.rejected + ~good,
+            status=jnp.where(lost, UNDERFLOW, GOING_ON),
+            doubtful=run.doubtful + (good & trial.doubtful),
         )
+        return chunk, jax.tree.map(accepted, trial.memory, memory)
 
     none, empty = jnp.asarray(0), jnp.zeros(STEPS)
     h = jnp.where(h > 0, h, system.first_length(t, Y))
     record = jax.eval_shape(attempt, t, Y, h, memory).record
     rows = jax.tree.map(lambda a: jnp.zeros((STEPS, *a.shape), a.dtype), record)
-    first = AcceptedSteps(
-        t, Y, h, memory, none, none, none, jnp.asarray(GOING_ON), empty, empty, rows
-    )  # fmt: skip
-    return jax.lax.while_loop(unfinished, body, first)
+    first = StepChunk(empty, empty, rows, none, t, Y, h, none, jnp.asarray(GOING_ON), none)
+    return jax.lax.while_loop(unfinished, body, (first, memory))[0]

@@ -11,14 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity._version import __version__
 from asperity.errors import InputError, require
 from asperity.laws import LinkerDieterich, RiceRuina
 from asperity.loads.programme.programme import BREAK
 from asperity.parameters.arguments import number
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
-from asperity.slider.named import values_as_text
+from asperity.slider.named import equations_as_text, values_as_text
 from asperity.transients.events import Event, Termination
 from asperity.transients.integration import Checkpoint, Integration
 from asperity.units import to_si
@@ -141,13 +140,8 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
 def provenance(integration: Integration) -> dict[str, Any]:
     """Version, law, parameters with units, programme, equations, tolerances and effort."""
     motion = integration.motion
-    law = type(motion.slider.law)
     return {
-        "asperity_version": __version__,
-        "law": law.name,
-        "source": law.source,
-        "equation_of_motion": motion.name,
-        "parameters": values_as_text(motion),
+        **equations_as_text(motion, values_as_text(motion)),
         "programme": repr(integration.programme),
         "method": " and ".join(sorted(integration.methods)),
         "relative_tolerance": integration.tolerances.rtol,

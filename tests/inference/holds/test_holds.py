@@ -39,7 +39,7 @@ def table(exact, healing, **more):
 
 @pytest.fixture(scope="module")
 def fitted(exact, noise):
-    return fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+    return fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=4)
 
 
 def test_the_numbers_come_back(fitted):
@@ -79,9 +79,6 @@ def test_derivatives_are_those_of_differences(exact):
         np.testing.assert_allclose(
             found.jacobian[:, column], slope, rtol=1e-4, atol=1e-5 * abs(slope).max()
         )
-    many = term.chi2_of_many([at, at | {"A": 1.1 * A}])
-    other = term.residuals(at | {"A": 1.1 * A})
-    np.testing.assert_allclose(many, [0, np.sum(other.values**2)], rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.long

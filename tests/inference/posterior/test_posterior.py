@@ -16,8 +16,8 @@ from scipy.special import ndtri
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit
 from asperity.inference.posterior import sample_posterior
-from asperity.inference.posterior.density import Coordinates
-from asperity.inference.posterior.sampling import next_block, warmed_up, whitened_posterior
+from asperity.inference.posterior.density import Coordinates, Whitened
+from asperity.inference.posterior.sampling import next_block, warmed_up
 from asperity.outputs import Interrupted
 
 
@@ -197,7 +197,7 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):
     found = fit_of_steps(steps, THROUGH_GAUGE, {"gain": Prior(1.0, 0.02, "calibration")})
-    whitened = whitened_posterior(found)
+    whitened = Whitened.of(found)
     density, data = whitened.compiled()
     both = jax.jit(jax.value_and_grad(density))
     drawn = np.random.default_rng(0).normal(size=(2, whitened.mode.size))

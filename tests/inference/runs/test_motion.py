@@ -99,6 +99,19 @@ def test_a_motion_that_runs_away_is_no_motion():
     assert recorded_friction(MOTION, {**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
 
 
+def test_a_free_radiation_damping_counts():
+    """What it adds to steady friction is eta V/W, and the derivative is that of differences."""
+    motion = run_equations(get_law("rice-ruina"), 3e-6, radiation_damping=True)
+    drive, reading = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4)), reading_at(TIMES)
+    one, more, less = (
+        recorded_friction(motion, {**VALUES, "eta": eta}, ("eta",), drive, reading)
+        for eta in (2e3, 2.002e3, 1.998e3)
+    )
+    np.testing.assert_allclose(one[0][0], VALUES["mu0"] + 2e3 * 3e-6, rtol=1e-9)
+    slope, expected = one[1][:, 0], (more[0] - less[0]) / 4.0
+    np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("name", population(["regularised", "linker-dieterich", "rice-ruina"]))
 def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
     """However long it is, steps stay where the integrator is stable: F/W is mu_ss there."""

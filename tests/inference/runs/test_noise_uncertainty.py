@@ -64,6 +64,7 @@ def test_degrees_of_freedom_of_a_mean_in_closed_form():
     assert variance[0] / covariance[0, 0] ** 2 == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.long
 def test_intervals_cover_where_those_under_known_noise_do_not():
     n, order, sets = 120, 12, 600
     s = np.arange(n) / n

@@ -116,18 +116,25 @@ def test_no_mistake_no_alarm():
     assert np.isfinite(found.log_multipliers).all()
 
 
+def observed(mistake):
+    """A mistake in the observables of a pass."""
+    return lambda p, n: p._replace(observables=p.observables._replace(**mistake(p.observables, n)))
+
+
 @pytest.mark.parametrize(
     "mistake",
     [
         # Derivatives that grow or shrink, the same on every division: Liouville's formula sees it.
-        lambda p, _: p._replace(monodromy=p.monodromy * (1 + 3e-8)),
-        lambda p, _: p._replace(log_determinant=p.log_determinant * 1.001),
+        observed(lambda o, _: {"monodromy": o.monodromy * (1 + 3e-8)}),
+        observed(lambda o, _: {"log_determinant": o.log_determinant * 1.001}),
         # A method of low order: its error falls too slowly with the number of steps.
-        lambda p, n: p._replace(harmonics=p.harmonics * (1 + 3e-3 / n)),
-        lambda p, n: p._replace(mean_friction=p.mean_friction * (1 + 3e-3 / n)),
+        observed(lambda o, n: {"harmonics": o.harmonics * (1 + 3e-3 / n)}),
+        observed(lambda o, n: {"mean_friction": o.mean_friction * (1 + 3e-3 / n)}),
         # The same of the derivatives, with the right determinant.
-        lambda p, n: p._replace(
-            monodromy=p.monodromy.at[0].multiply(1 + 1e-2 / n).at[1].divide(1 + 1e-2 / n)
+        observed(
+            lambda o, n: {
+                "monodromy": o.monodromy.at[0].multiply(1 + 1e-2 / n).at[1].divide(1 + 1e-2 / n)
+            }
         ),
         # A period that does not close.
         lambda p, _: p._replace(change=p.change + 1e-8),

@@ -11,8 +11,7 @@ from collections.abc import AsyncGenerator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from asperity.app.jobs.threads import BUSY
-
+_BUSY = "too many computations wait; try again in a while"
 #: Longest message of a worker (bytes).
 _LONGEST = 64 * 1024**2
 #: Time (s) within which a cancelled job must stop.
@@ -20,14 +19,10 @@ _PATIENCE = 1.0
 
 
 class Jobs:
-    """Runs jobs in worker processes.
-
-    A client has at most one job: a newer job ends the earlier job.
+    """Runs jobs in a worker process, one after the other.
 
     Parameters
     ----------
-    workers : int
-        Jobs that run at the same time; further jobs wait.
     most : int
         Jobs that may wait.
     preload : str
@@ -40,7 +35,6 @@ class Jobs:
 
     def __init__(
         self,
-        workers: int = 1,
         most: int = 20,
         preload: str = "asperity.orbit",
         laws: Sequence[str] = (),
@@ -49,17 +43,15 @@ class Jobs:
         self._most = most
         self._folder = folder
         self._preload = (preload, *laws)
-        self._free = asyncio.Semaphore(workers)
+        self._free = asyncio.Lock()
         self._waiting = 0
         self._idle: list[_Worker] = []
-        self._current: dict[str, asyncio.Event] = {}
         self._alive: set[_Worker] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._closed = False
 
     async def run(
         self,
-        client: str,
         job: str,
         argument: Any,
         *,
@@ -68,11 +60,10 @@ class Jobs:
     ) -> AsyncGenerator[dict[str, Any], None]:
         """Messages of a job, the last of which has ``done``.
 
-        Closing the iterator early ends the job.
+        Closing the iterator early ends the job, as when the page closes the connection.
 
         Parameters
         ----------
-        client : str
         job : str
             ``module:function``; see `asperity.app.jobs.worker`.
         argument
@@ -86,13 +77,8 @@ class Jobs:
         Where too many jobs wait, the one message says so.
         """
         if self._waiting >= self._most:
-            yield {"error": BUSY, "done": True}
+            yield {"error": _BUSY, "done": True}
             return
-        newer = asyncio.Event()
-        earlier = self._current.pop(client, None)
-        if earlier is not None:
-            earlier.set()
-        self._current[client] = newer
         self._waiting += 1
         try:
             if self._free.locked():
@@ -100,53 +86,26 @@ class Jobs:
             await self._free.acquire()
         finally:
             self._waiting -= 1
-        if newer.is_set():
-            self._free.release()
-            yield {"error": "superseded", "cancelled": True, "done": True}
-            return
-        try:
-            async for message in self._run(job, argument, limits, seconds, newer):
-                yield message
-        finally:
-            if self._current.get(client) is newer:
-                del self._current[client]
-
-    async def _run(
-        self,
-        job: str,
-        argument: Any,
-        limits: Mapping[str, int] | None,
-        seconds: float,
-        newer: asyncio.Event,
-    ) -> AsyncGenerator[dict[str, Any], None]:
-        """Messages of the job; frees its place among the workers when its worker is idle again."""
         if self._closed:
             self._free.release()
             return
         worker = None
         finished = False
-        superseded = asyncio.ensure_future(newer.wait())
+        clock = asyncio.get_running_loop().time
+        end = clock() + seconds
         try:
             worker = self._idle_one() or await _Worker.start(self._preload, self._folder)
             self._alive.add(worker)
             await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
-            end = asyncio.get_running_loop().time() + seconds
             while not finished:
-                reading = asyncio.ensure_future(worker.read())
-                left = end - asyncio.get_running_loop().time()
-                await asyncio.wait(
-                    {reading, superseded}, timeout=left, return_when=asyncio.FIRST_COMPLETED
-                )
-                if not reading.done():
-                    reading.cancel()
-                    why = "superseded" if superseded.done() else _too_long(seconds)
-                    yield {"error": why, "cancelled": superseded.done(), "done": True}
+                try:
+                    message = await asyncio.wait_for(worker.read(), end - clock())
+                except TimeoutError:
+                    yield {"error": _too_long(seconds), "done": True}
                     return
-                message = reading.result()
                 finished = message is None or bool(message.get("done"))
                 yield message or {"error": _why_it_ended(limits), "done": True}
         finally:
-            superseded.cancel()
             # The client may be gone, and this task with it: another task looks after the worker.
             task = asyncio.get_running_loop().create_task(
                 self._look_after(worker, reusable=not limits, finished=finished)
@@ -190,7 +149,7 @@ class Jobs:
             task.add_done_callback(self._tasks.discard)
 
     async def _warm(self, job: str) -> None:
-        async for _ in self.run("the server itself", job, {}):
+        async for _ in self.run(job, {}):
             pass
 
     async def close(self) -> None:

@@ -1,89 +1,12 @@
-"""Work in threads of the server: short computations, and compilation ahead of the first request."""
+"""Compilation ahead of the first request, in a thread of the server."""
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
-
-from starlette.exceptions import HTTPException
-
-BUSY = "too many computations wait; try again in a while"
-_SUPERSEDED = "a newer request took the place of this one"
-
-
-class _Waiting(NamedTuple):
-    work: Callable[[], Any]
-    answer: asyncio.Future[Any]
-
-
-class Lane:
-    """Threads for short computations.
-
-    A client has at most one request waiting: a newer request replaces it, and the older one is
-    refused. Clients are served in the order in which they began to wait: a client that sends
-    requests without pause gets no more turns than others.
-
-    Parameters
-    ----------
-    threads : int
-    most : int
-        Clients that may wait.
-    """
-
-    def __init__(self, threads: int, most: int = 200) -> None:
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="asperity-lane")
-        self._idle = threads
-        self._most = most
-        self._waiting: OrderedDict[str, _Waiting] = OrderedDict()
-
-    async def run(self, client: str, work: Callable[[], Any]) -> Any:
-        """The result of `work`, called in a thread.
-
-        Raises
-        ------
-        HTTPException
-            409 where a newer request took the place of this one, 503 where too many clients wait.
-        """
-        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        earlier = self._waiting.get(client)
-        if earlier is None and len(self._waiting) >= self._most:
-            raise HTTPException(503, BUSY)
-        # The place in the queue stays that of the earlier request.
-        self._waiting[client] = _Waiting(work, answer)
-        if earlier is not None and not earlier.answer.done():
-            earlier.answer.set_exception(HTTPException(409, _SUPERSEDED))
-        self._start()
-        return await answer
-
-    def close(self) -> None:
-        """Let no further work begin."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-
-    def _start(self) -> None:
-        while self._idle and self._waiting:
-            _, (work, answer) = self._waiting.popitem(last=False)
-            if answer.done():  # the client is gone
-                continue
-            self._idle -= 1
-            asyncio.get_running_loop().create_task(self._finish(work, answer))
-
-    async def _finish(self, work: Callable[[], Any], answer: asyncio.Future[Any]) -> None:
-        try:
-            result = await asyncio.get_running_loop().run_in_executor(self._pool, work)
-        except Exception as error:
-            if not answer.done():
-                answer.set_exception(error)
-        else:
-            if not answer.done():
-                answer.set_result(result)
-        finally:
-            self._idle += 1
-            self._start()
+from typing import Any
 
 
 class Preparation:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import log_density
 from asperity.inference.posterior.density import Whitened
-from asperity.inference.posterior.sampling import whitened_posterior
 from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
@@ -79,8 +78,8 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
 
     Notes
     -----
-    The prior is `PriorDensity`. A range k times as wide of a parameter that these data determine
-    lowers the logarithm by ln k.
+    The prior is that of `Coordinates`. A range k times as wide of a parameter that these data
+    determine lowers the logarithm by ln k.
     """
     if samples is None:
         samples = min(term.affordable for term in fit.objective.terms)
@@ -88,12 +87,12 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
         # Nothing to average over.
         density = fit.log_likelihood
         return Evidence(density, 0.0, float(samples), density, 0, {})
-    whitened = whitened_posterior(fit)
+    whitened = Whitened.of(fit)
     n = whitened.mode.size
     at_mode = float(_log_target(fit, whitened, np.zeros((1, n)))[0])
     laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
-        return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior.record())
+        return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior_record())
     # The whole of scipy.stats takes longer to load than a fit of a velocity step to begin.
     from scipy.stats import multivariate_t
 
@@ -111,7 +110,7 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
         float(weights.sum() ** 2 / (weights**2).sum()),
         laplace,
         failed,
-        whitened.prior.record(),
+        whitened.prior_record(),
     )
 
 
@@ -121,7 +120,7 @@ def _log_target(fit: Fit, whitened: Whitened, z: Float) -> Float:
     u = np.asarray(whitened.coordinates.to_u(q))
     volume = np.asarray(whitened.coordinates.log_slope(q)).sum(-1)
     volume = volume + np.linalg.slogdet(whitened.root)[1]
-    total = whitened.prior.log_density(u) + volume
+    total = whitened.coordinates.log_density(u) + volume
     values = [fit.objective.named(x) for x in u]
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         # The change from the estimate: the error of a coarse model of searched orbits is in both.

@@ -91,7 +91,16 @@ def described_fit(
     minima = [(objective.ordered(u), value) for u, value in minima]
     at = parabola_of(objective, *minima[0])
     if at is None:
-        return _fit_at_the_next(objective, minima, profile=profile, described=described)
+        # It lies at the edge of the region in which there are orbits, and was not reached again.
+        if not minima[1:]:
+            return failed_fit(objective)
+        result = described_fit(objective, minima[1:], profile=profile, described=described)
+        lost = (
+            f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
+            "periodic orbits, and was not found again: this is the next one; leave out the rows "
+            "of the slowest modulation and compare"
+        )
+        return replace(result, warnings=(lost, *result.warnings))
     # A search would not improve intervals under a law that the data contradict.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
@@ -161,28 +170,6 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
         "has periodic orbits, which takes minutes; ask for it (--profile), fix a parameter or give "
         "a prior"
     )
-
-
-def _fit_at_the_next(
-    objective: Objective,
-    minima: Sequence[tuple[Float, float]],
-    *,
-    profile: bool,
-    described: Callable[[int], None] | None,
-) -> Fit:
-    """The fit at the second minimum.
-
-    The first lies at the edge of the region in which there are orbits, and was not reached again.
-    """
-    if not minima[1:]:
-        return failed_fit(objective)
-    result = described_fit(objective, minima[1:], profile=profile, described=described)
-    lost = (
-        f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
-        "periodic orbits, and was not found again: this is the next one; leave out the rows of the "
-        "slowest modulation and compare"
-    )
-    return replace(result, warnings=(lost, *result.warnings))
 
 
 def _ends(
@@ -428,7 +415,8 @@ def _hull(
 def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     """The fit with its warnings, those in `said` first."""
     if fit.dof > 0 and fit.p_value < _MISFIT:
-        worst = max(fit.observables, key=lambda n: _excess(*fit.observables[n]))
+        sums = fit.observables.items()
+        worst, _ = max(sums, key=lambda pair: (pair[1][0] - pair[1][1]) / math.sqrt(2 * pair[1][1]))
         said.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom (p = "
             f"{fit.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
@@ -449,7 +437,7 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
-    u = _coordinates(fit)
+    u = fit.objective.coordinates(fit.values)
     slopes = [r.jacobian for r in fit.residuals] + [fit.objective.prior_residuals(u)[1]]
     information = np.sum([J.T @ J for J in slopes], axis=0)
     outliers = _outliers(fit)
@@ -472,10 +460,6 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     return replace(fit, warnings=tuple(said), outliers=outliers)
 
 
-def _coordinates(fit: Fit) -> Float:
-    return fit.objective.coordinates({k.name: fit.values[k.name] for k in fit.objective.unknowns})
-
-
 def _outliers(fit: Fit) -> tuple[int, ...]:
     """Rows of the table without which the law describes it.
 
@@ -488,7 +472,7 @@ def _outliers(fit: Fit) -> tuple[int, ...]:
     ((term, residuals),) = tables
     if len(objective.terms) > 1:
         return tuple(outlying_rows(residuals))
-    u = _coordinates(fit)
+    u = objective.coordinates(fit.values)
 
     def whole(u: Float) -> Residuals | None:
         data = objective.data_residuals(u)
@@ -509,10 +493,6 @@ def _outliers(fit: Fit) -> tuple[int, ...]:
 
     now = whole(u)
     return () if now is None else tuple(outlying_rows(now, refit))
-
-
-def _excess(chi2: float, n: int) -> float:
-    return (chi2 - n) / math.sqrt(2 * n)
 
 
 def _why_undetermined(fit: Fit, name: str) -> str:

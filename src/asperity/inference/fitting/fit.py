@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -168,23 +168,18 @@ def fit(
                 f"data must be {what} alone or other data, got both; fit them one after the "
                 "other, with the first as the prior of the second"
             )
-    numbers: dict[str, Any] = {
-        "fixed": fixed or {},
-        "material": material,
-        "prior": prior,
-        "start": start,
-    }
+    numbers = _Given(fixed or {}, material, prior, start)
+    motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
-        motion = {"inertia": inertia, "radiation_damping": radiation_damping}
         return _objective(
-            chosen, table, recordings, names, options=options, motion=motion, bare=bare, **numbers
+            chosen, table, recordings, names, numbers, options=options, motion=motion, bare=bare
         )
 
     if cycles:
-        objective = _cycle_objective(chosen, cycles, free, **numbers)
+        objective = _cycle_objective(chosen, cycles, free, numbers)
     elif holds:
-        objective = _hold_objective(chosen, joined_holds(holds), names, bare=bare, **numbers)
+        objective = _hold_objective(chosen, joined_holds(holds), names, numbers, bare=bare)
     else:
         objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
@@ -208,21 +203,20 @@ def fit(
         return replace(result, warnings=(*result.warnings, other)) if other else result
     said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
     said += unusual_numbers(result, recordings)
-    given = numbers["fixed"].get("K")
+    given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
         begun = {**(start or {}), **_begun(result, recordings, given)}
-        others = {n: v for n, v in numbers["fixed"].items() if n != "K"}
+        others = {n: v for n, v in numbers.fixed.items() if n != "K"}
         freed = fit(
             recordings,
             law,
             [n for n in names if n != "K"],
-            inertia=inertia,
-            radiation_damping=radiation_damping,
+            **numbers._replace(fixed=others, start=begun)._asdict(),
+            **motion,
             runs=runs,
             starts=1,
             seed=seed,
-            **{**numbers, "fixed": others, "start": begun},
         )
         said += (
             contradicted_sharing(result, freed, recordings)
@@ -232,15 +226,26 @@ def fit(
     return replace(result, warnings=(*said, *result.warnings))
 
 
+class _Given(NamedTuple):
+    """Numbers that the caller gives, as of `fit`."""
+
+    fixed: Mapping[str, Any]
+    material: Material | None
+    prior: Material | Mapping[str, Prior] | None
+    start: Mapping[str, Any] | None
+
+    def priors(self, free: Sequence[str]) -> dict[str, Prior]:
+        """Priors by the names of free parameters."""
+        prior = self.prior
+        return material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
+
+
 def _hold_objective(
     law: type[Law],
     table: HealingTable,
     free: list[str],
+    given: _Given,
     *,
-    fixed: Mapping[str, Any],
-    material: Material | None,
-    prior: Material | Mapping[str, Prior] | None,
-    start: Mapping[str, Any] | None,
     bare: bool,
 ) -> Objective:
     """The function to minimise for a table of holds, everything wrong refused."""
@@ -251,15 +256,16 @@ def _hold_objective(
                 f"free must be parameters of {law.name} with holds, got '{name}'; leave it out: "
                 "the table has stiffness and velocity"
             )
-    priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
+    priors = given.priors(free)
     require_free(law, free, priors, bare=bare)
     # Healing is counted from the level of sliding: the level itself does not enter.
     assumed = {n: v for n, v in _OF_THE_LEVEL.items() if n in numbers and n not in free}
-    given = {n: v for n, v in fixed.items() if n not in ("V", "K", "W0")}
-    known = {n for n in assumed if material is not None and n in material} | set(given)
-    given |= {n: v for n, v in assumed.items() if n not in known}
-    constants = fixed_values(law, None, free, given, material)
-    begun = start_values(law, free, start, material)
+    material = given.material
+    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
+    known = {n for n in assumed if material is not None and n in material} | set(fixed)
+    fixed |= {n: v for n, v in assumed.items() if n not in known}
+    constants = fixed_values(law, None, free, fixed, material)
+    begun = start_values(law, free, given.start, material)
     unknowns = unknowns_of(law, free, largest_epsilon=0.0, start=begun, priors=priors)
     require_rows(table.name, table.rows, unknowns)
     term = HoldTerm(table, law, constants)
@@ -270,19 +276,15 @@ def _cycle_objective(
     law: type[Law],
     cycles: Sequence[AveragedCycle],
     free: Sequence[str] | None,
-    *,
-    fixed: Mapping[str, Any],
-    material: Material | None,
-    prior: Material | Mapping[str, Prior] | None,
-    start: Mapping[str, Any] | None,
+    given: _Given,
 ) -> Objective:
     """The function to minimise for averaged cycles, everything wrong refused."""
     first, numbers = cycles[0], law_parameters(law)
     # The level of friction is fitted in each cycle.
-    given = {n: v for n, v in fixed.items() if n not in ("V", "W0")}
+    fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
     level = float(np.mean(first.values[:-1]))
-    given = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | given
-    names = [n for n in (*numbers, "K", "M") if n not in given] if free is None else list(free)
+    fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
+    names = [n for n in (*numbers, "K", "M") if n not in fixed] if free is None else list(free)
     if "mu0" in names:
         raise InputError(
             "free must be what the shape of a cycle shows, got 'mu0'; leave it out: a constant "
@@ -294,21 +296,21 @@ def _cycle_objective(
             f"M must be fixed where a slip is shorter than four samples, got it free for "
             f"{unseen[0]}; fix M, or sample faster"
         )
-    constants = fixed_values(law, None, names, given, material)
-    if "K" in given and "K" not in names:
-        constants["K"] = float(MACHINE["K"].check(given["K"]))
+    constants = fixed_values(law, None, names, fixed, given.material)
+    if "K" in fixed and "K" not in names:
+        constants["K"] = float(MACHINE["K"].check(fixed["K"]))
     missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
     if missing:
         raise InputError(
             f"{missing[0]} must be free or fixed for a fit of cycles, got neither; name it in "
             "--free, or give it with --fix"
         )
-    priors = material_priors(prior, names) if isinstance(prior, Material) else dict(prior or {})
+    priors = given.priors(names)
     require_free(law, names, priors, bare=False)
     # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
     K = first.loading_slope * first.W0 / first.V
     M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
-    begun = {"K": K, "M": M} | start_values(law, names, start, material)
+    begun = {"K": K, "M": M} | start_values(law, names, given.start, given.material)
     usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
     unknowns = unknowns_of(
         law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
@@ -380,17 +382,15 @@ def _objective(
     table: LockInTable | None,
     recordings: Sequence[RecordedRun],
     free: list[str],
+    given: _Given,
     *,
-    fixed: Mapping[str, Any],
-    material: Material | None,
-    prior: Material | Mapping[str, Prior] | None,
-    start: Mapping[str, Any] | None,
     options: RunOptions,
     motion: Mapping[str, bool],
     bare: bool,
 ) -> Objective:
     """The function to minimise, with everything that can be refused before computing refused."""
     require_motion(free, motion)
+    fixed, material = given.fixed, given.material
     if recordings:
         require_no_layer(free)
     if recordings and table is None:
@@ -400,8 +400,8 @@ def _objective(
     if table is not None and (shared or "K" in fixed):
         require_newtons(recordings)
     named = [name for name in free if not (name == "K" and recordings and table is None)]
-    priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
-    begun = start_values(law, free, start, material, runs=recordings)
+    priors = given.priors(free)
+    begun = start_values(law, free, given.start, material, runs=recordings)
     constants = fixed_values(law, table, free, fixed, material, runs=recordings)
     if table is not None and not recordings:
         begun, priors = of_the_table(begun, priors, constants)

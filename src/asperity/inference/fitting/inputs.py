@@ -23,6 +23,7 @@ from asperity.inference.unknowns import (
     Prior,
     Unknown,
     material_priors,
+    require_fittable,
 )
 from asperity.laws import Law, registered
 from asperity.materials import Material
@@ -161,6 +162,7 @@ def fixed_values(
     InputError
         If a name or value is wrong, or a number is missing.
     """
+    require_fittable(law, free)
     known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
     points: Mapping[str, Any] = {} if table is None else table.points
     if table is None:

@@ -61,18 +61,18 @@ def with_noise(
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
     ends: list[_End] = []
     for u in _apart(objective, starts):
-        ends += _with_own_noise(objective, u, ends)
+        ends += _with_own_noise(objective, u, ends, _COARSE)
     ends.sort(key=lambda end: end.deviance)
-    best = ends[0]
+    (best,) = _with_own_noise(ends[0].objective, ends[0].u, (), objective.tolerance)
     objective.terms = best.objective.terms
     objective.forget()
-    lowest = objective.minimise(best.u)
+    chi2 = objective.chi2(best.u)
     others = [
-        Minimum(end.u, lowest.chi2 + end.deviance - best.deviance)
+        Minimum(end.u, chi2 + end.deviance - best.deviance)
         for end in ends[1:]
         if math.isfinite(end.deviance)
     ]
-    return [lowest, *others], best.agreed
+    return [Minimum(best.u, chi2), *others], best.agreed
 
 
 def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
@@ -94,7 +94,9 @@ class _End(NamedTuple):
     agreed: bool
 
 
-def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> list[_End]:
+def _with_own_noise(
+    objective: Objective, u: Float, known: Sequence[_End], tolerance: float
+) -> list[_End]:
     """Noise and parameters in turn, until the parameters stay where they are.
 
     Empty where they come to an end that is known, or will not come to one that matters: each round
@@ -110,7 +112,7 @@ def _with_own_noise(objective: Objective, u: Float, known: Sequence[_End]) -> li
         for term in noisy:
             term.update_noise(objective.named(begin))
         objective.forget()
-        u, value = objective.minimise(begin, tolerance=_COARSE)
+        u, value = objective.minimise(begin, tolerance=tolerance)
         if not math.isfinite(value):
             break
         begin, u = objective.ordered(begin), objective.ordered(u)

@@ -236,61 +236,38 @@ class Fit(Drawn):
 
 def fit_record(fit: Fit) -> dict[str, Any]:
     """Everything that a fit says; infinite and undefined numbers are None."""
-    return {
-        "law": fit.law,
-        "converged": fit.converged,
-        "message": fit.message,
+    names = ("law", "converged", "message", "undetermined", "warnings")
+    numbers = ("chi2", "dof", "p_value", "log_likelihood", "aicc", "bic")
+    known = {**point_parameters(fit.objective.law), EPS_RATIO.name: EPS_RATIO}
+    # None for a number that each row of a table has its own of.
+    fixed = {n: np.unique(v) for n, v in fit.objective.fixed.items()}
+    record = {name: getattr(fit, name) for name in (*names, *numbers)} | {
         "parameters": {
             name: {**_estimate(p), "determined": name not in fit.undetermined}
             for name, p in fit.parameters.items()
         },
         "over_load": {name: _estimate(p) for name, p in fit.over_load.items()},
-        "fixed": _fixed(fit),
-        "correlation": {
-            "names": list(fit.parameters),
-            "matrix": [[plain(x) for x in row] for row in fit.correlation.tolist()],
+        "fixed": {
+            name: {"value": v[0] if v.size == 1 else None, "unit": known[name].unit}
+            for name, v in fixed.items()
         },
-        "undetermined": list(fit.undetermined),
-        "chi2": plain(fit.chi2),
-        "dof": fit.dof,
-        "p_value": plain(fit.p_value),
-        "log_likelihood": plain(fit.log_likelihood),
-        "aicc": plain(fit.aicc),
-        "bic": plain(fit.bic),
+        "correlation": {"names": list(fit.parameters), "matrix": fit.correlation.tolist()},
         "observables": {
             name: {"chi2": chi2, "n": n} for name, (chi2, n) in fit.observables.items()
         },
         "noise": _noise(fit),
-        "optima": [{"chi2": o.chi2, "values": dict(o.values)} for o in fit.optima],
-        "warnings": list(fit.warnings),
+        "optima": [vars(other) for other in fit.optima],
         "data": " and ".join(term.name for term in fit.objective.terms),
         "asperity_version": __version__,
     }
+    result: dict[str, Any] = plain(record)
+    return result
 
 
 def _estimate(result: Estimate) -> dict[str, Any]:
-    prior = result.prior
-    return {
-        "value": plain(result.value),
-        "unit": result.unit,
-        "se": plain(result.se),
-        "interval_68": [plain(x) for x in result.interval_68],
-        "interval_95": [plain(x) for x in result.interval_95],
-        "at_bound": result.at_bound,
-        "prior": None
-        if prior is None
-        else {"mean": prior.mean, "sd": prior.sd, "source": prior.source},
-    }
-
-
-def _fixed(fit: Fit) -> dict[str, Any]:
-    """Numbers that were not fitted; None for those that each row of a table has its own of."""
-    known = {**point_parameters(fit.objective.law), EPS_RATIO.name: EPS_RATIO}
-    several = {n: np.unique(v) for n, v in fit.objective.fixed.items()}
-    return {
-        name: {"value": plain(v[0]) if v.size == 1 else None, "unit": known[name].unit}
-        for name, v in several.items()
-    }
+    record = {name: value for name, value in vars(result).items() if name != "name"}
+    prior = result.prior and {n: getattr(result.prior, n) for n in ("mean", "sd", "source")}
+    return {**record, "prior": prior}
 
 
 def _noise(fit: Fit) -> dict[str, Any]:

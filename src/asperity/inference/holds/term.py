@@ -17,13 +17,13 @@ from asperity.inference.holds.table import HEALING, HealingTable
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.parameters import law_parameters
-from asperity.slider import Slider
+from asperity.slider.named import slider_from
 from asperity.transients.hold_and_step import hold
 
 Float = NDArray[np.float64]
 
-#: Holds in a call of the compiled programs, of a table and of many sets of parameters.
-_ROWS, _MANY = 32, 1024
+#: Tables are filled up to a multiple of so many holds.
+_ROWS = 32
 
 
 class HoldTerm(DataTerm):
@@ -47,8 +47,7 @@ class HoldTerm(DataTerm):
 
     def __init__(self, table: HealingTable, law: type[Law], fixed: Mapping[str, Any]) -> None:
         self.table, self.law, self.name = table, law, table.name
-        self._fields = {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(law).items()}
-        self._fixed = {n: float(v) for n, v in fixed.items() if n in self._fields}
+        self._fixed = {n: float(v) for n, v in fixed.items() if n in law_parameters(law)}
         self.error = 0.1 * float(np.ptp(table.healing)) or 1e-3
         self._freedom = math.inf
 
@@ -86,21 +85,17 @@ class HoldTerm(DataTerm):
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None where a hold has no solution."""
-        names = tuple(n for n in values if n in self._fields)
-        rows = self.table.rows
-        predicted, columns = np.empty(rows), np.zeros((rows, len(values)))
-        places = [list(values).index(n) for n in names]
-        for i in range(0, rows, _ROWS):
-            at = np.minimum(np.arange(i, i + _ROWS), rows - 1)
-            kept = slice(i, min(i + _ROWS, rows))
-            value, slopes = _with_slopes(
-                self.law, tuple(self._fields.items()), names, self._given(values, at), *self._at(at)
-            )
-            predicted[kept] = np.asarray(value)[: kept.stop - i]
-            for place, slope in zip(places, np.asarray(slopes), strict=True):
-                columns[kept, place] = slope[: kept.stop - i]
+        names = tuple(n for n in values if n in law_parameters(self.law))
+        table, rows = self.table, self.table.rows
+        at = np.minimum(np.arange(-(-rows // _ROWS) * _ROWS), rows - 1)
+        known = self._fixed | {n: values[n] for n in names}
+        given = {n: jnp.full(at.shape, v) for n, v in known.items()}
+        drive = (jnp.asarray(x[at]) for x in (table.K, table.V, table.hold_time))
+        predicted, slopes = (np.asarray(a) for a in _with_slopes(self.law, names, given, *drive))
+        columns = np.zeros((rows, len(values)))
+        columns[:, [n in names for n in values]] = slopes.T[:rows]
         sigma = self.sigma
-        whitened = (predicted - self.table.healing) / sigma
+        whitened = (predicted[:rows] - table.healing) / sigma
         if not (np.isfinite(whitened).all() and np.isfinite(columns).all()):
             return None
         return Residuals(
@@ -110,15 +105,6 @@ class HoldTerm(DataTerm):
             np.arange(rows),
             float(np.log(sigma).sum()),
         )
-
-    def _given(self, values: Mapping[str, Any], at: NDArray[np.intp]) -> dict[str, Array]:
-        """Parameters of the law at some rows."""
-        known = {**self._fixed, **{n: v for n, v in values.items() if n in self._fields}}
-        return {n: jnp.broadcast_to(jnp.asarray(v, float), at.shape) for n, v in known.items()}
-
-    def _at(self, at: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        table = self.table
-        return jnp.asarray(table.K[at]), jnp.asarray(table.V[at]), jnp.asarray(table.hold_time[at])
 
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
@@ -145,25 +131,8 @@ class HoldTerm(DataTerm):
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def _healing(
-    law: type[Law],
-    fields: tuple[tuple[str, str], ...],
-    given: dict[str, Array],
-    K: Array,
-    V: Array,
-    hold_time: Array,
-) -> Array:
-    slider = Slider(
-        law(**{field: given[n] for n, field in fields}), spring=K, load=jnp.ones_like(K)
-    )
-    found, _ = hold(slider, V, hold_time)
-    return found.maximum - found.level
-
-
-@partial(jax.jit, static_argnums=(0, 1, 2))
 def _with_slopes(
     law: type[Law],
-    fields: tuple[tuple[str, str], ...],
     names: tuple[str, ...],
     given: dict[str, Array],
     K: Array,
@@ -173,7 +142,9 @@ def _with_slopes(
     """Healing, and its derivatives to the named parameters, shape (names, points)."""
 
     def of(values: dict[str, Array]) -> Array:
-        return _healing(law, fields, {**given, **values}, K, V, hold_time)
+        slider = slider_from(law, {**given, **values, "K": K, "W0": jnp.ones_like(K)})
+        reloading, _ = hold(slider, V, hold_time)
+        return reloading.maximum - reloading.level
 
     def along(shares: Array) -> Array:
         change = {n: jnp.broadcast_to(s, K.shape) for n, s in zip(names, shares, strict=True)}

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtr
 
+from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import CompiledResiduals, Objective
 from asperity.inference.unknowns import Unknown
 
@@ -52,6 +53,8 @@ class Coordinates(NamedTuple):
         Parameter over u elsewhere.
     mean, precision : array
         Of normal priors of the parameter, in SI; 0 where there is none.
+    log_norm : float
+        Logarithm of what normalises the prior.
     """
 
     low: Any
@@ -60,6 +63,31 @@ class Coordinates(NamedTuple):
     scale: Any
     mean: Any
     precision: Any
+    log_norm: float = 0.0
+
+    @classmethod
+    def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> Coordinates:
+        """Those of free parameters, with ranges that reach an estimate with its deviations."""
+        ranges = [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
+        log_norm = 0.0
+        for k, (a, b) in zip(unknowns, ranges, strict=True):
+            if k.prior is None:
+                log_norm -= math.log(b - a)
+            else:
+                z = (np.array(k.to_value(np.array([a, b]))) - k.prior.mean) / k.prior.sd
+                log_norm -= math.log(ndtr(z[1]) - ndtr(z[0]))
+                log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
+                log_norm += 0.0 if k.logarithmic else math.log(k.scale)
+        low, high = np.array(ranges).reshape(-1, 2).T
+        return cls(
+            low,
+            high,
+            np.array([k.logarithmic for k in unknowns]),
+            np.array([k.scale for k in unknowns]),
+            np.array([k.prior.mean if k.prior else 0.0 for k in unknowns]),
+            np.array([1 / k.prior.sd if k.prior else 0.0 for k in unknowns]),
+            log_norm,
+        )
 
     def to_q(self, u: Float) -> Float:
         """Unbounded coordinates of u, which must lie within the range."""
@@ -87,71 +115,10 @@ class Coordinates(NamedTuple):
         normal = -0.5 * ((self.values(u) - self.mean) * self.precision) ** 2
         return jnp.sum(normal + jnp.where(self.volumes, u, 0.0), axis=-1)
 
-
-@dataclass(frozen=True, eq=False)
-class PriorDensity:
-    """Normalised prior density of the coordinates.
-
-    Attributes
-    ----------
-    unknowns : tuple of Unknown
-    coordinates : Coordinates
-    log_norm : float
-        Logarithm of the normalising factor.
-    """
-
-    unknowns: tuple[Unknown, ...]
-    coordinates: Coordinates
-    log_norm: float
-
-    @classmethod
-    def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> PriorDensity:
-        """The prior, with ranges that reach an estimate u with standard deviations sd."""
-        ranges = [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
-        log_norm = 0.0
-        for k, (a, b) in zip(unknowns, ranges, strict=True):
-            if k.prior is None:
-                log_norm -= math.log(b - a)
-            else:
-                z = (np.array(k.to_value(np.array([a, b]))) - k.prior.mean) / k.prior.sd
-                log_norm -= math.log(ndtr(z[1]) - ndtr(z[0]))
-                log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
-                log_norm += 0.0 if k.logarithmic else math.log(k.scale)
-        low, high = np.array(ranges).reshape(-1, 2).T
-        coordinates = Coordinates(
-            low,
-            high,
-            np.array([k.logarithmic for k in unknowns]),
-            np.array([k.scale for k in unknowns]),
-            np.array([k.prior.mean if k.prior else 0.0 for k in unknowns]),
-            np.array([1 / k.prior.sd if k.prior else 0.0 for k in unknowns]),
-        )
-        return cls(tuple(unknowns), coordinates, log_norm)
-
     def log_density(self, u: Float) -> Float:
-        """Logarithm of the density at u, shape (..., n) to (...); minus infinity out of range."""
-        c = self.coordinates
-        outside = ((u < c.low) | (u > c.high)).any(-1)
-        return np.where(outside, -np.inf, np.asarray(c.log_prior(u)) + self.log_norm)
-
-    def record(self) -> dict[str, dict[str, float | str]]:
-        """Each prior in SI, for JSON."""
-        result: dict[str, dict[str, float | str]] = {}
-        for i, k in enumerate(self.unknowns):
-            if k.prior is not None:
-                result[k.name] = {
-                    "kind": "normal",
-                    "mean": k.prior.mean,
-                    "sd": k.prior.sd,
-                    "source": k.prior.source,
-                }
-            else:
-                result[k.name] = {
-                    "kind": "uniform in the logarithm" if k.logarithmic else "uniform",
-                    "low": float(k.to_value(self.coordinates.low[i])),
-                    "high": float(k.to_value(self.coordinates.high[i])),
-                }
-        return result
+        """Logarithm of the prior density of u; minus infinity out of range."""
+        outside = ((u < self.low) | (u > self.high)).any(-1)
+        return np.where(outside, -np.inf, np.asarray(self.log_prior(u)) + self.log_norm)
 
 
 class DensityData(NamedTuple):
@@ -204,29 +171,33 @@ class Whitened:
     Attributes
     ----------
     objective : Objective
-    prior : PriorDensity
+    coordinates : Coordinates
     mode, root : array
         As of `DensityData`.
     """
 
     objective: Objective
-    prior: PriorDensity
+    coordinates: Coordinates
     mode: Float
     root: Float
 
-    @property
-    def coordinates(self) -> Coordinates:
-        """Of the prior."""
-        return self.prior.coordinates
-
     @classmethod
-    def at(cls, objective: Objective, prior: PriorDensity, u: Float, sd: Float) -> Whitened:
-        """The posterior whitened at the mode that is reached from u."""
-        low, high, *_ = prior.coordinates
+    def of(cls, fit: Fit) -> Whitened:
+        """The posterior of a fit, whitened at its mode."""
+        objective = fit.objective
+        u = objective.coordinates(fit.values)
+        sd = np.array(
+            [
+                min(abs(p.se / k.slope(p.value)) if np.isfinite(p.se) and p.value else 1.0, 1.0)
+                for k, p in zip(objective.unknowns, fit.parameters.values(), strict=True)
+            ]
+        )
+        coordinates = Coordinates.about(objective.unknowns, u, sd)
+        low, high, *_ = coordinates
         # Off the bounds by a tenth of a standard deviation.
         step = 0.1 * np.minimum(sd, high - low)
-        start = prior.coordinates.to_q(np.clip(u, low + step, high - step))
-        near = cls(objective, prior, start, np.eye(len(u)))
+        start = coordinates.to_q(np.clip(u, low + step, high - step))
+        near = cls(objective, coordinates, start, np.eye(len(u)))
         near = near._rooted(start)
         climbed = minimize(
             lambda z: -near.log_density(z)[0],
@@ -270,6 +241,20 @@ class Whitened:
         J = jacobian * slope
         value = -0.5 * float(r @ r) + float(volume @ u + log_slope.sum())
         return value, -J.T @ r + volume * slope + bend, J.T @ J + np.diag(curvature)
+
+    def prior_record(self) -> dict[str, dict[str, float | str]]:
+        """Prior of each parameter in SI, for JSON."""
+        result: dict[str, dict[str, float | str]] = {}
+        low, high, *_ = self.coordinates
+        for k, *ends in zip(self.objective.unknowns, low, high, strict=True):
+            if k.prior is not None:
+                known: dict[str, Any] = {n: getattr(k.prior, n) for n in ("mean", "sd", "source")}
+                result[k.name] = {"kind": "normal", **known}
+            else:
+                kind = "uniform in the logarithm" if k.logarithmic else "uniform"
+                a, b = (float(k.to_value(end)) for end in ends)
+                result[k.name] = {"kind": kind, "low": a, "high": b}
+        return result
 
     def compiled(self) -> tuple[PosteriorDensity, DensityData]:
         """The density as a compiled program evaluates it, and its data."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
-from asperity.inference.fitting.intervals import Interval
+from asperity.inference.fitting.intervals import LEVELS, Interval
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.outputs.json import plain
@@ -191,46 +191,33 @@ def posterior_of(
     """The posterior from the blocks of all chains, without their warm-up."""
     # Untyped, and only there with the extra.
     array_stats: Any = import_module("arviz_stats.base").array_stats
-    whole = [
-        Transitions(*(np.concatenate(part) for part in zip(*run, strict=True))) for run in runs
-    ]
-    stats = Transitions(*(np.stack(part) for part in zip(*whole, strict=True)))
+    chains = [jax.tree.map(lambda *blocks: np.concatenate(blocks), *run) for run in runs]
+    stats: Transitions = jax.tree.map(lambda *whole: np.stack(whole), *chains)
     u = whitened.u_of(stats.z)
     draws, marginals = {}, {}
     for i, unknown in enumerate(fit.objective.unknowns):
         x = np.asarray(unknown.to_value(u[..., i]))
         draws[unknown.name] = x
-        quantiles = np.quantile(x, [0.5, *_tails(math.erf(math.sqrt(0.5))), *_tails(0.95)])
+        tails = [(1 + sign * level) / 2 for level in LEVELS for sign in (-1, 1)]
+        median, low_68, high_68, low_95, high_95 = np.quantile(x, [0.5, *tails]).tolist()
         marginals[unknown.name] = Marginal(
             unknown.name,
             unknown.parameter.unit,
             float(x.mean()),
             float(x.std(ddof=1)),
-            float(quantiles[0]),
-            (float(quantiles[1]), float(quantiles[2])),
-            (float(quantiles[3]), float(quantiles[4])),
+            median,
+            (low_68, high_68),
+            (low_95, high_95),
             float(array_stats.rhat(x)),
             float(array_stats.ess(x, method="bulk")),
             float(array_stats.ess(x, method="tail", prob=(0.05, 0.95))),
         )
+    kept = stats._asdict()
+    kept.pop("z")
     return Posterior(
-        fit,
-        marginals,
-        draws,
-        stats.log_density,
-        stats.acceptance,
-        stats.energy,
-        stats.steps,
-        stats.diverging,
-        stats.failed,
-        seed,
-        whitened.prior.record(),
-        tuple(_warnings(marginals, stats)),
-    )
-
-
-def _tails(level: float) -> tuple[float, float]:
-    return (1 - level) / 2, (1 + level) / 2
+        fit=fit, parameters=marginals, draws=draws, seed=seed, prior=whitened.prior_record(),
+        warnings=tuple(_warnings(marginals, stats)), **kept,
+    )  # fmt: skip
 
 
 def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from asperity._jax import jit_large
 from asperity.errors import InputError
 from asperity.inference.fitting.result import Fit
-from asperity.inference.posterior.density import PriorDensity, Whitened
+from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.orbit.search import available_cores
 from asperity.outputs import Interrupted
@@ -64,7 +64,7 @@ def sample_posterior(
     Parameters
     ----------
     fit : Fit
-        Converged. Its priors hold; parameters without one are uniform as `PriorDensity` says.
+        Converged. Its priors hold; parameters without one are uniform as `Coordinates` says.
     chains, draws : int
         At least 2 chains, for R-hat, and 100 draws each after the warm-up; draws are rounded up
         to whole blocks of 50.
@@ -97,7 +97,7 @@ def sample_posterior(
     if not fit.parameters:
         raise InputError("posterior must be of free parameters, got none; free one, such as A")
     require_sizes(chains, draws)
-    whitened = whitened_posterior(fit)
+    whitened = Whitened.of(fit)
     density, data = whitened.compiled()
     blocks = -(-draws // BLOCK)
     kept: list[list[Transitions]] = [[] for _ in range(chains)]
@@ -142,20 +142,6 @@ def require_sizes(chains: int, draws: int) -> None:
             f"chains times draws must be {_MOST_DRAWS} at most, those of the warm-up included, "
             f"got {chains} chains of {each}; ask for fewer"
         )
-
-
-def whitened_posterior(fit: Fit) -> Whitened:
-    """The posterior of a fit, whitened at its mode."""
-    objective = fit.objective
-    u = objective.coordinates(fit.values)
-    sd = np.array(
-        [
-            min(abs(p.se / k.slope(p.value)) if np.isfinite(p.se) and p.value else 1.0, 1.0)
-            for k, p in zip(objective.unknowns, fit.parameters.values(), strict=True)
-        ]
-    )
-    prior = PriorDensity.about(objective.unknowns, u, sd)
-    return Whitened.at(objective, prior, u, sd)
 
 
 def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:

@@ -27,13 +27,13 @@ from asperity.inference.runs.steps import (
     Free,
     arranged,
     integrated,
-    law_fields,
     with_values,
 )
 from asperity.laws import Law
+from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening
-from asperity.slider import Slider
 from asperity.slider.motion import Motion
+from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
 
 Float = NDArray[np.float64]
@@ -48,7 +48,12 @@ _GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
 
 
 def run_equations(
-    law: type[Law], velocity: float, *, inertia: bool = False, radiation_damping: bool = False
+    law: type[Law],
+    velocity: float,
+    fixed: Mapping[str, float] | None = None,
+    *,
+    inertia: bool = False,
+    radiation_damping: bool = False,
 ) -> Motion:
     """Equation of motion of a recording, whose numbers are those that `through` is given.
 
@@ -57,13 +62,21 @@ def run_equations(
     law : type of Law
     velocity : float
         Pulling velocity of the first piece (m/s), which is sliding.
+    fixed : mapping of str to float, optional
+        Numbers that stay: asperities are not elastic where lambda is fixed to 0.
     inertia, radiation_damping : bool
         What counts in the equation of motion.
+
+    Raises
+    ------
+    InputError
+        If what counts is fixed to 0.
     """
-    numbers = dict.fromkeys(law_fields(law).values(), jnp.ones(()))
-    slider = Slider(law(**numbers), spring=1.0, load=1.0, mass=float(inertia))
-    # An array: as a number it would be part of the compiled program.
-    V, eta = jnp.asarray(float(velocity)), 1.0 if radiation_damping else None
+    # Arrays: as numbers they would be part of the compiled program.
+    names = (*law_parameters(law), "M", "eta")
+    numbers = {n: jnp.asarray((fixed or {}).get(n, 1.0), float) for n in names}
+    slider = slider_from(law, numbers | {"K": 1.0, "W0": 1.0})
+    V, eta = jnp.asarray(float(velocity)), numbers["eta"] if radiation_damping else None
     return equation_of_motion(slider, V, 1.0, inertia=inertia, eta=eta)
 
 

@@ -20,11 +20,11 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from asperity.algebra.runge_kutta import dormand_prince_5
 from asperity.inference.runs.drive import Drive, excitation, shifted
 from asperity.inference.runs.reading import GAIN
-from asperity.laws import Law
-from asperity.parameters import law_parameters
 from asperity.slider.motion import Motion
+from asperity.slider.named import slider_from
 
 Float = NDArray[np.float64]
 
@@ -42,28 +42,6 @@ START, SHIFT = "start", "shift"
 _EVER_FREE = ("K", GAIN)
 #: Numbers of derivatives are filled up to a multiple of this.
 _TOGETHER = 4
-#: Dormand and Prince: nodes, coefficients of the stages, error of the step.
-_NODES = np.array([0.0, 0.2, 0.3, 0.8, 8 / 9, 1.0, 1.0])
-_STAGES = np.zeros((7, 7))
-_STAGES[1, :1] = 1 / 5
-_STAGES[2, :2] = 3 / 40, 9 / 40
-_STAGES[3, :3] = 44 / 45, -56 / 15, 32 / 9
-_STAGES[4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
-_STAGES[5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
-_STAGES[6, :6] = 35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
-_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
-#: Of the continuous extension (Hairer, Norsett and Wanner, Solving ODEs I, II.6).
-_DENSE = np.array(
-    [
-        -12715105075 / 11282082432,
-        0.0,
-        87487479700 / 32700410799,
-        -10690763975 / 1880347072,
-        701980252875 / 199316789632,
-        -1453857185 / 822651844,
-        69997945 / 29380423,
-    ]
-)
 
 
 class Free(eqx.Module):
@@ -254,17 +232,17 @@ def _stepped(
         return motion.rates(state, excitation(drive, values, piece, at))
 
     # Sums written out: products of such small matrices take longer than all else.
+    table, new = dormand_prince_5(), y
     k: list[Array] = []
-    new = y
-    for node, row in zip(_NODES, _STAGES, strict=True):
+    for node, row in zip(table.C, table.A, strict=True):
         new = y + length * _combined(row, k) if k else y
         k.append(rates(begin + node * length, new))
     # The last stage is the solution of order 5.
     rise = new - y
     first = length * k[0] - rise
     second = rise - length * k[6] - first
-    rows = jnp.stack([y, rise, first, second, length * _combined(_DENSE, k)])
-    return new, length * _combined(_ERROR, k), rows
+    rows = jnp.stack([y, rise, first, second, length * _combined(table.D, k)])
+    return new, length * _combined(table.E, k), rows
 
 
 def _steps_taken(
@@ -346,18 +324,5 @@ def _combined(weights: Float, rates: Sequence[Array]) -> Array:
 
 def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
     """The equation of motion with other numbers of the law and the slider."""
-    fields = law_fields(type(motion.slider.law))
-    law = type(motion.slider.law)(**{f: values[n] for n, f in fields.items()})
-    slider = motion.slider
-    changed = eqx.tree_at(
-        lambda s: (s.law, s.K, s.W0, s.M),
-        slider,
-        (law, values["K"], values["W0"], values.get("M", slider.M)),
-    )
-    motion = eqx.tree_at(lambda m: m.slider, motion, changed)
-    return replace(motion, eta=values["eta"]) if "eta" in values else motion
-
-
-def law_fields(law: type[Law]) -> dict[str, str]:
-    """Fields of a law by the names of their parameters."""
-    return {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(law).items()}
+    damping: dict[str, Any] = {name: values[name] for name in ("eta",) if name in values}
+    return replace(motion, slider=slider_from(type(motion.slider.law), values), **damping)

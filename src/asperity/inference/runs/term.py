@@ -112,7 +112,7 @@ class RunTerm(DataTerm):
         # In a list, which copies share: whatever the noise, the motion takes as many steps.
         self._room = [ROOMS[0]]
         self.motion = run_equations(
-            law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
+            law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
         self._columns = _linear_columns(run, linear)
@@ -120,7 +120,7 @@ class RunTerm(DataTerm):
         self._after_changes = (1.0, 1.0)
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
         none = np.zeros(0)
-        self.models = [Autoregression(none, max(np.mean(s**2) / 2, 1e-300)) for s in steps]
+        self.models = [Autoregression(none, max(float(np.mean(s**2)) / 2, 1e-300)) for s in steps]
         self._prepare()
 
     @property

@@ -13,7 +13,6 @@ from asperity.errors import Argument, InputError
 from asperity.measurement.sliding.segments import (
     Cut,
     Partition,
-    displacement_noise,
     partition,
     partition_at,
 )
@@ -21,9 +20,6 @@ from asperity.measurement.sliding.signals import SlidingSignals
 
 Float = NDArray[np.float64]
 
-#: A segment stands still that moves by less than so many standard deviations of the displacement's
-#: noise, or by less than this share of the fastest velocity.
-_STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
 #: Fewest samples between two steps, or a step and an end: a velocity needs them.
 _SAMPLES = 3
 #: A given velocity that differs by this share from that of the displacement is contradicted.
@@ -116,15 +112,7 @@ def _given_or_measured(
         if steps is None
         else partition_at(time, displacement, np.array(steps))
     )
-    speeds = list(result.velocities)
-    noise = displacement_noise(time, displacement)
-    fastest = max(abs(v) for v in speeds)
-    spans = np.diff([time[0], *(c.time for c in result.cuts), time[-1]])
-    holds = [
-        hold or abs(v) * t < _STILL_NOISE * noise or abs(v) < _STILL_SHARE * fastest
-        for hold, v, t in zip(result.holds, speeds, spans, strict=True)
-    ]
-    return result, speeds, holds
+    return result, list(result.velocities), list(result.holds)
 
 
 def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:

@@ -35,6 +35,7 @@ from asperity.orbit import (
     response_function,
 )
 from asperity.parameters import law_parameters
+from asperity.slider.named import law_from
 
 Float = NDArray[np.float64]
 
@@ -67,6 +68,7 @@ class LockInTerm(DataTerm):
     """
 
     searches: bool = False
+    affordable = _SAMPLES
     failure = (
         "no start has a periodic orbit at every operating point; give start values, or fix "
         "parameters for which sliding is stable"
@@ -83,7 +85,7 @@ class LockInTerm(DataTerm):
     ) -> None:
         self.table, self.law = table, law
         self.name, self.observables = table.name, table.observables
-        self.motion = {"inertia": inertia, "radiation_damping": radiation_damping}
+        self.motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
         self.fixed = {
             n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
         }
@@ -165,12 +167,7 @@ class LockInTerm(DataTerm):
 
     def use_search(self, always: bool) -> None:
         """Search for the orbits that the fast method does not find at every call, or no more."""
-        self.searches = always
-
-    @property
-    def affordable(self) -> int:
-        """Evaluations that an integral may take."""
-        return _SEARCHED_SAMPLES if self.searches else _SAMPLES
+        self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
 
     @property
     def _count(self) -> int:
@@ -261,7 +258,7 @@ class LockInTerm(DataTerm):
         )
         derivatives, zero = {}, np.zeros(self.table.rows)
         # Nothing depends on a parameter of other data.
-        none = values._replace(mean_friction=zero, harmonics=np.zeros((zero.size, 2), complex))
+        none: Any = Prediction(zero, zero, np.zeros((zero.size, 2), complex))
         for name in free:
             source, factor = ("epsilon", applied) if name == "eps_ratio" else (name, 1.0)
             slope = slopes.get(source, none)
@@ -391,8 +388,7 @@ def _steady_slopes(given: Mapping[str, Array], *, law: type[Law]) -> tuple[Array
 
 def steady_friction(law: type[Law], given: Mapping[str, Array]) -> Array:
     """mu_ss(V) at each row, for parameters of shape (rows,)."""
-    fields = {f.rstrip("_"): f for f in law.__dataclass_fields__}
-    return law(**{fields[n]: given[n] for n in law_parameters(law)}).mu_ss(given["V"])
+    return law_from(law, given).mu_ss(given["V"])
 
 
 @dataclass(frozen=True)
@@ -400,7 +396,7 @@ class _CompiledResiduals:
     """Residuals of a table within compiled programs."""
 
     law: type[Law]
-    motion: tuple[tuple[str, bool], ...]
+    motion: tuple[tuple[str, Any], ...]
     search: bool
 
     def __call__(self, values: Mapping[str, Array], data: tuple[dict[str, Any], Weights]) -> Array:

@@ -136,7 +136,9 @@ def _fourier_values(
     equations = FourierEquations(_NODES, _GRADING)
     unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
     cycle = equations.cycle(problem)
-    mean, harmonics = force_spectrum(problem.system, cycle, *unknowns, program.harmonics)
+    mean, harmonics = force_spectrum(
+        problem.system, cycle, unknowns.mean, unknowns.zero_mean, program.harmonics
+    )
     logs = jnp.zeros((0, *mean.shape), dtype=complex)
     if program.multipliers:
         J = stretched(cycle, equations.jacobian(problem, unknowns))

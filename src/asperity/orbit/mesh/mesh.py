@@ -35,7 +35,7 @@ _EVEN_SHARE = 0.3
 
 
 class Orbit(NamedTuple):
-    """A piecewise polynomial `PeriodicOrbit` of every operating point.
+    """A piecewise polynomial orbit of every operating point, with a mesh that suits it.
 
     Attributes
     ----------

@@ -30,6 +30,7 @@ from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
+    error_of,
     grid,
     load_cycle,
     spectrum,
@@ -385,9 +386,7 @@ def _iterate(
         far = jnp.any((last > _NEAR) & ~jnp.isnan(last))
         at = jax.lax.cond(far, prepare, lambda _: at, unknowns)
         new, change = equations.bounded_step(problem, cycle, unknowns, at)
-        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-        error = jnp.where(change < _ROUND_OFF, change, error)
+        error = error_of(change, last, _ROUND_OFF)
         # Further steps change converged points by round-off only.
         error = jnp.where(reached <= tolerance, reached, error)
         return new, at, change, error, steps + 1

@@ -58,7 +58,10 @@ _LOOKED_AT = slice(1, None, 3)
 
 
 class FourierOrbit(NamedTuple):
-    """A `PeriodicOrbit` on the grid theta = tau + g sin(tau), one array for each state.
+    """An orbit on the grid theta = tau + g sin(tau), one array for each state.
+
+    A zero-mean part of 1e-9 of the mean keeps its digits, and hundreds of points fit into the cache
+    of a core; `asperity.orbit.mesh.mesh.Orbit` is for orbits that are steep.
 
     Attributes
     ----------
@@ -186,6 +189,13 @@ def _largest_change(change: States, new: States, old: States, kappa: Array) -> A
     return jnp.stack([moved[0] / size, *moved[1:], *map(jnp.abs, change)]).max(0)
 
 
+def error_of(change: Array, last: Array, round_off: float) -> Array:
+    """Error after a change, from the one before: r / (1 - r) of it if a step contracts by r."""
+    contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
+    error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
+    return jnp.where(change < round_off, change, error)
+
+
 def fourier_orbit(
     system: QuasiStatic,
     load: Modulation,
@@ -238,13 +248,9 @@ def fourier_orbit(
         rates, push = jax.linearize(rates_of, *together(mean, zero_mean))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
         change = _largest_change(moved, new, zero_mean, system.kappa)
-        # The error of a contraction by r is r / (1 - r) times the last change.
-        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-        error = jnp.where(change < _ROUND_OFF, change, error)
+        error = error_of(change, last, _ROUND_OFF)
         # Further steps change converged points by round-off only.
-        error = jnp.where(reached <= tolerance, reached, error)
-        return mean, new, change, error, steps + 1
+        return mean, new, change, jnp.where(reached <= tolerance, reached, error), steps + 1
 
     mean, zero_mean, change, error, steps = jax.lax.while_loop(
         unfinished, body, (averaged.centre, zero, far, far, 0)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, mesh_chunk, put, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -103,19 +103,21 @@ def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)
     resolved = np.zeros(points, bool)
-    chunk, *_ = mesh_chunk(size)
-    for start in range(0, points, chunk):
-        rows = np.arange(start, min(start + chunk, points))
-        # The last chunk is padded to the common shape; padding points are not solved.
-        filled = np.concatenate([rows, np.full(chunk - len(rows), rows[-1])])
-        harmonics, resolved[rows] = _solve(take(problem, filled), len(rows))
-        put(orbit, rows, _on_even_mesh(harmonics, scheme))
+
+    def solve(part: Problem) -> tuple[Orbit, NDArray[np.bool_]]:
+        harmonics, exact = _solve(part)
+        return _on_even_mesh(harmonics, scheme), exact
+
+    for rows, (some, exact) in run_chunks(solve, (problem,), np.arange(points), mesh_chunk(size)):
+        put(orbit, rows, some)
+        resolved[rows] = exact
     return orbit, resolved
 
 
-def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Harmonics (size, count, points) of the first `points`, and which of them are exact."""
+def _solve(problem: Problem) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+    """Harmonics (size, count, points), and which points are exact."""
     Y = np.array(adiabatic_states(problem, nodes=NODES[0]))
+    points = Y.shape[2]
     at, exact = np.arange(points), np.zeros(points, bool)
     harmonics = np.zeros((len(Y), NODES[-1] // 2 + 1, points), complex)
     at = _newton(problem, Y, at, _FIRST_STEPS)

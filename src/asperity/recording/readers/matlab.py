@@ -1,8 +1,7 @@
 """MATLAB files of version 5 and older, read by SciPy; those of version 7.3 are HDF5.
 
-SciPy trusts the tags of a version 5 file that is not compressed: of files with one to five changed
-bytes, one in about 100 ends the interpreter. The elements of a file are therefore checked before
-SciPy reads them; compressed elements have a checksum.
+SciPy trusts the sizes in a version 5 file that is not compressed, and a wrong one can end the
+interpreter: they are checked before. Compressed elements have a checksum.
 """
 
 from __future__ import annotations
@@ -10,9 +9,9 @@ from __future__ import annotations
 import io
 import math
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from asperity.recording.readers.raw import (
     RawColumn,
@@ -20,19 +19,15 @@ from asperity.recording.readers.raw import (
     beginning,
     group_columns,
     one_table,
-    refuse_truncated,
 )
 
 _SIGNATURE = b"MATLAB 5.0 MAT-file"
 _HEADER = 128
-#: Bytes of a number, by the type of its element.
+#: Bytes of a number, by the type of its element; and the types of matrices and of what is packed.
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 _MATRIX, _COMPRESSED = 14, 15
-_INT8, _INT32, _UINT32 = 1, 5, 6
-_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION = 1, 2, 3, 4, 5, 16
-_NUMERIC = range(6, 16)
-_COMPLEX = 0x0800
-_DEEPEST = 64
+#: Classes of matrices that hold numbers.
+_NUMBERS = range(6, 16)
 
 
 def is_format(path: Path) -> bool:
@@ -57,7 +52,8 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
 
     raw = path.read_bytes()
     if 0 not in raw[:4]:
-        _refuse_unsound(path, raw)
+        order = {b"IM": "<", b"MI": ">"}[raw[126:128]]
+        _checked(raw, _HEADER, len(raw), order)
     variables = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
     groups: dict[str, list[RawColumn]] = {}
     steps: list[float | None] = []
@@ -75,102 +71,27 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     return RawRecording(columns, left_out, {"format": "matlab 5", "group": group or ""}, step=step)
 
 
-class _DamagedError(Exception):
-    """An invalid element."""
-
-
-class _Element(NamedTuple):
-    """Type of an element, offset and size of its data."""
-
-    kind: int
-    first: int
-    size: int
-
-
-def _refuse_unsound(path: Path, raw: bytes) -> None:
-    """Refuse a version 5 file with an element that exceeds the element around it."""
-    order = {b"IM": "<", b"MI": ">"}.get(raw[126:128])
-    if order is None:
-        why = "which is cut within its header" if len(raw) < _HEADER else "whose header is damaged"
-        raise refuse_truncated(path, why)
-    try:
-        for element in _elements(raw, _HEADER, len(raw), order):
-            if element.kind == _MATRIX:
-                _walk_matrix(raw, element, order, 0)
-            elif element.kind != _COMPRESSED:
-                raise _DamagedError
-    except (_DamagedError, struct.error):
-        raise refuse_truncated(path, "which is cut or damaged") from None
-
-
-def _elements(raw: bytes, at: int, stop: int, order: str) -> Iterator[_Element]:
+def _checked(raw: bytes, at: int, stop: int, order: str) -> list[tuple[int, int, int]]:
+    """Type, first byte and size of the elements of a stretch; ValueError if a size is wrong."""
+    elements = []
     while at < stop:
-        if at + 8 > stop:
-            raise _DamagedError
         kind, size = struct.unpack_from(f"{order}II", raw, at)
-        first = at + 8
-        if kind >> 16:
-            # Four bytes at most stand in the tag itself.
-            kind, size, first = kind & 0xFFFF, kind >> 16, at + 4
-            at += 8
-            if size > 4:
-                raise _DamagedError
+        # Four bytes at most stand in the tag itself.
+        short = kind >> 16
+        if short:
+            kind, size, first, at = kind & 0xFFFF, short, at + 4, at + 8
         else:
+            first = at + 8
             # What is compressed is not padded.
             at = first + (size if kind == _COMPRESSED else -(-size // 8) * 8)
-        if first + size > stop or (kind not in _SIZES and kind not in (_MATRIX, _COMPRESSED)):
-            raise _DamagedError
-        yield _Element(kind, first, size)
-
-
-def _walk_matrix(raw: bytes, matrix: _Element, order: str, depth: int) -> None:
-    if not matrix.size:
-        # An empty cell.
-        return
-    if depth > _DEEPEST:
-        raise _DamagedError
-    parts = list(_elements(raw, matrix.first, matrix.first + matrix.size, order))
-    if len(parts) < 3 or [p.kind for p in parts[:3]] != [_UINT32, _INT32, _INT8]:
-        raise _DamagedError
-    flags, sides = parts[:2]
-    if flags.size != 8 or sides.size < 8 or sides.size % 4:
-        raise _DamagedError
-    (kind,) = struct.unpack_from(f"{order}I", raw, flags.first)
-    lengths = struct.unpack_from(f"{order}{sides.size // 4}i", raw, sides.first)
-    if min(lengths) < 0:
-        raise _DamagedError
-    _walk_contents(raw, parts[3:], kind, math.prod(lengths), order, depth)
-
-
-def _walk_contents(
-    raw: bytes, parts: list[_Element], flags: int, count: int, order: str, depth: int
-) -> None:
-    kind = flags & 0xFF
-    arrays = 1 + bool(flags & _COMPLEX)
-    if kind in _NUMERIC:
-        sound = [p.size // _SIZES.get(p.kind, 1) for p in parts] == [count] * arrays
-    elif kind in (_CHAR, _SPARSE):
-        sound = len(parts) == (1 if kind == _CHAR else 2 + arrays)
-    elif kind in (_CELL, _FUNCTION):
-        sound = _walk_matrices(raw, parts, count if kind == _CELL else 1, order, depth)
-    elif kind in (_STRUCT, _OBJECT):
-        named = parts[kind == _OBJECT :]
-        if len(named) < 2 or named[0].size != 4:
-            raise _DamagedError
-        (length,) = struct.unpack_from(f"{order}i", raw, named[0].first)
-        if length < 1 or named[1].kind != _INT8 or named[1].size % length:
-            raise _DamagedError
-        fields = named[1].size // length
-        sound = _walk_matrices(raw, named[2:], count * fields, order, depth)
-    else:
-        sound = False
-    if not sound:
-        raise _DamagedError
-
-
-def _walk_matrices(raw: bytes, parts: list[_Element], count: int, order: str, depth: int) -> bool:
-    if len(parts) != count or any(part.kind != _MATRIX for part in parts):
-        return False
-    for part in parts:
-        _walk_matrix(raw, part, order, depth + 1)
-    return True
+        if first + size > stop or kind not in {*_SIZES, _MATRIX, _COMPRESSED}:
+            raise ValueError("an element is longer than what it lies in, or of no known type")
+        elements.append((kind, first, size))
+        if kind == _MATRIX and size:
+            flags, sides, _, *data = _checked(raw, first, first + size, order)
+            (what,) = struct.unpack_from(f"{order}I", raw, flags[1])
+            lengths = struct.unpack_from(f"{order}{sides[2] // 4}i", raw, sides[1])
+            wrong = any(n != _SIZES.get(k, 0) * math.prod(lengths) for k, _, n in data)
+            if flags[2] != 8 or min(lengths) < 0 or (what & 0xFF in _NUMBERS and wrong):
+                raise ValueError("a matrix has not as many numbers as it says")
+    return elements

@@ -1,9 +1,5 @@
 // Requests to the server that the page came from.
 
-const client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) =>
-  b.toString(16).padStart(2, "0"),
-).join("");
-
 /** A request that the server refuses; the message is the server's sentence. */
 export class Refused extends Error {}
 
@@ -17,10 +13,10 @@ async function received(promise) {
   }
 }
 
-async function send(path, body, signal, part) {
+async function send(path, body, signal) {
   const response = await received(fetch(`/api/${path}`, {
     method: "POST",
-    headers: { "Content-Type": "application/json", "X-Client": part ? `${client}-${part}` : client },
+    headers: { "Content-Type": "application/json" },
     body: JSON.stringify(body),
     signal,
   }));
@@ -43,10 +39,10 @@ export async function ask(path, body, signal) {
 
 /**
  * Run a job: `onMessage` is called with each of its messages, and the last message is returned.
- * Aborting the signal ends the job; so does another job on the same path with the same `part`.
+ * Aborting the signal ends the job.
  */
-export async function run(path, body, onMessage, signal, part) {
-  const response = await send(path, body, signal, part);
+export async function run(path, body, onMessage, signal) {
+  const response = await send(path, body, signal);
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let begun = "";
   let last = {};

@@ -14,7 +14,6 @@ const ROLE_NAMES = {
   time: "time", W: "normal load", F: "shear force", velocity: "velocity",
   displacement: "displacement", friction: "friction",
 };
-let numbered = 0;
 
 export class RecordingCard {
   constructor(page, known, state, { changed, removed }) {
@@ -22,7 +21,6 @@ export class RecordingCard {
     this.state = { key: state.key ?? null, name: state.name || "" };
     this.state.source = { columns: {}, units: {}, channels: {}, ...(state.source || {}) };
     this.state.options = { ...(state.options || {}) };
-    this.number = numbered += 1;
     this.result = null;
     this.recording = null;
     this.left = new Set(state.left || []); // rows that a fit leaves out
@@ -117,7 +115,7 @@ export class RecordingCard {
         if (part.waiting) this.#says("Waiting for another recording…");
         if (part.stage === "measuring") this.#says("Measuring…");
         if (part.recording) { this.recording = part.recording; this.#drawForms(); }
-      }, signal, `r${this.number}`);
+      }, signal);
       if (signal.aborted || !last.result) return;
       this.result = last.result;
       this.traced = null;
