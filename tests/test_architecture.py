@@ -45,7 +45,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "lock_in": _BASE | {"recording"},
     "measurement": _BASE | {"questions", "recording", "lock_in"},
     "tribometer": _BASE | {"recording"},  # is handed a trajectory
-    "inference": _EQUATIONS | _SIGNALS | {"materials", "orbit", "transients", "questions"},
+    "inference": _EQUATIONS
+    | _SIGNALS
+    | {"algebra", "materials", "orbit", "transients", "questions"},
     "experiment": _RESULTS,
     "operating_point": _EQUATIONS | {"algebra", "materials", "orbit", "questions"},
     "protocol": _RESULTS | {"experiment", "operating_point"},

@@ -83,7 +83,9 @@ def test_a_missing_option(asperity) -> None:
 
 def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
     path = tmp_path / "steps.csv"
-    rows = "".join(f"{t / 10},{t**2 / 1e6},{0.6 + t % 7 / 1e3}\n" for t in range(200))
+    rows = "".join(
+        f"{t / 10},{max(t, 10 * t - 900) / 1e4},{0.6 + t % 7 / 1e3}\n" for t in range(200)
+    )
     path.write_text("time (s),displacement (mm),friction\n" + rows)
     fit = partial(asperity, "fit", path, "--names", "geophysics")
     refused(fit("--free", "a,b"), "got none for D_c;")

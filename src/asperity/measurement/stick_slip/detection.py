@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,29 +179,19 @@ class _Averages:
     def __init__(self, force: Array, noise: Noise) -> None:
         self.force, self._noise = force, noise
         self._total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
-        self._means: dict[int, tuple[Array, int]] = {}
-        self._falls: dict[tuple[int, float, float], tuple[Index, Index]] = {}
+        self.means, self.falls = cache(self._means), cache(self._falls)
 
-    def means(self, octave: int) -> tuple[Array, int]:
+    def _means(self, octave: int) -> tuple[Array, int]:
         """Means over 2^octave samples, and the samples from one to the next."""
-        if octave not in self._means:
-            width = 1 << octave
-            hop = max(1, width // 4)
-            first, last = self._total[:-width:hop], self._total[width::hop]
-            self._means[octave] = (last - first) / width, hop
-        return self._means[octave]
+        width = 1 << octave
+        hop = max(1, width // 4)
+        return (self._total[width::hop] - self._total[:-width:hop]) / width, hop
 
-    def falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
+    def _falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
         """Peaks and troughs of means, without those at the ends of the recording.
 
         `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
         """
-        key = octave, scatter, tilt
-        if key not in self._falls:
-            self._falls[key] = self._computed(*key)
-        return self._falls[key]
-
-    def _computed(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
         means, hop = self.means(octave)
         if tilt:
             means = means + tilt * hop * np.arange(means.size)
@@ -308,8 +299,9 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
 def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise twice as fast as the loading around it is the
-    instrument's. Loading is as fast as the fastest rises but for a quarter of the time.
+    The slider does not move backwards: a rise that is closer to the usual fall than to the loading
+    around it, on a logarithmic scale, is the instrument's. Loading is as fast as the fastest rises
+    but for a quarter of the time.
     """
     if peak.size < 3:
         return peak, trough
@@ -323,5 +315,6 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
     fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
     usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
-    apart = rate <= 2 * usual
+    fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
+    apart = rate <= np.sqrt(np.maximum(usual * fall, 0.0))
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]

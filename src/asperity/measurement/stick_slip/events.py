@@ -167,9 +167,10 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     stop = np.minimum(edges[1:], trough + length)
     # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
     quarter = (peak[1:] - trough[:-1]) // 4
-    stick = (trough[:-1] + quarter, peak[1:] - quarter + 2)
-    lines = _lines(force, *stick) if k > 1 else (np.empty(0),) * 3
-    rate = np.maximum(np.concatenate([lines[2][:1] if k > 1 else [0.0], lines[2]]), 0.0)
+    sticks = (np.empty(0),) * 4
+    if k > 1:
+        sticks = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
+    rate = np.maximum(np.concatenate([sticks[2][:1] if k > 1 else [0.0], sticks[2]]), 0.0)
     bounds = peak, trough, first, stop
     large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
     shape, shift = _shape(
@@ -188,7 +189,6 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * (np.sqrt(np.median(squares)) / falls.scatter[0] or 1.0)
     shapes = shape.timing, shift
-    sticks = (*lines, (stick[1] - stick[0]).astype(float))
     events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, shapes)
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
     away = 2 * (trough - peak)
@@ -356,7 +356,8 @@ def _shape(
     certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
     chosen = 0
     for k in range(1, len(_SHAPES) - 1):
-        if _excess((squares[chosen] - squares[k])[certain]) > _CLEAR:
+        better = (squares[chosen] - squares[k])[certain]
+        if better.size > 1 and better.mean() > _CLEAR * better.std(ddof=1) / np.sqrt(better.size):
             chosen = k
     onset, end, *_ = fits[chosen]
     misfit = np.array([_root(fit[3] / drop**2) for fit in fits])
@@ -375,13 +376,6 @@ def _root(values: Array) -> float:
     """Root of a mean of squares, two standard errors above what it is."""
     error = values.std() / np.sqrt(max(values.size - 1, 1))
     return float(np.sqrt(max(values.mean() + 2 * error, 0.0)))
-
-
-def _excess(values: Array) -> float:
-    """Mean over its standard error; NaN of fewer than two values."""
-    if values.size < 2:
-        return float("nan")
-    return float(values.mean() / max(values.std(ddof=1) / np.sqrt(values.size), 1e-300))
 
 
 def _measured(
@@ -445,17 +439,12 @@ def _measured(
     )
 
 
-def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array]:
-    """Centre, mean and slope of the samples in runs that do not overlap, in rising order."""
-    count = (stop - first).astype(float)
-    bounds = np.column_stack([first, np.minimum(stop, force.size - 1)]).ravel()
-    centre = (first + stop - 1) / 2
-    owner = np.searchsorted(first, np.arange(force.size), side="right") - 1
-    owner = np.clip(owner, 0, first.size - 1)
-    t, y = np.arange(force.size) - centre[owner], force - force[first][owner]
-    mean = np.add.reduceat(y, bounds)[::2] / count
-    slope = np.add.reduceat(t * y, bounds)[::2] / (count * (count**2 - 1) / 12)
-    return centre, mean + force[first], slope
+def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+    """Centre, mean, slope and number of samples of runs that do not overlap, in rising order."""
+    sums = _Sums(force, first, (first + stop) // 2)
+    level, slope, _, away = sums.line(first, stop)
+    mean, count = level + slope * away + sums.level, (stop - first).astype(float)
+    return sums.origin + away, mean, slope, count
 
 
 def _of_mean(scatter: Array, samples: Index | Array) -> Array:
@@ -483,14 +472,9 @@ def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
     reach = np.broadcast_to(width[:, None] / 2, places.shape)
 
     def mean(low: Array, high: Array) -> Array:
-        return (_at(total, high) - _at(total, low)) / (high - low)
+        first, last = (np.interp(at + 0.5, np.arange(total.size), total) for at in (low, high))
+        return np.asarray((last - first) / (high - low))
 
     # Means over the halves before and after a place lie half a width apart.
     rate = (mean(places - reach, places) - mean(places, places + reach)) / reach
     return np.where(end - onset < 2.0, drop, rate.max(1))
-
-
-def _at(values: Array, places: Array) -> Array:
-    places = np.clip(places + 0.5, 0, values.size - 1)
-    low = np.minimum(places.astype(np.intp), values.size - 2)
-    return np.asarray(values[low] + (places - low) * (values[low + 1] - values[low]))

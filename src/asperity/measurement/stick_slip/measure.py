@@ -17,7 +17,7 @@ from asperity.measurement.sliding.signals import (
 )
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
-from asperity.measurement.stick_slip.noise import estimate, without_impulses
+from asperity.measurement.stick_slip.noise import estimate, resolution, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
@@ -243,7 +243,8 @@ def measure_stick_slip(
     about += signals.signs
     crowded = _CROWDED if any(regime.sticks for regime in parts) else CROWDED
     for name in signals.names:
-        about += saturation(trace.channel(name).values, trace.time, name, crowded)
+        cut_off = saturation(trace.channel(name).values, trace.time, name, crowded)
+        about += [f for f in cut_off if f.name == "saturation"]
     checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
     steps = coarsely_rounded(signals.friction)
     if steps and len(events):
@@ -368,26 +369,46 @@ def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tupl
 
 
 def _hidden(result: StickSlipMeasurement) -> tuple[float, float]:
-    """Share by which sticks load less in their first half than their slope says, and its error.
+    """Share of the loading that events too small to be seen take, and its standard error.
 
-    Events too small to be seen take it, or drops that are read too small; creep and the bend of an
-    inertial slider lie in the second half. NaN with few sticks.
+    Few of them make sticks load less in their first half than their slope says; creep lies in the
+    second. Many lower the slope of every stick: of the differences between neighbouring means in
+    its middle half the median is that of the loading, as noise is symmetrical, and the mean has
+    what falls in between too. Of both, and of all widths of means, the most significant; NaN with
+    few sticks.
     """
     events, time = result.events, result.time
     after = np.concatenate(
         [[], *(np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks)]
     ).astype(np.intp)
-    if after.size < LIMITS["events"][1]:
+    if after.size < LIMITS["events"][1] or not result.loading_slope > 0:
         return np.nan, np.nan
-    total = np.concatenate([[0.0], np.cumsum(result.friction)])
+    total = np.concatenate([[0.0], np.cumsum(result.friction - result.friction.mean())])
     quarter = events.stick_duration[after] / 4
     first = np.searchsorted(time, events.end[after - 1] + quarter)
     stop = np.maximum(np.searchsorted(time, events.onset[after] - quarter), first + 1)
-    rise = (total[stop] - total[first]) / (stop - first) - events.force_after[after - 1]
+    mean = (total[stop] - total[first]) / (stop - first) + result.friction.mean()
+    rise = mean - events.force_after[after - 1]
     load = result.loading_slope * ((time[first] + time[stop - 1]) / 2 - events.end[after - 1])
     lack = 1 - rise.sum() / load.sum()
     off = rise - (1 - lack) * load
-    return float(lack), float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
+    best = float(lack), float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
+    rounding = resolution(result.friction) / np.sqrt(12.0)
+    for share in (8, 16, 32):
+        width = int(np.median(stop - first)) // share
+        if not width:
+            break
+        at = np.arange(0, time.size - 2 * width, max(width // 4, 1))
+        owner = np.searchsorted(first, at, side="right") - 1
+        at = at[(owner >= 0) & (at + 2 * width < stop[owner])]
+        change = total[at + 2 * width] - 2 * total[at + width] + total[at]
+        usual, spread = np.median(change), np.diff(np.quantile(change, [0.16, 0.84]))[0] / 2
+        # The median of n normal values less their mean scatters by sqrt((pi/2 - 1)/n); eight
+        # differences of the same two widths are about one. Sums are whole steps of the recorder.
+        error = np.hypot(spread * np.sqrt((np.pi / 2 - 1) * 8 / at.size), rounding)
+        if usual > 0 and (usual - change.mean()) * best[1] > best[0] * error:
+            best = float(1 - change.mean() / usual), float(error / usual)
+    return best
 
 
 def _checks(result: StickSlipMeasurement) -> list[Check]:
@@ -398,7 +419,8 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         check = judged(name, number, LIMITS[name], sentence, significant=abs(number) >= 3 * error)
         checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
 
-    ask("events", count, f"{count} complete events", "; means and spreads of so few say little")
+    text = f"{count} complete event{'' if count == 1 else 's'}"
+    ask("events", count, text, "; means and spreads of so few say little")
     open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
     kind = result.kind
     for one in open_[:1]:
@@ -430,8 +452,8 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         ask(
             "hidden events",
             hidden,
-            f"in the first half of a stick the force rises by {percent(abs(hidden))} "
-            f"{'less' if hidden > 0 else 'more'} than the loading slope says",
+            f"the mean loading of the sticks is {percent(abs(hidden))} "
+            f"{'less' if hidden > 0 else 'more'} than the usual one",
             ": small events are missing, or drops are read too small",
             error,
         )

@@ -169,7 +169,7 @@ def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
     away = force - middle
     scatter = float(np.quantile(np.abs(np.diff(force, 2)), 0.5)) / (0.6745 * np.sqrt(6.0))
     # Steps of the recorder: rounding noise has no quantile of zero.
-    scatter = max(scatter, _resolution(force) / np.sqrt(12.0))
+    scatter = max(scatter, resolution(force) / np.sqrt(12.0))
     limit = _IMPULSE * scatter
     at = np.flatnonzero(np.abs(away) > limit)
     for step in (-3, 3):
@@ -183,7 +183,7 @@ def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
     return clean, at
 
 
-def _resolution(force: Array) -> float:
+def resolution(force: Array) -> float:
     """Smallest usual step between neighbouring samples that differ; zero for a fine recorder."""
     steps = np.abs(np.diff(force[: 1 << 16]))
     moving = steps[steps > 0]

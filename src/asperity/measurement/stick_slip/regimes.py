@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.stats import kendalltau
 
 from asperity.measurement.stick_slip.events import SlipEvents
@@ -145,21 +146,12 @@ def _without_single_events(parts: list[Regime]) -> list[Regime]:
     return merged
 
 
-def _windows(values: Array) -> Array:
-    """Of each value the next `_NEAR`, itself among them; NaN beyond the end."""
-    padded = np.concatenate([values, np.full(_NEAR - 1, np.nan)])
-    return np.lib.stride_tricks.sliding_window_view(padded, _NEAR)
-
-
 def _usual(values: Array) -> Array:
-    """Median over the neighbours on both sides; NaN where none of them is known."""
-    after = _windows(values)
-    before = _windows(values[::-1])[::-1]
-    both = np.column_stack([before, after])
-    known = np.isfinite(both).any(1)
-    usual = np.full(values.size, np.nan)
-    usual[known] = np.nanmedian(both[known], axis=1)
-    return usual
+    """Median over the neighbours on both sides; NaN of a single event, which has no stick."""
+    if values.size < 2:
+        return values
+    known = np.concatenate([values[1:2], values[1:]])
+    return np.asarray(median_filter(known, 2 * _NEAR - 1, mode="reflect"))
 
 
 def _other_velocity(slope: Array) -> NDArray[np.bool_]:

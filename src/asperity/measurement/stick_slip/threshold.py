@@ -38,6 +38,9 @@ _WIDEST, _NEAR = 2.0, 1.6
 #: Share by which a period is extrapolated at most.
 _FARTHEST = 0.4
 
+#: Regimes that the motion comes to below the threshold.
+_STICKING = "regular", "irregular", "growing", "oscillation"
+
 #: Columns as `asperity recipe` takes them, and the bracket.
 COLUMNS = (
     "V",
@@ -149,11 +152,11 @@ def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
     list of Threshold
         In rising velocity; one with a `reason` where it cannot be told.
     """
-    table = [_Row.of(row) for row in rows if all(row.get(n) for n in ("V", "K", "W0", "regime"))]
-    table.sort(key=lambda row: row.V)
-    groups: list[list[_Row]] = []
+    table = [row for row in rows if all(row.get(n) for n in ("V", "K", "W0", "regime"))]
+    table.sort(key=lambda row: row["V"])
+    groups: list[list[Mapping[str, Any]]] = []
     for row in table:
-        if groups and row.V <= groups[-1][0].V * (1 + _SAME_VELOCITY):
+        if groups and row["V"] <= groups[-1][0]["V"] * (1 + _SAME_VELOCITY):
             groups[-1].append(row)
         else:
             groups.append([row])
@@ -165,29 +168,12 @@ def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
     ]
 
 
-@dataclass(frozen=True)
-class _Row:
-    V: float
-    stiffness: float
-    sticks: bool | None
-    row: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, row: Mapping[str, Any]) -> _Row:
-        # What the motion comes to counts, not how it begins.
-        last = row["regime"].rpartition(", then ")[2]
-        sticks = None
-        if last in ("steady sliding", "loading"):
-            sticks = False if last == "steady sliding" else None
-        elif last.startswith(("regular", "irregular", "growing", "oscillation")):
-            sticks = True
-        return cls(row["V"], row["K"] / row["W0"], sticks, row)
-
-
-def _threshold(group: list[_Row]) -> Threshold:
-    V = float(np.mean([row.V for row in group]))
-    sticking = [row.stiffness for row in group if row.sticks]
-    sliding = [row.stiffness for row in group if row.sticks is False]
+def _threshold(group: list[Mapping[str, Any]]) -> Threshold:
+    V = float(np.mean([row["V"] for row in group]))
+    # What the motion comes to counts, not how it begins.
+    last = [(row["regime"].rpartition(", then ")[2], row["K"] / row["W0"]) for row in group]
+    sticking = [stiffness for kind, stiffness in last if kind.startswith(_STICKING)]
+    sliding = [stiffness for kind, stiffness in last if kind == "steady sliding"]
     low, high = max(sticking, default=np.nan), min(sliding, default=np.nan)
     reason = ""
     if not sticking or not sliding:
@@ -205,20 +191,20 @@ def _threshold(group: list[_Row]) -> Threshold:
     return Threshold(V, centre, doubt, frequency, error, low, high, reason)
 
 
-def _frequency(group: list[_Row], centre: float) -> tuple[float, float]:
+def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, float]:
     """Frequency (Hz) at the threshold, and its standard uncertainty."""
     values, doubts, squares, periods, errors = [], [], [], [], []
-    for one in group:
-        ratio = one.stiffness / centre
+    for row in group:
+        ratio = row["K"] / row["W0"] / centre
         if not 1 / _NEAR < ratio < _NEAR:
             continue
-        row, root = one.row, np.sqrt(ratio)
+        root = np.sqrt(ratio)
         frequency, error = (row.get(f"linear_frequency{s}") for s in ("", "_uncertainty"))
         if frequency is not None and np.isfinite(frequency):
             values.append(frequency / root)
             # Half of the step to the threshold counts as uncertain.
             doubts.append(np.hypot(error / root, values[-1] * abs(root - 1) / 2))
-        elif one.sticks and row["regime"] == "regular stick-slip":
+        elif row["regime"] == "regular stick-slip":
             squares.append(row["drop"] ** 2)
             periods.append(row["recurrence"] * root)
             errors.append(row["recurrence_uncertainty"])
