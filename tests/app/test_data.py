@@ -457,7 +457,7 @@ def test_recordings_are_dropped_measured_and_restored_from_their_link(
     assert head.startswith("onset (s),end (s)")
     assert len(rows) == count
     plot = events.locator(".panel.whole .plot")
-    plot.scroll_into_view_if_needed()
+    plot.hover()  # when nothing moves any more
     box = plot.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
     page.mouse.down()
