@@ -20,6 +20,8 @@ _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
 _NEAR = 10
 #: Share of the time of rises in which the force rises no faster than by the usual loading.
 _LOADING = 0.75
+#: Longest swing back of the instrument, in times of a usual fall.
+_SWING = 3.0
 #: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
 #: excess of so many standard deviations is loading and slip.
 _ASYMMETRY = 3.0
@@ -299,9 +301,10 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
 def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise that is closer to the usual fall than to the loading
-    around it, on a logarithmic scale, is the instrument's. Loading is as fast as the fastest rises
-    but for a quarter of the time.
+    The slider does not move backwards: a rise twice as fast as the loading around it is the
+    instrument's. Loading is as fast as the fastest rises but for a quarter of the time. The
+    instrument swings back in half its period, which a fall takes too: what rises for longer
+    than three usual falls begins in an impulse.
     """
     if peak.size < 3:
         return peak, trough
@@ -315,6 +318,5 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
     fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
     usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
-    fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
-    apart = rate <= np.sqrt(np.maximum(usual * fall, 0.0))
+    apart = (rate <= 2 * usual) | (length > _SWING * np.median(trough - peak))
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]

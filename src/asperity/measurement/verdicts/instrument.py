@@ -271,10 +271,12 @@ def flat_top(reading: LockInReading, time: Array, load: Array, force: Array) -> 
     time, load, force : array, (n,)
         Of the window.
     """
-    number = 0.0
-    sentence = (
-        "neither load nor force is cut off flat in its mean cycle; a gauge that saturates smoothly "
-        "is not excluded, as its harmonics are those of a response"
+    number, sentence = (
+        0.0,
+        (
+            "neither load nor force is cut off flat in its mean cycle; a gauge that saturates "
+            "smoothly is not excluded, as its harmonics are those of a response"
+        ),
     )
     gained = -np.inf
     for c, (name, values) in enumerate((("load", load), ("force", force))):
