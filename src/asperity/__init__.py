@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from asperity.app.notebook import explore
     from asperity.branches import continuation, doubled_branch, stability_boundary
     from asperity.errors import InputError
-    from asperity.inference.answers import compare_data as compare
-    from asperity.inference.answers import fit_data as fit
+    from asperity.inference.answers import compare, fit
     from asperity.measurement.from_file import measure_recording as measure
     from asperity.orbit import (
         averaged_response,
@@ -59,12 +58,12 @@ _HOMES = {
     "InputError": ("errors", "InputError"),
     "Slider": ("slider", "Slider"),
     "averaged_response": ("orbit", "averaged_response"),
-    "compare": ("inference.answers", "compare_data"),
+    "compare": ("inference.answers", "compare"),
     "continuation": ("branches", "continuation"),
     "doubled_branch": ("branches", "doubled_branch"),
     "map": ("study.map", "response_map"),
     "explore": ("app.notebook", "explore"),
-    "fit": ("inference.answers", "fit_data"),
+    "fit": ("inference.answers", "fit"),
     "measure": ("measurement.from_file", "measure_recording"),
     "periodic_response": ("orbit", "periodic_response"),
     "perturbation_response": ("theory", "perturbation_response"),

@@ -270,4 +270,9 @@ def test_the_link_of_a_scene_restores_it_without_a_barrier_that_axe_knows_of(vis
     for width in (375, 800, 1440):
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        # Nor is a picture wider than its panel, which clips it.
+        page.wait_for_function(
+            "[...document.querySelectorAll('.plot svg')].every("
+            "(e) => e.clientWidth <= e.parentElement.clientWidth)"
+        )
     assert settled(again, tab) == (controls, figures)

@@ -85,7 +85,7 @@ def test_the_page_of_the_browser_has_the_second_paper_by_its_name(installed):
     [
         ('id = "weight"', 'id = "frequency"', "claim.id must be unique, got 'frequency' twice"),
         ('claims = ["frequency"]', 'claims = ["mass"]', "must name claims of the file, got 'mass'"),
-        ('found = "{frequency}."', 'found = "{mass}."', "found must name claims .*got 'mass'"),
+        ('result = "{frequency}."', 'result = "{mass}."', "result must name claims .*got 'mass'"),
         ('depends_on = ["K"]', 'depends_on = ["M"]', "must name an uncertainty of the file"),
         ('kind = "test"', 'kind = "guess"', "kind must be test, fit, arithmetic or identity"),
         ("[[claim]]", "[[claim]", "must be valid TOML"),

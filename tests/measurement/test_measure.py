@@ -291,8 +291,7 @@ def test_the_record_holds_everything(truth, protocol, trace) -> None:
 
 
 @pytest.mark.parametrize("samples", [3000, 140_000])
-@pytest.mark.parametrize("which", ["load", "force"])
-@pytest.mark.parametrize("refine", [True, False])
+@pytest.mark.parametrize(("which", "refine"), [("load", True), ("force", False)])
 def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) -> None:
     time = np.arange(samples) * 1e-3
     signals = {"load": truth.load(time), "force": truth.force(time)}

@@ -160,23 +160,22 @@ def test_a_disturbance_of_the_motor_is_no_step() -> None:
     assert [c.time for c in found.cuts] == pytest.approx([first], abs=0.05)
 
 
+@pytest.mark.parametrize("defect", ["spike", "jump"])
+def test_a_spike_or_a_jump_of_the_gauge_is_no_motion(defect) -> None:
+    time = np.arange(2000) * 0.01
+    slip = 3 * UM * time + 1e-8 * np.random.default_rng(0).standard_normal(time.size)
+    slip[slice(700, 701 if defect == "spike" else None)] += 1e-3
+    cut = partition(time, slip)
+    assert cut.cuts == ()
+    assert cut.velocities == pytest.approx([3 * UM], rel=1e-3)
+
+
 def test_a_small_change_can_be_read_in_two_ways(sliding_trace) -> None:
     time, slip, friction, _ = stepped((3 * UM, 4 * UM), (300 * UM, 300 * UM), (50, 50))
     found = measure_sliding(sliding_trace(time, friction, slip))
     check = next(c for c in found.checks if c.name == "segments")
     assert check.verdict == "suspicious"
     assert "may be no step" in check.sentence
-
-
-def test_a_recorded_velocity_does_as_well(sliding_trace) -> None:
-    time, _, friction, (truth,) = stepped((UM, 10 * UM), (100 * UM, 300 * UM), (20, 50))
-    noise = 1 + 0.05 * np.random.default_rng(1).standard_normal(time.size)
-    velocity = np.where(time < truth, UM, 10 * UM) * noise
-    found = measure_sliding(sliding_trace(time, friction, velocity=velocity))
-    (step,) = found.steps
-    assert step.time == pytest.approx(truth, abs=0.1)
-    assert (step.velocity_before, step.velocity_after) == pytest.approx((UM, 10 * UM), rel=0.02)
-    assert found.velocity_from == "velocity"
 
 
 def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
@@ -234,7 +233,7 @@ def wanders(rng, size, rate):
 def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kind, seed) -> None:
     """Random velocities with stops of seconds between; noise of 5 nm to 0.5 um."""
     rng = np.random.default_rng(seed)
-    rate, noise = 1000.0, 10 ** rng.uniform(-8.3, -6.3)
+    rate, noise = 300.0, 10 ** rng.uniform(-8.3, -6.3)
     # A stop is seen if it moves by 60 standard deviations less than its surroundings.
     fast = max(60 * noise / 2, 1e-6) * 10 ** rng.uniform(0, 1.5)
     factor = 10 ** (rng.choice([-1, 1]) * rng.uniform(0.3, 0.9))
@@ -243,7 +242,6 @@ def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kin
     lengths = [v * s if v else s for v, s in zip(velocities, spans, strict=True)]
     time, slip, friction, truth = stepped(velocities, lengths, (rate,) * 6, resolution=0, seed=seed)
     slip = slip + noise * kind(rng, time.size, rate)
-    # At 1 kHz the difference of two samples is some 10 um/s at rest.
     found = measure_sliding(sliding_trace(time, friction, slip))
     assert [s.hold for s in found.segments] == [v == 0 for v in velocities]
     assert [s.start for s in found.segments[1:]] == pytest.approx(truth.tolist(), abs=0.5)

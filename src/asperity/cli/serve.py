@@ -40,16 +40,24 @@ an environment.
 @switch("--open opened", "Open the page in the browser.")
 def serve(port: int, laws: tuple[str, ...], opened: bool) -> None:
     """Serve the page: explore, map, and look at recordings in a browser."""
+    from contextlib import ExitStack
+
+    from asperity.cli.progress import waiting
+
+    starting = ExitStack()
+    starting.enter_context(waiting("starting the page"))
     from asperity.app.server import serve as run
 
     def started(address: str) -> None:
+        starting.close()
         click.echo(f"asperity: {address}  (Ctrl-C ends it)", err=True)
         if opened:
             import webbrowser
 
             webbrowser.open(address)
 
-    run(port, laws=laws, started=started)
+    with starting:
+        run(port, laws=laws, started=started)
     # Without waiting for a program that is just being compiled.
     sys.stderr.flush()
     os._exit(0)

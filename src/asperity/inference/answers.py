@@ -11,9 +11,10 @@ from typing import Any
 
 from asperity import materials
 from asperity.errors import Argument, InputError
-from asperity.inference.comparison.compare import Comparison, compare
+from asperity.inference.comparison.compare import Comparison
+from asperity.inference.comparison.compare import compare as compare_loaded
 from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
-from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.fit import fit as fit_loaded
 from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
@@ -270,7 +271,7 @@ def answer_fit(
     windows: Any = question.windows
     if windows is None:
         data = read_data(question, read)
-        return fit(data, law or default_law(data), question.free, **options)
+        return fit_loaded(data, law or default_law(data), question.free, **options)
     (recording,) = question.data
     if is_table(recording):
         raise InputError("windows", "go with one recording", "a table", "give one recording")
@@ -290,7 +291,7 @@ def answer_comparison(
     """The comparison that a question asks for; parameters as of `answer_fit`."""
     options = _options(question, read, progress)
     laws = compared_laws(question.laws)
-    return compare(read_data(question, read), laws, question.free, **options)
+    return compare_loaded(read_data(question, read), laws, question.free, **options)
 
 
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
@@ -308,7 +309,7 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
 
 
 @typed
-def fit_data(
+def fit(
     data: Data | Sequence[Data],
     law: str | type[Law] | None = None,
     free: Sequence[str] | None = None,
@@ -325,19 +326,27 @@ def fit_data(
     free : sequence of str, optional
         Free parameters; by default all that the data may show.
     **options
-        Of `asperity.inference.fit`.
+        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``material``,
+        ``prior``, ``start``, ``inertia`` and ``profile``.
 
     Raises
     ------
     InputError
         As of `asperity.inference.fit`, or if a file cannot be read.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> steps = asp.samples.velocity_steps(seed=1)
+    >>> print(asp.fit(steps, "rice-ruina"))
+    >>> print(asp.fit("steps.csv", free=["A", "B"], fixed={"D0": "5 um"}))
     """
     loaded = _loaded(data, options.get("fixed"))
-    return fit(loaded, default_law(loaded) if law is None else law, free, **options)
+    return fit_loaded(loaded, default_law(loaded) if law is None else law, free, **options)
 
 
 @typed
-def compare_data(
+def compare(
     data: Data | Sequence[Data],
     laws: str | Sequence[str] = "all",
     free: Sequence[str] | None = None,
@@ -362,7 +371,7 @@ def compare_data(
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
     names = compared_laws([law.strip() for law in listed])
-    return compare(_loaded(data, options.get("fixed")), names, free, **options)
+    return compare_loaded(_loaded(data, options.get("fixed")), names, free, **options)
 
 
 def compared_laws(names: Sequence[str]) -> list[str]:

@@ -70,6 +70,10 @@ TEXTS = {
         NAMES + rows([f"{'01' if i < 30 else '02'}.02.2019 {c}" for i, c in enumerate(clock())]),
         None,
     ),
+    "days and hours between tabs": (
+        NAMES.replace(",", "\t") + rows([f"2019-05-02 {c}" for c in clock()], sep="\t"),
+        set(),
+    ),
     "American afternoon": (NAMES + rows([f"05/02/2019 {c} PM" for c in clock()]), set()),
     "German dates": (
         "Datum;Normalkraft (N);Reibkraft (N)\n"

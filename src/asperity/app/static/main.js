@@ -106,8 +106,6 @@ function setLetters(large) {
   redrawAll();
 }
 
-let resized = 0;
-
 async function start() {
   page.catalogue = await get("catalogue");
   useKinds(page.catalogue.kinds);
@@ -133,10 +131,6 @@ async function start() {
   document.getElementById("full").addEventListener("click", changeScreen);
   document.addEventListener("fullscreenchange", () => setLetters(Boolean(document.fullscreenElement)));
   addEventListener("hashchange", show);
-  addEventListener("resize", () => {
-    clearTimeout(resized);
-    resized = setTimeout(() => redrawAll(matchMedia("print").matches), 120);
-  });
   addEventListener("beforeprint", () => redrawAll(true));
   addEventListener("afterprint", () => redrawAll());
   show();

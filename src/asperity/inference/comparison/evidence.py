@@ -89,8 +89,8 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
         return Evidence(density, 0.0, float(samples), density, 0, {})
     whitened = Whitened.of(fit)
     n = whitened.mode.size
-    at_mode = float(_log_target(fit, whitened, np.zeros((1, n)))[0])
-    laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
+    (mode,), (at_mode,) = _with_log_prior(whitened, np.zeros((1, n)))
+    laplace = fit.objective.log_likelihood(mode) + at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
         return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior_record())
     # The whole of scipy.stats takes longer to load than a fit of a velocity step to begin.
@@ -114,13 +114,18 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
     )
 
 
-def _log_target(fit: Fit, whitened: Whitened, z: Float) -> Float:
-    """Logarithm of likelihood times prior times the volume dq/dz du/dq, shape (samples,)."""
+def _with_log_prior(whitened: Whitened, z: Float) -> tuple[Float, Float]:
+    """Coordinates of the fit, and the logarithm of the prior times the volume dq/dz du/dq."""
     q = whitened.mode + z @ whitened.root.T
     u = np.asarray(whitened.coordinates.to_u(q))
     volume = np.asarray(whitened.coordinates.log_slope(q)).sum(-1)
     volume = volume + np.linalg.slogdet(whitened.root)[1]
-    total = whitened.coordinates.log_density(u) + volume
+    return u, whitened.coordinates.log_density(u) + volume
+
+
+def _log_target(fit: Fit, whitened: Whitened, z: Float) -> Float:
+    """Logarithm of likelihood times prior times volume, shape (samples,)."""
+    u, total = _with_log_prior(whitened, z)
     values = [fit.objective.named(x) for x in u]
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         # The change from the estimate: the error of a coarse model of searched orbits is in both.

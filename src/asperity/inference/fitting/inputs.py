@@ -162,7 +162,8 @@ def fixed_values(
     InputError
         If a name or value is wrong, or a number is missing.
     """
-    require_fittable(law, free)
+    # The gain of a gauge is freed by its prior, which is asked for elsewhere.
+    require_fittable(law, [n for n in free if n.partition("[")[0] != GAIN])
     known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
     points: Mapping[str, Any] = {} if table is None else table.points
     if table is None:

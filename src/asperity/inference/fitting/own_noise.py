@@ -54,10 +54,14 @@ def with_noise(
     bool
     """
     starts: list[Float] = []
-    for u in _apart(searched, [minimum.u for minimum in minima]):
+    for k, (u, value) in enumerate(minima):
+        # Most of the drawn starts have led to the same minimum.
+        near = [v for v, other in minima[:k] if value - other < _ONE_END]
+        if len(_apart(searched, [*near, u])) == len(_apart(searched, near)):
+            continue
         white = objective.minimise(u, tolerance=_COARSE, evaluations=_EVALUATIONS).u
         # Chi-squared of a drift says how large it is: noise has one a sample.
-        allowed = searched.chi2(u) * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
     ends: list[_End] = []
     for u in _apart(objective, starts):

@@ -119,8 +119,8 @@ def partition(time: Array, displacement: Array | None) -> Partition:
     if displacement is None:
         return Partition((), (np.nan,), (False,))
     motion = _motion(time, displacement)
-    pieces, doubts = _segments(motion, _pieces(motion))
-    speeds, holds, unsure = _speeds(motion, pieces)
+    pieces, means, doubts = _segments(motion, _pieces(motion))
+    speeds, holds, unsure = _speeds(motion, pieces, means)
     cuts = tuple(_intersection(motion, before, after) for before, after in pairwise(pieces))
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
@@ -139,7 +139,8 @@ def partition_at(time: Array, displacement: Array | None, times: Array) -> Parti
     if displacement is None:
         return Partition(cuts, (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1))
     pieces = list(pairwise([0, *at.tolist(), time.size]))
-    speeds, holds, _ = _speeds(_motion(time, displacement), pieces)
+    motion = _motion(time, displacement)
+    speeds, holds, _ = _speeds(motion, pieces, [_velocity(motion, piece) for piece in pieces])
     return Partition(cuts, speeds, holds)
 
 
@@ -176,7 +177,7 @@ def _motion(time: Array, displacement: Array) -> _Motion:
     # Of a coarse recorder most differences are zero: its step is the noise.
     moved = np.abs(np.diff(displacement))
     step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
-    floor = 1e-9 * float(np.ptp(displacement)) + 1e-300
+    floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
     return _Motion(
         time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step
     )
@@ -222,7 +223,9 @@ def _change_points(motion: _Motion, edges: NDArray[np.intp]) -> list[int]:
     t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
     x = np.add.reduceat(motion.displacement - motion.displacement[0], edges[:-1]) / size
     # What the recorder rounds is the same in all samples of a slow block.
-    weight = 1 / (motion.slow_noise**2 / size + motion.step**2 / 12)
+    unit = float(np.hypot(motion.slow_noise, motion.step))
+    weight = 1 / ((motion.slow_noise / unit) ** 2 / size + (motion.step / unit) ** 2 / 12)
+    x /= unit
     t /= float(np.median(np.diff(t)))
     n = size.size
     parameter = _PENALTY * np.log(n)
@@ -298,8 +301,8 @@ def _still(motion: _Motion, piece: Piece, speed: float) -> bool:
     return abs(speed) * _duration(motion, piece) <= _STILL * motion.noise
 
 
-def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[str]]:
-    """Pieces without transitions and small changes; and doubts."""
+def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[float], list[str]]:
+    """Pieces without transitions and small changes, their velocities, and doubts."""
     doubts: list[str] = []
     speeds = [_velocity(motion, piece) for piece in pieces]
     while len(pieces) > 1:
@@ -315,9 +318,10 @@ def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[s
         allowed = np.where(share < _TRANSITION, np.log(_CLEAR_RATIO), np.log(_RATIO))
         least = int(np.argmin(ratios / allowed))
         if ratios[least] < allowed[least]:
-            whole = pieces[least][0], pieces[least + 1][1]
-            pieces[least : least + 2] = [whole]
-            speeds[least : least + 2] = [_velocity(motion, whole)]
+            # A gauge that jumps between the two has no part in the mean.
+            mean = float(np.average(speeds[least : least + 2], weights=spans[least : least + 2]))
+            pieces[least : least + 2] = [(pieces[least][0], pieces[least + 1][1])]
+            speeds[least : least + 2] = [mean]
             continue
         transition = _transition(motion, pieces, speeds)
         if transition is None:
@@ -338,7 +342,7 @@ def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[s
             or _course(motion, pieces[k], speeds[k], (speeds[i], speeds[j])) == "even"
         ]
         del pieces[i + 1 : j], speeds[i + 1 : j]
-    return pieces, doubts
+    return pieces, speeds, doubts
 
 
 def _transition(
@@ -427,10 +431,9 @@ def _intersection(motion: _Motion, before: Piece, after: Piece) -> Cut:
 
 
 def _speeds(
-    motion: _Motion, pieces: list[Piece]
+    motion: _Motion, pieces: list[Piece], speeds: list[float]
 ) -> tuple[tuple[float, ...], tuple[bool, ...], list[str]]:
     """Velocities, zero where noise explains the motion; which segments are holds; and doubts."""
-    speeds = [_velocity(motion, piece) for piece in pieces]
     speeds = [
         0.0 if _still(motion, *each) else each[1] for each in zip(pieces, speeds, strict=True)
     ]

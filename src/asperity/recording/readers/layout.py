@@ -409,7 +409,10 @@ def layout_of(
     sample = [line.text for line in last if line.ended] or [line.text for line in last]
     ways = _ways(delimiter, decimal)
     scored = [(_score(sample, *separators), separators) for separators in ways]
-    (score, width), separators = max(scored, key=lambda s: s[0])
+    # Blanks stand inside the dates of a table with tabs, too: of equal scores, a sign goes first.
+    (score, width), separators = max(
+        scored, key=lambda s: (s[0][0], s[1][0] is not None and s[0][1] > 1, s[0][1])
+    )
     if not sample or score < 0.5:
         raise InputError(
             "recording.path",

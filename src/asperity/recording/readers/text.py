@@ -211,6 +211,7 @@ def _mismatch(layout: Layout) -> Finding:
         if count == width + 1
         else f"the last {count - width} names belong to no column"
     )
+    commas = width == 2 * count and layout.delimiter == ","
     return Finding(
         "heading mismatch",
         "warning",
@@ -218,7 +219,9 @@ def _mismatch(layout: Layout) -> Finding:
         "the heading",
         f"The heading has {count} names for {width} columns; the first {first} columns were given "
         f"the first {first} names, and {others}. Where the names stopped to fit is not in the "
-        "file: check that each column holds what its name says.",
+        "file: check that each column holds what its name says."
+        + commas
+        * " Commas seem to be decimal marks, too: save it with semicolons between cells.",
     )
 
 

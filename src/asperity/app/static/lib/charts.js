@@ -57,6 +57,10 @@ export class Figure {
     });
     this.plot.style.minHeight = `${height}px`; // nothing moves when the picture comes
     if (ownLabel) this.plot.setAttribute("aria-label", ownLabel);
+    // The first drawing may come before the panels beside it.
+    new ResizeObserver(() => {
+      if (this.frames && !printing && this.plot.clientWidth !== this.width) this.#paint();
+    }).observe(this.plot);
     this.note = el("div", { class: "note" });
     const label = fresh("figure");
     const button = (text, what, act) => el("button", {
@@ -108,6 +112,7 @@ export class Figure {
     const width = printing ? this.#printedWidth() : this.plot.clientWidth;
     // While the layout changes a panel may be narrower than its margins.
     if (width <= 10 * RIGHT) return;
+    this.width = width;
     const drawn = drawChart(chart, width, height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
@@ -312,7 +317,7 @@ export class Figure {
 
 const isKnown = (value) => value !== null && value !== undefined && Number.isFinite(value);
 
-/** Draw everything again, after the width has changed, for the screen or for paper. */
+/** Draw everything again, with other letters or for paper. */
 export function redrawAll(onPaper = false) {
   printing = onPaper;
   for (const figure of figures) {

@@ -67,6 +67,9 @@ export function withDoubt(value, doubt) {
   if (value === null || value === undefined) return "–";
   if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
   const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
-  if (places > 7 || Math.abs(value) >= 1e6) return `${digits(value, 5)} ± ${digits(doubt, 2)}`;
+  if (places > 7 || Math.abs(value) >= 1e6) {
+    const count = Math.floor(Math.log10(Math.abs(value) / doubt)) + 2;
+    return `${digits(value, Math.max(2, Math.min(15, count)))} ± ${digits(doubt, 2)}`;
+  }
   return `${value.toFixed(places).replace("-", "−")} ± ${doubt.toFixed(places)}`;
 }
