@@ -22,9 +22,24 @@ def model_of(a):
     return Autoregression(np.array([a[0] / (1 - a[1]), a[1]]), autocovariances(a, 1)[0])
 
 
-def test_autocovariances_are_those_of_the_spectrum():
+def test_the_first_samples_are_whitened_by_a_root_of_their_inverse_covariance():
     a = (1.2, -0.5)
-    np.testing.assert_allclose(model_of(a).autocovariances(3), autocovariances(a, 3), rtol=1e-10)
+    root = model_of(a).whitening.first
+    inverse = np.linalg.inv(toeplitz(autocovariances(a, 2)))
+    np.testing.assert_allclose(root.T @ root, inverse, rtol=1e-10)
+
+
+@pytest.mark.parametrize("noise", [np.resize([1.0, -1.0], 400), np.arange(400.0)])
+def test_noise_that_can_be_predicted_adds_finite_covariance(noise):
+    model, curves = fitted([noise]), np.sin(np.arange(400) / 30)[:, None]
+    added, variance = added_by_noise(model, curves, np.zeros((400, 0)), np.eye(1))
+    assert np.isfinite(added).all()
+    assert np.isfinite(variance).all()
+
+
+def test_a_stretch_without_noise_has_innovations_of_zero():
+    zeros = np.zeros(400)
+    np.testing.assert_array_equal(fitted([zeros]).whiten(zeros), zeros)
 
 
 def test_the_added_covariance_is_that_of_estimates_that_follow_the_coefficients():

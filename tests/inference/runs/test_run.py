@@ -3,11 +3,22 @@
 import numpy as np
 import pytest
 
+from asperity.errors import InputError
 from asperity.inference import recorded_run
 from asperity.recording import Channel, Trace
 
 
-def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0, steps=(), velocities=(1e-6,)):
+def run_under(
+    corners,
+    levels,
+    *,
+    noise=1e-4,
+    rate=10.0,
+    end=100.0,
+    steps=(),
+    velocities=(1e-6,),
+    friction=(0.6, 0.61),
+):
     """A recording under a load of straight lines."""
     time = np.arange(int(end * rate)) / rate
     edges = np.array([0.0, *steps, end])
@@ -18,7 +29,9 @@ def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0, steps=(), ve
         Trace(
             time,
             {
-                "friction": Channel(np.full(time.size, 0.6), "dimensionless", "", "friction", ""),
+                "friction": Channel(
+                    np.resize(friction, time.size), "dimensionless", "", "friction", ""
+                ),
                 "displacement": Channel(slip, "length", "m", "displacement", "m"),
                 "normal stress": Channel(load, "pressure", "Pa", "normal stress", "Pa"),
             },
@@ -27,6 +40,11 @@ def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0, steps=(), ve
         steps=list(steps),
         velocities=list(velocities),
     )
+
+
+def test_friction_that_never_changes_is_refused():
+    with pytest.raises(InputError, match="friction of run must vary, got 0"):
+        run_under([0.0, 100.0], [1.0, 1.0], friction=(0.6,))
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4])

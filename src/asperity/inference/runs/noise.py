@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded, toeplitz
+from scipy.linalg import solve_banded
 from scipy.special import chdtrc
 
 from asperity.recording.defects.autoregression import Autoregression, LaggedProducts, Whitening
@@ -147,8 +147,8 @@ def added_by_noise(
     if not p:
         return np.zeros_like(covariance), variance
     s = model.innovation
-    lagged = toeplitz(model.autocovariances(p))
-    root = np.linalg.cholesky(s**2 / n * np.linalg.inv(lagged))
+    # The whitening of the first p samples is a root of the inverse of their autocovariances.
+    root = s / np.sqrt(n) * model.whitening.first.T
     a = np.concatenate([[1.0], -model.coefficients[-1]])
     before = np.vstack([np.zeros((p, covariance.shape[0])), curves @ covariance])
     bands = np.repeat(a[:, None], n, axis=1)

@@ -15,7 +15,7 @@ from scipy.linalg import solveh_banded
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtri
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
 from asperity.measurement.samples import compressive, load_channel, shear_channel
@@ -190,8 +190,8 @@ def recorded_run(
     Raises
     ------
     InputError
-        If channels are missing, the recording begins with a hold, the direction turns, or the load
-        is not positive.
+        If channels are missing, the friction never changes, the recording begins with a hold, the
+        direction turns, or the load is not positive.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
@@ -199,6 +199,13 @@ def recorded_run(
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
+    # No recorder resolves 1e-9 of its range.
+    changes, value = (
+        np.ptp(friction) > 1e-9 * np.abs(friction).max(),
+        f"{friction[0]:.6g} throughout",
+    )
+    advice = "it holds nothing to fit; name the channel of the shear force"
+    require(bool(changes), f"the friction of {shown}", "vary", value, advice)
     cuts_found, speeds, doubts = constant_velocities(signals, shown, steps, velocities)
     origin = float(time[0])
     cut_times = [cut.time - origin for cut in cuts_found]

@@ -95,18 +95,6 @@ class Autoregression:
             orders.append(np.append(a - k * a[::-1], k))
         return orders
 
-    def autocovariances(self, n: int) -> Float:
-        """Autocovariances of the lags 0 to n - 1; n is at most the order (Levinson's recursion)."""
-        result = np.zeros(n)
-        result[:1] = self.variance
-        innovation_power = self.variance
-        for k, (a, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
-            if k + 1 >= n:
-                break
-            result[k + 1] = partial * innovation_power + a @ result[k:0:-1]
-            innovation_power *= 1 - partial**2
-        return result
-
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
         return np.asarray(self.whitening.of(np.asarray(columns, float)))
@@ -198,14 +186,16 @@ def fitted(
     highest = min(highest, max(0, min(s.size for s in stretches) - 2))
     more = uncertain if uncertain is not None else [np.zeros((0, s.size)) for s in stretches]
     rows = [np.vstack([s, u]) for s, u in zip(stretches, more, strict=True)]
-    variance = sum(float(np.sum(r * r)) for r in rows) / n
+    # A recording made by a formula has no noise.
+    smallest = np.finfo(float).tiny
+    variance = max(sum(float(np.sum(r * r)) for r in rows) / n, smallest)
     reflection = _reflections(rows, highest)
-    criteria = [n * math.log(max(variance, 1e-300)) + 2]
+    criteria = [n * math.log(variance) + 2]
     innovation_power = variance
     for k, partial in enumerate(reflection, start=2):
         innovation_power *= 1 - partial * partial
         penalty = 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
-        criteria.append(n * math.log(max(innovation_power, 1e-300)) + penalty)
+        criteria.append(n * math.log(max(innovation_power, smallest)) + penalty)
     best = len(reflection)
     if order is None:
         best = min(best, max(int(np.argmin(criteria)), _lowest_order(n)))
@@ -214,7 +204,7 @@ def fitted(
     # The variance of the likelihood: innovations of unit mean square.
     white = np.concatenate([result.whiten(s) for s in stretches])
     left = max(n - parameters - best, 1)
-    return Autoregression(chosen, variance * float(white @ white) / left)
+    return Autoregression(chosen, max(variance * float(white @ white) / left, smallest))
 
 
 def _lowest_order(n: int) -> int:
