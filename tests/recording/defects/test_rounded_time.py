@@ -139,7 +139,7 @@ def test_amplitudes_are_those_of_the_samples_and_not_of_their_stamps(truth, trac
 
 def test_everyone_who_reads_a_recording_reads_the_grid(tmp_path) -> None:
     time = np.arange(4000) / 400
-    table = np.stack([np.round(time, 2), 1e6 * 1e-5 * time, 0.6 + 1e-6 * time], axis=1)
+    table = np.stack([np.round(time, 2), 1e6 * 1e-5 * time, 0.6 + 1e-3 * time], axis=1)
     path = tmp_path / "rounded.csv"
     head = "time (s),displacement (um),mu"
     np.savetxt(path, table, "%.4f", delimiter=",", header=head, comments="")
