@@ -407,7 +407,7 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
         ({"laws": ["file.py:Law"]}, "law"),
         ({"material": "../x.toml"}, "material"),
         ({"tables": []}, "data"),
-        ({"free": ["nonsense"]}, "free"),
+        ({"free": ["nonsense"]}, "Free parameters"),
         ({"fixed": {"K": "1 kg"}}, "K"),
         ({"tables": [{"name": "t.csv", "text": "no table"}]}, "t.csv"),
     ],
