@@ -250,3 +250,19 @@ def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kin
     (step,) = found.steps
     assert step.velocity_before * step.velocity_after > 0
     assert len(found.holds) == 2
+
+
+@pytest.mark.parametrize(
+    ("displacement", "said"),
+    [
+        (lambda time: 1e-8 * time**2, "changes by 2e+02 % within a segment"),
+        (lambda time: 0 * time, "nothing slides"),
+        (lambda time: 1e-5 * (time > 10), "nothing slides"),
+    ],
+)
+def test_one_segment_that_does_not_slide_evenly_is_doubted(displacement, said):
+    time = np.arange(20_000) / 1000
+    cut = partition(time, displacement(time))
+    assert cut.cuts == ()
+    (doubt,) = cut.doubts
+    assert said in doubt

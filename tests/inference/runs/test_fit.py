@@ -168,7 +168,7 @@ def test_a_recording_that_begins_with_a_hold_is_refused():
 
 def test_samples_without_a_number_are_said_to_be_left_out():
     time = np.arange(600) / 10
-    friction = np.full(600, 0.6)
+    friction = 0.6 + 1e-3 * np.sin(time)
     friction[[5, 310]] = np.nan
     run = recorded_run(trace_of(time, friction, 1e-6 * time), steps=[30.0])
     assert run.time.size == 598

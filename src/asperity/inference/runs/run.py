@@ -199,13 +199,6 @@ def recorded_run(
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
-    # No recorder resolves 1e-9 of its range.
-    changes, value = (
-        np.ptp(friction) > 1e-9 * np.abs(friction).max(),
-        f"{friction[0]:.6g} throughout",
-    )
-    advice = "it holds nothing to fit; name the channel of the shear force"
-    require(bool(changes), f"the friction of {shown}", "vary", value, advice)
     cuts_found, speeds, doubts = constant_velocities(signals, shown, steps, velocities)
     origin = float(time[0])
     cut_times = [cut.time - origin for cut in cuts_found]
@@ -218,6 +211,13 @@ def recorded_run(
         [0.0, *cut_times, times[-1]],
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
+    # No recorder resolves 1e-9 of its range.
+    changes, value = (
+        np.ptp(friction) > 1e-9 * np.abs(friction).max(),
+        f"{friction[0]:.6g} throughout",
+    )
+    advice = "it holds nothing to fit; name the channel of the shear force"
+    require(bool(changes), f"the friction of {shown}", "vary", value, advice)
     doubts += [finding.sentence for finding in signals.signs]
     doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)

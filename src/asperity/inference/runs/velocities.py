@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.measurement.sliding.segments import (
     Cut,
     Partition,
@@ -66,6 +66,8 @@ def constant_velocities(
             f"{'no sliding' if not moving else 'a hold'}; give a window that does"
         )
     sign = float(np.sign(moving[0]))
+    advice = "give another channel of the displacement, or a window that slides"
+    require(sign != 0, f"the displacement of {name}", "move", "noise alone", advice)
     if any(sign * v <= 0 for v in moving):
         raise InputError(
             f"{name} must slide in one direction, got a reversal; give a window without"

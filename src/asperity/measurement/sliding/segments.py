@@ -440,9 +440,10 @@ def _speeds(
     holds, doubts = [False] * len(pieces), []
     for k, (piece, speed) in enumerate(zip(pieces, speeds, strict=True)):
         neighbours = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
-        if not neighbours:
+        if not neighbours and speed == 0:
+            doubts.append("the displacement moves by no more than its noise: nothing slides")
             continue
-        share = abs(speed) / max(min(neighbours), 1e-300)
+        share = abs(speed) / max(min(neighbours, default=0.0), 1e-300)
         change, uncertainty = _velocity_change(motion, piece)
         since = f"from {motion.time[piece[0]]:.6g} s on the velocity"
         # What creeps in a hold slows down.
