@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from asperity.air.layer import AirLayer
 from asperity.air.normal_contact import as_real
 from asperity.air.transfer import effective_modulation
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
 #: monotone over decades, so that a few points a decade reveal it.
@@ -116,10 +116,9 @@ def _check_single(*values: object) -> None:
         parts = vars(value).values() if isinstance(value, AirLayer) else (value,)
         shape = next((np.shape(p) for p in parts if np.ndim(p)), None)  # type: ignore[arg-type]
         if shape is not None:
-            raise InputError(
-                f"inverse.arguments must be single numbers, got an array of shape {shape}; "
-                "call once for each measured fraction, as each may have several solutions"
-            )
+            rule = "be single numbers"
+            advice = "call once for each measured fraction, as each may have several solutions"
+            raise InputError("inverse.arguments", rule, f"an array of shape {shape}", advice)
 
 
 def _invert(
@@ -162,10 +161,8 @@ def _invert(
 
 def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
     ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
-    if ends.shape != (2,) or not ends[0] < ends[1]:
-        raise InputError(
-            "inverse.bracket", "be two ascending lengths", f"{bracket} m", "swap or correct them"
-        )
+    rule, got, advice = "be two ascending lengths", f"{bracket} m", "swap or correct them"
+    require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
     return float(ends[0]), float(ends[1])
 
 

@@ -133,10 +133,8 @@ class AirLayer:
             object.__setattr__(self, field, value)
         with np.errstate(over="ignore"):
             if not np.all(np.isfinite(np.square(self.R))):
-                raise InputError(
-                    "AirLayer.R", "have a square that is a finite number", f"{np.max(self.R):g} m",
-                    "give the radius of the contact patch",
-                )  # fmt: skip
+                rule, got = "have a square that is a finite number", f"{np.max(self.R):g} m"
+                raise InputError("AirLayer.R", rule, got, "give the radius of the contact patch")
         check_shapes("AirLayer.fields", *(getattr(self, field) for field in _KINDS))
         one_of(self.gas_flow, get_args(GasFlow), "AirLayer.gas_flow")
 

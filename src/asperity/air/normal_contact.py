@@ -38,9 +38,8 @@ def check_shapes(label: str, *values: ArrayLike) -> None:
         np.broadcast_shapes(*shapes)
     except ValueError:
         listed = " and ".join(str(s) for s in dict.fromkeys(shapes) if s)
-        raise InputError(
-            label, "have shapes that broadcast together", listed, "give arrays of one shape"
-        ) from None
+        rule = "have shapes that broadcast together"
+        raise InputError(label, rule, listed, "give arrays of one shape") from None
 
 
 @dataclass(frozen=True)

@@ -72,10 +72,9 @@ def transfer_function(
         if layer is not None:
             denominator = denominator + layer.dynamic_stiffness(omega) / contact.stiffness
     if not np.all(np.isfinite(denominator)):
-        raise InputError(
-            "modulation.frequency must leave stiffnesses that are finite numbers, got "
-            f"{np.max(f):g} Hz; bring it, the slider and the layer nearer to an experiment"
-        )
+        rule = "leave stiffnesses that are finite numbers"
+        advice = "bring it, the slider and the layer nearer to an experiment"
+        raise InputError("modulation.frequency", rule, f"{np.max(f):g} Hz", advice)
     return _reciprocal(denominator)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from asperity.branches.branch import Bifurcation, Branch
 from asperity.branches.continuation import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.loads import Excitation, Modulation
 from asperity.orbit.mesh.arclength import (
     ContinuationPoint,
@@ -102,24 +102,18 @@ def doubled_branch(
         If the bifurcation is no period doubling, the branch has a doubled period already,
         or there is no doubled orbit next to it.
     """
-    if bifurcation.kind != "period doubling":
-        raise InputError(
-            f"bifurcation must be a period doubling, got a {bifurcation.kind}; choose another one"
-        )
-    if branch.periods != 1:
-        raise InputError(
-            f"branch must have the period of the modulation, got {branch.periods} periods; "
-            "follow further doublings in the multipliers of this branch"
-        )
+    rule, got = "be a period doubling", f"a {bifurcation.kind}"
+    require(bifurcation.kind == "period doubling", "bifurcation", rule, got, "choose another one")
+    rule = "have the period of the modulation"
+    advice = "follow further doublings in the multipliers of this branch"
+    require(branch.periods == 1, "branch", rule, f"{branch.periods} periods", advice)
     follower, moving, problem = branch.origin
     simple = follower.finer(bifurcation.critical.point, INTERVALS)
     twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
     start = None if simple is None else _doubled_orbit_near(follower, twice, simple)
     if start is None:
-        raise InputError(
-            "bifurcation must have a doubled orbit next to it, got none by Newton's method; "
-            "continue in another parameter"
-        )
+        rule, got = "have a doubled orbit next to it", "none by Newton's method"
+        raise InputError("bifurcation", rule, got, "continue in another parameter")
     recorder = BranchRecorder(twice, moving, start, counted(progress, most_steps), periods=2)
     return recorder.branch(recorder.follow_branch(most_steps), problem)
 

@@ -12,7 +12,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.loads import Modulation
 from asperity.orbit.mesh.arclength import ParameterLine, still
@@ -68,16 +68,12 @@ def moving_parameter(
     name = continued_name(type(problem.system.slider.law), name)
     known = equation_parameters(*problem)
     if name not in known:
-        raise InputError(
-            f"parameter must be one that the equations have, got '{name}'; {closest(name, known)}"
-        )
+        rule = "be one that the equations have"
+        raise InputError("parameter", rule, f"'{name}'", closest(name, known))
     parameter = known[name]
     ends = [_end(parameter, end, field) for end in span]
     start, end = ends
-    if start == end:
-        raise InputError(
-            f"{field} must have two different ends, got {start:g} twice; give (start, end)"
-        )
+    require(start != end, field, "have two different ends", f"{start:g} twice", "give (start, end)")
     ratio = max(start, end) / min(start, end) if min(start, end) > 0 else 0.0
     return ContinuedParameter(
         name, parameter.unit, start, end, name != "epsilon" and ratio > _LOGARITHMIC
@@ -92,11 +88,9 @@ def continued_name(law: type[Law], name: str) -> str:
     InputError
         If neither the law nor the experiment has a parameter of that name.
     """
-    if name in MODULATION:
-        raise InputError(
-            f"parameter must be one that continuation can change, got '{name}'; give it as "
-            "modulation=asperity.loads.modulated(...) and continue in another one"
-        )
+    rule = "be one that continuation can change"
+    advice = "give it as modulation=asperity.loads.modulated(...) and continue in another one"
+    require(name not in MODULATION, "parameter", rule, f"'{name}'", advice)
     known = {n: p for n, p in point_parameters(law).items() if p.path}
     return known_name(name, known)
 
@@ -139,11 +133,8 @@ def _end(parameter: Parameter, value: Any, field: str) -> float:
     """An end of a span, checked by the rule of the parameter."""
     checked = number(value, field, parameter.kind, parameter.rule)
     # 0 in a table means "not included"; a continued parameter must be part of the equations.
-    if parameter.name in ("M", "eta") and not checked > 0:
-        raise InputError(
-            f"{field} must be positive for {parameter.name}, got {checked:g} {parameter.unit}; "
-            "give a span above zero"
-        )
+    holds, got = parameter.name not in ("M", "eta") or checked > 0, f"{checked:g} {parameter.unit}"
+    require(holds, field, f"be positive for {parameter.name}", got, "give a span above zero")
     return checked
 
 
@@ -184,12 +175,9 @@ def one_problem(
     }
     for name, value in given.items():
         if value is None:
-            raise InputError(f"{name} must be given, got None; or continue in it")
-    if not slider.law.rate_dependent:
-        raise InputError(
-            f"law must depend on the velocity to have a branch with bifurcations, got "
-            f"{slider.law.name}; its force is mu W for all parameters"
-        )
+            raise InputError(name, "be given", "None", "or continue in it")
+    rule, got = "depend on the velocity to have a branch with bifurcations", slider.law.name
+    require(slider.law.rate_dependent, "law", rule, got, "its force is mu W for all parameters")
     amplitude = moving.get("epsilon", epsilon)
     problem = checked_problem(
         slider,
@@ -200,11 +188,8 @@ def one_problem(
         radiation_damping=moving.get("eta", radiation_damping),
     )
     flat, shape = flatten(problem)
-    if shape not in ((), (1,)):
-        raise InputError(
-            f"parameters must be numbers for a continuation, got arrays of shape {shape}; "
-            "follow one operating point at a time"
-        )
+    rule, got = "be numbers for a continuation", f"arrays of shape {shape}"
+    require(shape in ((), (1,)), "parameters", rule, got, "follow one operating point at a time")
     return flat
 
 

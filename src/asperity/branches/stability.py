@@ -48,7 +48,7 @@ from asperity.branches.steps import (
     kind_of,
     root_near,
 )
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
@@ -452,8 +452,8 @@ def stability_boundary(
         moving_parameter(problem, x, x_span, "x_span"),
         moving_parameter(problem, y, y_span, "y_span"),
     )
-    if parameters[0].name == parameters[1].name:
-        raise InputError(f"y must differ from x, got '{y}' for both; choose another parameter")
+    rule, got = "differ from x", f"'{y}' for both"
+    require(parameters[0].name != parameters[1].name, "y", rule, got, "choose another parameter")
     plane = ParameterPlane(problem, parameters, 1)
     report = counted(progress, 2 * lines)
     curves: list[TracedBoundary] = []

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity import materials
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.compare import compare as compare_loaded
 from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
@@ -113,9 +113,8 @@ def read_data(
     # Velocities, for one, have no number where there is no recording.
     for name in ("steps", "velocities"):
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
-            raise InputError(
-                name, "go with one recording", recordings, "cut the recordings beforehand"
-            )
+            rule = "go with one recording"
+            raise InputError(name, rule, recordings, "cut the recordings beforehand")
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }
@@ -214,17 +213,11 @@ def _prior_of_unloading(
     other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
     if other is not None:
         raise InputError(label, "be the only number of K", f"{Argument(other)} K too", "drop one")
-    if len(question.data) != 1 or is_table(question.data[0]):
-        raise InputError(
-            label, "go with one recording", f"{len(question.data)} files", "give one recording"
-        )
-    if any(name.partition("[")[0] == "gain" for name in priors):
-        raise InputError(
-            label,
-            "be without a prior of gain",
-            "both: the slope is measured by the same gauge, and scales with it",
-            "give the prior of K from another source",
-        )
+    rule, got, advice = "go with one recording", f"{len(question.data)} files", "give one recording"
+    require(len(question.data) == 1 and not is_table(question.data[0]), label, rule, got, advice)
+    rule, advice = "be without a prior of gain", "give the prior of K from another source"
+    got = "both: the slope is measured by the same gauge, and scales with it"
+    require(not any(name.partition("[")[0] == "gain" for name in priors), label, rule, got, advice)
     assert question.stiffness_from is not None  # by the caller
     (data,) = question.data
     low, high = question.stiffness_from
@@ -234,12 +227,9 @@ def _prior_of_unloading(
         begin, end = span or (-math.inf, math.inf)
         if low < end and begin < high:
             where = "the whole recording" if span is None else f"{begin:g} to {end:g} s"
-            raise InputError(
-                label,
-                "lie outside what is fitted",
-                f"{low:g} to {high:g} s in {where}",
-                "give a window without it: its samples would count twice",
-            )
+            rule = "lie outside what is fitted"
+            advice = "give a window without it: its samples would count twice"
+            raise InputError(label, rule, f"{low:g} to {high:g} s in {where}", advice)
     return measured_stiffness(read(data), (low, high)).prior
 
 
@@ -273,8 +263,8 @@ def answer_fit(
         data = read_data(question, read)
         return fit_loaded(data, law or default_law(data), question.free, **options)
     (recording,) = question.data
-    if is_table(recording):
-        raise InputError("windows", "go with one recording", "a table", "give one recording")
+    rule = "go with one recording"
+    require(not is_table(recording), "windows", rule, "a table", "give one recording")
     return fit_windows(
         read(recording),
         law or default_law(()),
@@ -384,8 +374,7 @@ def compared_laws(names: Sequence[str]) -> list[str]:
     """
     if "all" in names:
         return [name for name, law in registered().items() if law.rate_dependent]
-    if not names:
-        raise InputError("laws", "name laws", "none", "write 'all' or a,b,c")
+    require(names, "laws", "name laws", "none", "write 'all' or a,b,c")
     known = [known_law(name) for name in names]
     for name in known:
         get_law(name)

@@ -169,10 +169,9 @@ class DataTerm(ABC):
         InputError
             For data whose prediction has no derivatives within compiled programs.
         """
-        raise InputError(
-            f"a posterior must be of lock-in readings or recordings of sliding, got {self.name}; "
-            "take intervals by profile likelihood (profile=True, --profile)"
-        )
+        rule = "be of lock-in readings or recordings of sliding"
+        advice = "take intervals by profile likelihood (profile=True, --profile)"
+        raise InputError("a posterior", rule, self.name, advice)
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
         """The same data with fewer rows and a coarser model, to look for minima with.

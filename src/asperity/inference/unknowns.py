@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
@@ -253,9 +253,8 @@ def unknown_of(
     name = parameter.name
     positive = parameter.rule == "positive"
     if prior is not None and positive and prior.mean <= 0:
-        raise InputError(
-            f"prior of {name} must have a positive mean, got {prior.mean:g}; correct it"
-        )
+        rule = "have a positive mean"
+        raise InputError(f"prior of {name}", rule, f"{prior.mean:g}", "correct it")
     middle = given if given else prior.mean if prior else None
     if usual is not None:
         low, high = usual
@@ -291,9 +290,6 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
         if name in material and material[name].uncertainty:
             number = material[name]
             priors[name] = Prior(number.si, float(number.si_uncertainty or 0), material.name)
-    if not priors:
-        raise InputError(
-            "prior must be a material with uncertainties of free parameters, got "
-            f"'{material.name}', which has none for {', '.join(names)}; leave the prior out"
-        )
+    got, advice = f"'{material.name}', which has none for {', '.join(names)}", "leave the prior out"
+    require(priors, "prior", "be a material with uncertainties of free parameters", got, advice)
     return priors

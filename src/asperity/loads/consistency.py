@@ -48,9 +48,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
     leaves, structure = jax.tree.flatten(modulation)
     for leaf in leaves:
         if isinstance(leaf, str):
-            raise InputError(
-                f"{name} must have numbers for its fields, got {shown(leaf)}; give them in SI"
-            )
+            raise InputError(name, "have numbers for its fields", shown(leaf), "give them in SI")
     if type(modulation) in (Harmonic, Periodic):
         return modulation
     try:

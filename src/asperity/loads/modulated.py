@@ -9,7 +9,7 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.loads.modulation import Periodic, Series
 from asperity.parameters.arguments import shown
 from asperity.units import to_radians, to_si
@@ -120,7 +120,7 @@ def sampled(
     """
     given = {"load": load, "velocity": velocity, "shear": shear}
     if all(values is None for values in given.values()):
-        raise InputError("load, velocity or shear must be given, got none; give samples of one")
+        raise InputError("load, velocity or shear", "be given", "none", "give samples of one")
     series = {name: _series_of(name, values, harmonics) for name, values in given.items()}
     _require_contact(series["load"])
     return Periodic(series["load"], series["shear"], series["velocity"])
@@ -130,17 +130,14 @@ def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] |
     """Fourier coefficients of the load."""
     terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
     for n, term in (load or {}).items():
-        if n < 2 or n != int(n):
-            raise InputError(
-                f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
-            )
+        rule = "have harmonics from 2 on"
+        require(not n < 2 and n == int(n), "load", rule, n, "give the first one as epsilon")
         try:
             amplitude, phase = term
         except (TypeError, ValueError):
-            raise InputError(
-                f"load[{n}] must be a pair of amplitude and phase, got {shown(term)}; write it "
-                f"like load={{{n}: (0.1, 0.0)}}"
-            ) from None
+            rule = "be a pair of amplitude and phase"
+            advice = f"write it like load={{{n}: (0.1, 0.0)}}"
+            raise InputError(f"load[{n}]", rule, shown(term), advice) from None
         size = to_si(amplitude, "dimensionless", f"load[{n}]")
         terms[int(n)] = (size, to_radians(phase, f"load[{n}]"))
     return tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
@@ -156,10 +153,8 @@ def _checked_tilt(value: Any) -> NDArray[np.float64]:
     angle = np.asarray(to_radians(value, "tilt"), float)
     bad = angle[~(np.abs(angle) < np.pi / 2)]
     if bad.size:
-        raise InputError(
-            f"tilt must be less than a right angle, got {bad.flat[0]:g} rad; "
-            "give the angle from the normal, such as '5 deg'"
-        )
+        advice = "give the angle from the normal, such as '5 deg'"
+        raise InputError("tilt", "be less than a right angle", f"{bad.flat[0]:g} rad", advice)
     return angle
 
 
@@ -167,19 +162,15 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
     if values is None:
         return ()
     samples = np.asarray(values, float)
-    if samples.ndim != 1 or len(samples) < 3 or not np.isfinite(samples).all():
-        raise InputError(
-            f"{name} must be at least 3 finite samples of one period, got an array of shape "
-            f"{samples.shape}; give evenly spaced samples without the end point"
-        )
+    holds = samples.ndim == 1 and len(samples) >= 3 and np.isfinite(samples).all()
+    rule, got = "be at least 3 finite samples of one period", f"an array of shape {samples.shape}"
+    require(holds, name, rule, got, "give evenly spaced samples without the end point")
     spectrum = np.fft.rfft(samples) / len(samples)
     scale = 1.0
     if name != "shear":
         scale = spectrum[0].real
-        if not scale > 0:
-            raise InputError(
-                f"{name} must have a positive mean, got {scale:g}; give it in the sense of sliding"
-            )
+        rule = "have a positive mean"
+        require(scale > 0, name, rule, f"{scale:g}", "give it in the sense of sliding")
     # At half the number of samples, cos and sin cannot be distinguished.
     top = (len(samples) - 1) // 2
     kept = spectrum[1 : min(top, harmonics or top) + 1] / scale

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inverted, join, sums
 from asperity.lock_in.reading import LockInReading, reading_of
@@ -192,73 +192,44 @@ def _white(blocks: BlockSums, residual: NDArray[np.complex128]) -> Array:
 
 
 def _degree(detrend: str) -> int:
-    if detrend not in DRIFTS:
-        raise InputError(
-            "lock_in.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
-        )
+    rule = "be none, linear or quadratic"
+    require(detrend in DRIFTS, "lock_in.detrend", rule, f"'{detrend}'", "choose one")
     return DRIFTS[detrend]
 
 
 def _check(time: Array, load: Array, force: Array, harmonics: int, degree: int) -> None:
-    if harmonics < 1:
-        raise InputError("lock_in.harmonics", "be at least 1", harmonics, "ask for 1 or more")
-    if not time.size == load.size == force.size:
-        raise InputError(
-            "lock_in.time, load and force",
-            "have one length",
-            f"{time.size}, {load.size} and {force.size}",
-            "cut them to the same samples",
-        )
+    require(not harmonics < 1, "lock_in.harmonics", "be at least 1", harmonics, "ask for 1 or more")
+    rule, got = "have one length", f"{time.size}, {load.size} and {force.size}"
+    advice = "cut them to the same samples"
+    require(time.size == load.size == force.size, "lock_in.time, load and force", rule, got, advice)
     least = 2 * (degree + 1 + 2 * harmonics) + 2
-    if time.size < least:
-        raise InputError(
-            "lock_in.time",
-            f"hold at least {least} samples for {harmonics} harmonics",
-            time.size,
-            "give a longer window or fewer harmonics",
-        )
+    holds, rule = not time.size < least, f"hold at least {least} samples for {harmonics} harmonics"
+    require(holds, "lock_in.time", rule, time.size, "give a longer window or fewer harmonics")
 
 
 def _check_finite(blocks: BlockSums) -> BlockSums:
     """Refuse samples that are not finite: their sums are not either."""
-    if not np.isfinite(blocks.moments).all():
-        raise InputError(
-            "lock_in.load and force",
-            "be finite",
-            "values that are not",
-            "leave out their samples, as asperity.measurement.measure does",
-        )
+    got = "values that are not"
+    advice = "leave out their samples, as asperity.measurement.measure does"
+    require(np.isfinite(blocks.moments).all(), "lock_in.load and force", "be finite", got, advice)
     return blocks
 
 
 def _check_clock(time: Array) -> None:
-    if not (time[1:] > time[:-1]).all():
-        raise InputError(
-            "lock_in.time",
-            "rise from sample to sample",
-            "equal or decreasing times",
-            "sort or cut the recording",
-        )
+    rule, got = "rise from sample to sample", "equal or decreasing times"
+    require((time[1:] > time[:-1]).all(), "lock_in.time", rule, got, "sort or cut the recording")
 
 
 def _check_resolved(time: Array, frequency: float, harmonics: int) -> None:
     span = float(time[-1] - time[0])
     # Gaps do not lower the sampling rate of the remaining samples.
     rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
-    if not frequency > 0 or frequency * span < 1:
-        raise InputError(
-            "lock_in.frequency",
-            "have at least one period in the window",
-            f"{frequency:.6g} Hz in {span:.6g} s",
-            "give a longer window or another frequency",
-        )
-    if 2 * harmonics * frequency >= rate:
-        raise InputError(
-            "lock_in.harmonics",
-            "lie below half the sampling rate",
-            f"{harmonics} harmonics of {frequency:.6g} Hz at {rate:.6g} samples per second",
-            "ask for fewer",
-        )
+    rule, got = "have at least one period in the window", f"{frequency:.6g} Hz in {span:.6g} s"
+    advice = "give a longer window or another frequency"
+    require(frequency > 0 and not frequency * span < 1, "lock_in.frequency", rule, got, advice)
+    rule = "lie below half the sampling rate"
+    got = f"{harmonics} harmonics of {frequency:.6g} Hz at {rate:.6g} samples per second"
+    require(not 2 * harmonics * frequency >= rate, "lock_in.harmonics", rule, got, "ask for fewer")
 
 
 class LockInStream:
@@ -291,16 +262,11 @@ class LockInStream:
         harmonics: int = 4,
         detrend: str = "linear",
     ) -> None:
-        if detrend not in DRIFTS:
-            raise InputError(
-                f"LockInStream.detrend must be none, linear or quadratic, got '{detrend}'; choose "
-                "one"
-            )
-        if not (end > start and frequency > 0):
-            raise InputError(
-                f"LockInStream.end must follow start and frequency be positive, got {start:g} s, "
-                f"{end:g} s and {frequency:g} Hz; give them in this order"
-            )
+        rule = "be none, linear or quadratic"
+        require(detrend in DRIFTS, "LockInStream.detrend", rule, f"'{detrend}'", "choose one")
+        rule, advice = "follow start and frequency be positive", "give them in this order"
+        got = f"{start:g} s, {end:g} s and {frequency:g} Hz"
+        require(end > start and frequency > 0, "LockInStream.end", rule, got, advice)
         half = (end - start) / 2
         self._basis = Basis(2 * np.pi * frequency, harmonics, DRIFTS[detrend], start + half, half)
         self._parts: list[BlockSums] = []
@@ -317,19 +283,16 @@ class LockInStream:
         first, last = basis.centre - basis.half_width, basis.centre + basis.half_width
         slack = 1e-9 * basis.half_width
         if not (time[0] >= first - slack and time[-1] <= last + slack):
-            raise InputError(
-                f"LockInStream.add must get times from {first:.10g} s to {last:.10g} s, got "
-                f"{time[0]:.10g} s to {time[-1]:.10g} s; give start and end of all that follows"
-            )
+            rule = f"get times from {first:.10g} s to {last:.10g} s"
+            got = f"{time[0]:.10g} s to {time[-1]:.10g} s"
+            advice = "give start and end of all that follows"
+            raise InputError("LockInStream.add", rule, got, advice)
         share = (time[-1] - time[0]) / (2 * basis.half_width)
         step = even_step(time, basis.omega * basis.harmonics)
         blocks = max(1, round(BLOCKS * share))
         part = sums(basis, time, [load, force], blocks=blocks, step=step)
-        if not np.isfinite(part.moments).all():
-            raise InputError(
-                "LockInStream.add must get finite values, got some that are not; leave their "
-                "samples out"
-            )
+        rule, got, advice = "get finite values", "some that are not", "leave their samples out"
+        require(np.isfinite(part.moments).all(), "LockInStream.add", rule, got, advice)
         self._parts.append(part)
 
     def read(self) -> LockInReading:
@@ -340,10 +303,7 @@ class LockInStream:
         InputError
             If there are none, or the frequency is not accurate enough.
         """
-        if not self._parts:
-            raise InputError(
-                "LockInStream.add must be called before read, got no samples; add some"
-            )
+        require(self._parts, "LockInStream.add", "be called before read", "no samples", "add some")
         reading = read(join(self._parts))
         off = 2 * np.pi * reading.frequency - self._basis.omega
         if abs(off) * self._basis.half_width > _OFF:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import require
 
 Array = NDArray[np.float64]
 
@@ -176,13 +176,9 @@ def inverted(normal: Array) -> Array:
         inverse = np.asarray(np.linalg.inv(equal), dtype=np.float64)
     except np.linalg.LinAlgError:
         inverse = np.full_like(equal, np.nan)
-    if not np.isfinite(inverse).all():
-        raise InputError(
-            "lock_in.time",
-            "resolve all harmonics and drift terms",
-            "samples that do not",
-            "give a longer window or ask for fewer harmonics",
-        )
+    rule = "resolve all harmonics and drift terms"
+    advice = "give a longer window or ask for fewer harmonics"
+    require(np.isfinite(inverse).all(), "lock_in.time", rule, "samples that do not", advice)
     return inverse * scale * scale[:, None]
 
 

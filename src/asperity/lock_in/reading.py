@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.lock_in.noise import LocalNoise
 from asperity.lock_in.normal_equations import BlockSums
 from asperity.lock_in.settling import Settling
@@ -186,20 +186,15 @@ class LockInReading:
                     return phasor.amplitude_uncertainty
                 return phasor.phase_uncertainty
         if name not in self.names:
-            raise InputError(
-                f"LockInReading.uncertainty must name a number, got '{name}'; "
-                f"{closest(name, self.names)}"
-            )
+            advice = closest(name, self.names)
+            raise InputError("LockInReading.uncertainty", "name a number", f"'{name}'", advice)
         at = self.names.index(name)
         return math.sqrt(max(float(self.covariance[at, at]), 0.0))
 
     def phasor(self, n: int) -> Phasor:
         """Harmonic n of F/W0 with its uncertainty."""
-        if not 1 <= n <= self.harmonics.size:
-            raise InputError(
-                f"LockInReading.phasor must be one of 1 to {self.harmonics.size}, got {n}; "
-                "ask for more harmonics"
-            )
+        rule, advice = f"be one of 1 to {self.harmonics.size}", "ask for more harmonics"
+        require(1 <= n <= self.harmonics.size, "LockInReading.phasor", rule, n, advice)
         at = [self.names.index(f"re{n}"), self.names.index(f"im{n}")]
         return Phasor(
             complex(self.harmonics[n - 1]),
@@ -272,10 +267,8 @@ def reading_of(
     phasors = beta[first : first + n] - 1j * beta[first + n : linear]
     average = 1 / np.arange(1, first + 1) * (np.arange(first) % 2 == 0)
     mean_load, mean_force = average @ beta[:first]
-    if not mean_load:
-        raise InputError(
-            "lock_in.load", "have a mean to be relative to", "0", "give the load and not its change"
-        )
+    rule = "have a mean to be relative to"
+    require(mean_load, "lock_in.load", rule, "0", "give the load and not its change")
     # Phase of W/W0: a load that is recorded as negative has a positive amplitude too.
     phase = float(np.angle(phasors[0, 0] / mean_load))
     turn = np.exp(-1j * phase * np.arange(1, n + 1))

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import ConstantLoadError, InputError
+from asperity.errors import ConstantLoadError, InputError, require
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
 
 Array = NDArray[np.float64]
@@ -68,13 +68,9 @@ def strongest_line(
         If the recording is too short to hold the frequency.
     """
     step, thinned = _evenly(time, values, _SPECTRUM)
-    if not np.isfinite([step, thinned.sum()]).all():
-        raise InputError(
-            "lock_in.load",
-            "be finite",
-            "values that are not",
-            "leave out their samples, as asperity.measurement.measure does",
-        )
+    got = "values that are not"
+    advice = "leave out their samples, as asperity.measurement.measure does"
+    require(np.isfinite([step, thinned.sum()]).all(), "lock_in.load", "be finite", got, advice)
     spectra = [_spectrum(step, thinned)]
     if time.size > _SPECTRUM:
         # Averages over several samples hide fast lines: these are searched in a part.
@@ -85,12 +81,10 @@ def strongest_line(
     present = [line for line in lines if line is not None]
     if not present:
         where = "" if between is None else f" about {sum(between) / 2:.6g} Hz"
-        raise InputError(
-            "reference.frequency",
-            "lie within what the recording resolves",
-            f"{time.size} samples in {time[-1] - time[0]:.6g} s{where}",
-            "give another frequency or a longer window",
-        )
+        rule = "lie within what the recording resolves"
+        got = f"{time.size} samples in {time[-1] - time[0]:.6g} s{where}"
+        advice = "give another frequency or a longer window"
+        raise InputError("reference.frequency", rule, got, advice)
     return max(present, key=lambda line: line.amplitude)
 
 

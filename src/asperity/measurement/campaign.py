@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.measurement.record import observable_covariance
 from asperity.outputs import UnfinishedText, output_file, written_file
 
@@ -95,10 +95,8 @@ def run_campaign(
     Interrupted
         On Ctrl-C.
     """
-    if out.suffix.lower() not in (".csv", ".nc"):
-        raise InputError(
-            f"--out must be a CSV or a NetCDF file, got '{out}'; write it like --out campaign.csv"
-        )
+    rule, advice = "be a CSV or a NetCDF file", "write it like --out campaign.csv"
+    require(out.suffix.lower() in (".csv", ".nc"), "--out", rule, f"'{out}'", advice)
     out = output_file(
         out, "--out", example="campaign.csv", inputs={f"recording '{f}'": f for f in files}
     )

@@ -51,20 +51,15 @@ def _of_names(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | 
         pattern += _NUMBER + re.escape(following)
     for name in names or [text]:
         if name not in MACHINE_FIELDS or names.count(name) > 1:
-            raise InputError(
-                Argument(_LABEL),
-                f"name each of {', '.join(MACHINE_FIELDS)} once at most",
-                f"'{name}'",
-                _EXAMPLE,
-            )
+            rule = f"name each of {', '.join(MACHINE_FIELDS)} once at most"
+            raise InputError(Argument(_LABEL), rule, f"'{name}'", _EXAMPLE)
     result: dict[Path, dict[str, float | str]] = {}
     for file in files:
         # The whole name, or all of it but the ending.
         match = re.fullmatch(pattern, file.name) or re.fullmatch(pattern, file.stem)
         if match is None:
-            raise InputError(
-                Argument(_LABEL), "fit the names of all recordings", f"'{file.name}'", _EXAMPLE
-            )
+            rule = "fit the names of all recordings"
+            raise InputError(Argument(_LABEL), rule, f"'{file.name}'", _EXAMPLE)
         result[file] = {
             MACHINE_FIELDS[name]: f"{value} {unit}".strip()
             for name, value, unit in zip(names, match.groups(), units, strict=True)

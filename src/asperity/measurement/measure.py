@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.errors import ConstantLoadError, InputError
+from asperity.errors import ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -231,10 +231,8 @@ class _ModulatedRecording:
 def _prepared(
     trace: Trace, load: str, force: str, frequency: float | None, detrend: str, refine: bool
 ) -> _ModulatedRecording:
-    if detrend not in DRIFTS:
-        raise InputError(
-            "measure.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
-        )
+    rule = "be none, linear or quadratic"
+    require(detrend in DRIFTS, "measure.detrend", rule, f"'{detrend}'", "choose one")
     samples = usable(trace, load, force)
     line = modulation_line(samples.time, samples.load, frequency)
     require_modulated(line, samples.load)
@@ -386,12 +384,9 @@ def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
     first, stop = np.searchsorted(time, [start, end], side="left")
     stop = int(np.searchsorted(time, end, side="right"))
     if not start < end or stop - int(first) < 16:
-        raise InputError(
-            "measure.window",
-            "enclose at least 16 samples",
-            f"{start:g} s to {end:g} s",
-            f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s",
-        )
+        rule = "enclose at least 16 samples"
+        advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+        raise InputError("measure.window", rule, f"{start:g} s to {end:g} s", advice)
     return int(first), stop
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
 from asperity.recording.defects.rounded_time import even_times
 from asperity.recording.finding import Finding
@@ -273,12 +273,8 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     require_one_dimension(W, F, load, force)
     names = (_name(trace, W), name)
     if names[0] == names[1]:
-        raise InputError(
-            "measure.force",
-            "be another channel than the load",
-            f"'{names[0]}' for both",
-            "name the one that is the shear force",
-        )
+        rule, got = "be another channel than the load", f"'{names[0]}' for both"
+        raise InputError("measure.force", rule, got, "name the one that is the shear force")
     two = replace(trace, channels={names[0]: W, names[1]: F}, findings=())
     findings = about_channels(trace, names)
     unread = len(trace.findings) - len(findings)
@@ -343,13 +339,10 @@ def require_computable(**channels: Array) -> None:
     """
     for name, values in channels.items():
         largest = float(np.abs(values).max(initial=0.0))
-        if largest and not 1 / _LARGEST < largest < _LARGEST:
-            raise InputError(
-                "measure.trace",
-                f"hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size",
-                f"{largest:.4g} as the largest of '{name}'",
-                "correct its unit, or cut damaged rows out with a window",
-            )
+        holds = not largest or 1 / _LARGEST < largest < _LARGEST
+        rule = f"hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size"
+        advice = "correct its unit, or cut damaged rows out with a window"
+        require(holds, "measure.trace", rule, f"{largest:.4g} as the largest of '{name}'", advice)
 
 
 def about_window(samples: Samples, start: float, end: float) -> list[Finding]:

@@ -189,15 +189,12 @@ class ResponseFunction:
                 'known must go with search="direct", no multipliers and parameters that are not '
                 "traced; leave it out"
             )
-        if known.points != points:
-            raise InputError(
-                f"known must be of as many points as the parameters, {points}, got {known.points}"
-            )
+        rule = f"be of as many points as the parameters, {points}"
+        require(known.points == points, "known", rule, known.points)
         if known.orbit is not None and known.orbit.centre.shape[0] != self._program.states:
-            raise InputError(
-                f"known must be of equations with {self._program.states} states, got "
-                f"{known.orbit.centre.shape[0]}; each law and motion needs its own"
-            )
+            rule = f"be of equations with {self._program.states} states"
+            got = known.orbit.centre.shape[0]
+            raise InputError("known", rule, got, "each law and motion needs its own")
 
     def _padded(self, parameters: Mapping[str, ArrayLike]) -> tuple[Parameters, int | None]:
         """All parameters with as many points as a program is compiled for, and the points given."""

@@ -355,10 +355,9 @@ def dimension_names(
         texts = isinstance(chosen, list | tuple) and all(isinstance(n, str) for n in chosen)
         if texts and len(chosen) == len(set(chosen)) == len(shape):
             return tuple(chosen)
-        raise InputError(
-            f"dims must be {len(shape)} different names, one for each axis, got {shown(dims)}; "
-            "leave it out to have the axes named by what varies"
-        )
+        rule = f"be {len(shape)} different names, one for each axis"
+        advice = "leave it out to have the axes named by what varies"
+        raise InputError("dims", rule, shown(dims), advice)
     along: dict[str, list[int]] = {}
     for name, shape_of in shapes.items():
         along[name] = [

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following import BranchFollowing
 from asperity.orbit.methods.collocation import Collocation
@@ -91,8 +91,7 @@ def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
     InputError
         If there is no method of a name.
     """
-    if not choices:
-        raise InputError("methods", "name a method", "none", "leave it out for all")
+    require(choices, "methods", "name a method", "none", "leave it out for all")
     known = (*CHOICES, *_SYNONYMS)
     names = {_SYNONYMS.get(n, n) for n in (one_of(c, known, "methods") for c in choices)}
     return tuple(method for method in METHODS if method.choice in names)

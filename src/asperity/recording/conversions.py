@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.parameters.arguments import number
 from asperity.recording.trace import Channel, Trace
 from asperity.units import to_si
@@ -56,13 +56,8 @@ def stress_to_force(
 
 def _pressure(trace: Trace, name: str) -> str:
     channel = trace.channel(name)
-    if channel.kind != "pressure":
-        raise InputError(
-            "stress_to_force.channels",
-            "be pressures",
-            f"'{name}' in '{channel.unit}'",
-            "leave it out",
-        )
+    rule, got = "be pressures", f"'{name}' in '{channel.unit}'"
+    require(channel.kind == "pressure", "stress_to_force.channels", rule, got, "leave it out")
     return next(key for key, c in trace.channels.items() if c is channel)
 
 
@@ -82,10 +77,8 @@ def friction_to_force(trace: Trace, name: str = "F") -> Trace:
         If one of the two is missing or ambiguous, or `name` is taken.
     """
     friction, load = trace.channel("friction"), trace.channel("W")
-    if name in trace.channels:
-        raise InputError(
-            f"friction_to_force.name must be free, got '{name}', which the trace has; give another"
-        )
+    got = f"'{name}', which the trace has"
+    require(name not in trace.channels, "friction_to_force.name", "be free", got, "give another")
     made = Channel(friction.values * load.values, load.kind, load.unit, name)
     note = {"shear from friction": f"{friction.recorded_name} x {load.recorded_name}"}
     return replace(
@@ -119,10 +112,8 @@ def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
     if isinstance(stiffness, str):
         match = _PER_LENGTH.fullmatch(stiffness)
         if match is None:
-            raise InputError(
-                "stiffness_from_friction.stiffness must be a friction per length, got "
-                f"'{stiffness}'; write it like '1e-3 /um'"
-            )
+            rule, advice = "be a friction per length", "write it like '1e-3 /um'"
+            raise InputError("stiffness_from_friction.stiffness", rule, f"'{stiffness}'", advice)
         per_length = to_si(match[1], "dimensionless", "stiffness_from_friction.stiffness")
         per_length /= to_si(f"1 {match[2]}", "length", "stiffness_from_friction.stiffness")
     kind = (
@@ -130,9 +121,6 @@ def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
     )
     weight = to_si(load, kind, "stiffness_from_friction.load")
     product = float(per_length) * weight
-    if not (float(per_length) > 0 and weight > 0):
-        raise InputError(
-            f"stiffness_from_friction must have a positive stiffness and load, got {stiffness} and "
-            f"{load}; check the signs"
-        )
+    holds, rule = float(per_length) > 0 and weight > 0, "have a positive stiffness and load"
+    require(holds, "stiffness_from_friction", rule, f"{stiffness} and {load}", "check the signs")
     return product

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Names, Quantity, evaluate
 from asperity.recording.finding import Finding
@@ -51,12 +51,9 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     """
     for target, text in channels.items():
         field = Argument("channels", target)
-        if not str(text).strip():
-            raise InputError(
-                field, "be an expression", repr(text), "write it like '2.4 N/V * Gauge'"
-            )
-        if not target.strip():
-            raise InputError("channels", "have names", "an empty one", "write 'load = ...'")
+        rule = "be an expression"
+        require(str(text).strip(), field, rule, repr(text), "write it like '2.4 N/V * Gauge'")
+        require(target.strip(), "channels", "have names", "an empty one", "write 'load = ...'")
         quantity, sources = evaluate(str(text), _names(trace, field), field)
         trace = _with(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
@@ -97,8 +94,7 @@ def _with(
 
 
 def _with_time(trace: Trace, time: NDArray[np.float64], field: Argument, text: str) -> Trace:
-    if not np.isfinite(time).any():
-        raise InputError(field, "give times", "no finite one", "correct the expression")
+    require(np.isfinite(time).any(), field, "give times", "no finite one", "correct the expression")
     kept = [f for f in trace.findings if f.name not in CHECKED]
     moved = replace(trace, time=time, findings=())
     provenance = {**trace.provenance, "time": f"derived: {text}"}
@@ -111,12 +107,8 @@ def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: A
     fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
     if kind not in fitting:
         shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
-        raise InputError(
-            field,
-            f"be a {' or '.join(sorted(fitting))}",
-            shown,
-            "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'",
-        )
+        advice = "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'"
+        raise InputError(field, f"be a {' or '.join(sorted(fitting))}", shown, advice)
 
 
 def _names(trace: Trace, field: Argument) -> Names:
@@ -169,12 +161,8 @@ def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:
     try:
         factor, dimension = base_units(channel.recorded_unit)
     except InputError:
-        raise InputError(
-            field,
-            "be made of channels in known units",
-            f"'{key}' in '{channel.recorded_unit}'",
-            f"name its unit when reading, like {key}=N",
-        ) from None
+        rule, got = "be made of channels in known units", f"'{key}' in '{channel.recorded_unit}'"
+        raise InputError(field, rule, got, f"name its unit when reading, like {key}=N") from None
     return Quantity(channel.values * factor, dimension)
 
 

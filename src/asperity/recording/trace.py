@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, listed
+from asperity.errors import Argument, InputError, listed, require
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.defects.check import CHECKED, check, even_rate
 from asperity.recording.finding import Finding, with_cause
@@ -50,11 +50,9 @@ class Channel:
     def to(self, unit: str) -> NDArray[np.float64]:
         """Values in another unit, such as ``"MPa"``; raises `InputError` if it does not fit."""
         if self.kind is None:
-            raise InputError(
-                f"Channel.unit must be known to be converted, got '{self.recorded_unit}' for "
-                f"'{self.recorded_name}'; name it when reading, like "
-                f"{Argument('units', self.recorded_name, 'N')}"
-            )
+            got = f"'{self.recorded_unit}' for '{self.recorded_name}'"
+            advice = f"name it when reading, like {Argument('units', self.recorded_name, 'N')}"
+            raise InputError("Channel.unit", "be known to be converted", got, advice)
         return np.asarray(from_si(self.values, unit, self.kind))
 
 
@@ -87,13 +85,9 @@ class Trace(Displayed):
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         object.__setattr__(self, "findings", tuple(self.findings))
         for name, channel in self.channels.items():
-            if channel.values.size != self.time.size:
-                raise InputError(
-                    "Trace.channels",
-                    "be as long as time",
-                    f"{channel.values.size} values of '{name}' for {self.time.size} times",
-                    "cut them to the same length",
-                )
+            rule, advice = "be as long as time", "cut them to the same length"
+            got = f"{channel.values.size} values of '{name}' for {self.time.size} times"
+            require(channel.values.size == self.time.size, "Trace.channels", rule, got, advice)
 
     def __len__(self) -> int:
         return self.time.size
@@ -158,12 +152,8 @@ class Trace(Displayed):
         if end is not None:
             inside &= self.time < to_si(end, "time", "slice.end")
         if not inside.any():
-            raise InputError(
-                "slice.start and slice.end",
-                "enclose samples",
-                f"{start} to {end}",
-                f"{_extent(self.time)}",
-            )
+            rule, got = "enclose samples", f"{start} to {end}"
+            raise InputError("slice.start and slice.end", rule, got, f"{_extent(self.time)}")
         cut = {k: replace(c, values=c.values[inside]) for k, c in self.channels.items()}
         kept = tuple(f for f in self.findings if f.name not in CHECKED)
         part = replace(self, time=self.time[inside], channels=cut, findings=())
@@ -198,10 +188,7 @@ class Trace(Displayed):
 def _column(values: Any, name: str) -> NDArray[np.float64]:
     """A read-only float64 view; the caller's array stays as it is."""
     column = np.asarray(values, dtype=np.float64).view()
-    if column.ndim != 1:
-        raise InputError(
-            f"{name} must have one dimension, got {column.ndim}; give one array per channel"
-        )
+    require(column.ndim == 1, name, "have one dimension", column.ndim, "give one array per channel")
     column.flags.writeable = False
     return column
 

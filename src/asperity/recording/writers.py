@@ -55,9 +55,8 @@ def write(
     file = check_path(path)
     for name in units or {}:
         if name not in trace.channels:
-            raise InputError(
-                f"write.units must name channels, got '{name}'; {closest(name, trace.channels)}"
-            )
+            rule = "name channels"
+            raise InputError("write.units", rule, f"'{name}'", closest(name, trace.channels))
     columns = _columns(trace, units or {})
     target = output_file(file, "write.path", example="recording.csv")
     with written_file(target, "write.path") as complete:
@@ -69,10 +68,8 @@ def check_path(path: str | os.PathLike[str]) -> Path:
     """The path, if its end names a format; raises `InputError` if not."""
     file = Path(path)
     if file.suffix.lower() not in WRITERS:
-        raise InputError(
-            f"write.path must end in the name of a format, got '{file.name}'; "
-            f"{closest(file.suffix.lower(), WRITERS)}"
-        )
+        advice = closest(file.suffix.lower(), WRITERS)
+        raise InputError("write.path", "end in the name of a format", f"'{file.name}'", advice)
     return file
 
 
@@ -120,10 +117,9 @@ def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
     try:
         import nptdms
     except ImportError:
-        raise InputError(
-            f"write.path must be in a format that can be written here, got '{path.name}', which "
-            "is TDMS; install npTDMS, as 'pip install asperity[lab]' does"
-        ) from None
+        rule = "be in a format that can be written here"
+        advice = "install npTDMS, as 'pip install asperity[lab]' does"
+        raise InputError("write.path", rule, f"'{path.name}', which is TDMS", advice) from None
     rate = trace.sample_rate
     clock: dict[str, Any] = {}
     if rate is not None:

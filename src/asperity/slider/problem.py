@@ -11,7 +11,7 @@ import jax
 import numpy as np
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
@@ -58,13 +58,8 @@ def equation_of_motion(
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)
-    if not slider.law.rate_dependent:
-        raise InputError(
-            "law",
-            "depend on the velocity with inertia or radiation damping",
-            slider.law.name,
-            "leave both out or choose another law",
-        )
+    rule, got = "depend on the velocity with inertia or radiation damping", slider.law.name
+    require(slider.law.rate_dependent, "law", rule, got, "leave both out or choose another law")
     if inertia:
         _require_positive("slider.M", slider.M, "kg", "give the mass, as mass='1.6 kg'")
     else:
@@ -87,13 +82,9 @@ def _require_positive(name: str, value: ArrayLike | None, unit: str, remedy: str
 def _elastic(slider: Slider) -> bool:
     """Whether the asperities are elastic, at every point or at none."""
     length = np.asarray(slider.law.elastic_length)
-    if np.any(length > 0) and np.any(length == 0):
-        raise InputError(
-            "law.lambda",
-            "be positive at all points or 0 at all points with inertia or radiation damping",
-            "both: the states differ",
-            "solve the two groups separately",
-        )
+    rule = "be positive at all points or 0 at all points with inertia or radiation damping"
+    got, advice = "both: the states differ", "solve the two groups separately"
+    require(not np.any(length > 0) or not np.any(length == 0), "law.lambda", rule, got, advice)
     return bool(np.all(length > 0))
 
 
@@ -121,13 +112,9 @@ def checked_problem(
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
-    if POSITION in slider.law.state_names:
-        raise InputError(
-            "slider.law",
-            "be the same everywhere for a periodic response",
-            "one on an uneven track",
-            "integrate it as a transient",
-        )
+    rule, got = "be the same everywhere for a periodic response", "one on an uneven track"
+    advice = "integrate it as a transient"
+    require(POSITION not in slider.law.state_names, "slider.law", rule, got, advice)
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)
@@ -149,12 +136,8 @@ def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation
     """
     if (epsilon is None) == (modulation is None):
         given = "neither" if epsilon is None else "both"
-        raise InputError(
-            "exactly one of epsilon and modulation",
-            "be given",
-            given,
-            "give epsilon for a harmonic load and modulation for any other",
-        )
+        advice = "give epsilon for a harmonic load and modulation for any other"
+        raise InputError("exactly one of epsilon and modulation", "be given", given, advice)
     if modulation is None:
         return Harmonic(DRIVE["epsilon"].check(epsilon))
     return checked_modulation(modulation)
@@ -185,12 +168,8 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
         shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
     except ValueError:
         shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
-        raise InputError(
-            name,
-            "have shapes that broadcast",
-            ", ".join(shapes),
-            "give arrays of one shape, or add axes of length 1",
-        ) from None
+        advice = "give arrays of one shape, or add axes of length 1"
+        raise InputError(name, "have shapes that broadcast", ", ".join(shapes), advice) from None
     return (
         jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), problem),
         shape,

@@ -29,7 +29,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.theory.closed_forms import SmallModulation
 
 AgeVelocity: TypeAlias = Literal["slider", "plastic"]
@@ -86,11 +86,9 @@ def ageing_response(p: SmallModulation, age_velocity: AgeVelocity = "slider") ->
     InputError
         If `age_velocity` is neither of the two.
     """
-    if age_velocity not in ("slider", "plastic"):
-        raise InputError(
-            f"ageing_response.age_velocity must be 'slider' or 'plastic', got '{age_velocity}'; "
-            "choose one of the two"
-        )
+    holds, rule = age_velocity in ("slider", "plastic"), "be 'slider' or 'plastic'"
+    got = f"'{age_velocity}'"
+    require(holds, "ageing_response.age_velocity", rule, got, "choose one of the two")
     plastic = age_velocity == "plastic"
     one, two = _order(p, 1, plastic), _order(p, 2, plastic)
     nu = p.V / (p.omega * p.D0)

@@ -23,7 +23,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws.parameter import checked
 
 Form: TypeAlias = Literal["derived", "as_printed"]
@@ -143,10 +143,9 @@ def critical_pulsation(p: SmallModulation) -> Array:
         If B <= A, where steady sliding is stable at any stiffness.
     """
     if not np.all(p.B > p.A):
-        raise InputError(
-            f"critical_pulsation.B must be above A, got B - A = {np.min(p.B - p.A):g}; "
-            "a velocity-strengthening interface has no threshold"
-        )
+        got = f"B - A = {np.min(p.B - p.A):g}"
+        advice = "a velocity-strengthening interface has no threshold"
+        raise InputError("critical_pulsation.B", "be above A", got, advice)
     return jnp.sqrt((p.B - p.A) / p.A) * p.V / p.D0
 
 
@@ -241,11 +240,8 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
         "plastic": (B - A) W0/(D0 - (B - A) lambda), the spring and the asperities in series.
     """
     lengths = {"slider": p.D0 + p.A * p.lambda_, "plastic": p.D0 - (p.B - p.A) * p.lambda_}
-    if age_velocity not in lengths:
-        raise InputError(
-            f"critical_stiffness_elastic.age_velocity must be 'slider' or 'plastic', "
-            f"got '{age_velocity}'; choose one of the two"
-        )
+    rule, got, advice = "be 'slider' or 'plastic'", f"'{age_velocity}'", "choose one of the two"
+    require(age_velocity in lengths, "critical_stiffness_elastic.age_velocity", rule, got, advice)
     return (p.B - p.A) * p.W0 / lengths[age_velocity]
 
 
@@ -271,10 +267,8 @@ def critical_stiffness_form(
 
 
 def _check_form(form: str) -> None:
-    if form not in ("derived", "as_printed"):
-        raise InputError(
-            f"closed form must be 'derived' or 'as_printed', got '{form}'; choose one of the two"
-        )
+    rule, advice = "be 'derived' or 'as_printed'", "choose one of the two"
+    require(form in ("derived", "as_printed"), "closed form", rule, f"'{form}'", advice)
 
 
 def _by_form(form: str, *, derived: Array, as_printed: Array | float) -> Array | float:

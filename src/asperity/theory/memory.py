@@ -28,7 +28,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.loads import Excitation
 from asperity.parameters import obeying
@@ -93,11 +93,8 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
         (jnp.ones(()),),
     )
     scale = float(direct) * float(rates.max(initial=0.0))
-    if not scale > 0:
-        raise InputError(
-            f"law must have a state that relaxes and a direct effect, got {law.name}; "
-            "its sliding has no critical stiffness"
-        )
+    rule = "have a state that relaxes and a direct effect"
+    require(scale > 0, "law", rule, law.name, "its sliding has no critical stiffness")
     k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
     low = 0.0
     for _ in range(_REFINEMENTS):
@@ -206,10 +203,8 @@ def ageing_long_hold(
         leading = B ln y - B A ln(kappa/B)/(kappa - B),   renewal = B ln(1 - mean of s over t).
     """
     if type(law) is not RiceRuina:
-        raise InputError(
-            f"law must be the ageing law 'rice-ruina', got {getattr(law, 'name', type(law))}; "
-            "asperity.experiment.hold_response takes any law"
-        )
+        rule, got = "be the ageing law 'rice-ruina'", getattr(law, "name", type(law))
+        raise InputError("law", rule, got, "asperity.experiment.hold_response takes any law")
     V = obeying(velocity, "ageing_long_hold.velocity", "velocity", "positive")
     t = obeying(hold_time, "ageing_long_hold.hold_time", "time", "positive")
     k = obeying(stiffness, "ageing_long_hold.stiffness", "per_length", "positive")
@@ -264,19 +259,14 @@ def healing_rate_limit(law: RiceRuina) -> Array:
         return _DECADE * B
     if name == "ruina-slip":
         return _DECADE * jnp.minimum(A, B)
-    if not np.all(B > A / 2):
-        raise InputError(
-            "law.B must be above law.A / 2 for a healing rate in closed form, got less; "
-            "integrate with asperity.experiment.hold_response"
-        )
+    holds, rule = np.all(B > A / 2), "be above law.A / 2 for a healing rate in closed form"
+    require(holds, "law.B", rule, "less", "integrate with asperity.experiment.hold_response")
     return _DECADE * (B - A / 2)
 
 
 def _one_of_three(law: Any) -> tuple[str, RiceRuina]:
     if type(law) not in (RiceRuina, RuinaSlip, PerrinRiceZheng):
         name = getattr(law, "name", type(law).__name__)
-        raise InputError(
-            f"law must be rice-ruina, ruina-slip or perrin-rice-zheng, got {name}; "
-            "asperity.experiment has the same for any law by integration"
-        )
+        advice = "asperity.experiment has the same for any law by integration"
+        raise InputError("law", "be rice-ruina, ruina-slip or perrin-rice-zheng", name, advice)
     return law.name, law

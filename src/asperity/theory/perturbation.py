@@ -187,10 +187,8 @@ def perturb(system: Motion) -> PerturbationResponse:
         shape = jnp.broadcast_shapes(*shapes)
     except ValueError:
         given = ", ".join(sorted({str(s) for s in shapes if s}))
-        raise InputError(
-            f"parameters must have shapes that broadcast, got {given}; "
-            "give arrays of one shape, or add axes of length 1"
-        ) from None
+        advice = "give arrays of one shape, or add axes of length 1"
+        raise InputError("parameters", "have shapes that broadcast", given, advice) from None
     # One axis of points, as the linear solver takes them.
     points = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x, float), shape).ravel(), system)
     expand = _rate_independent if not system.slider.law.rate_dependent else _expand

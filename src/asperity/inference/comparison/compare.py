@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.comparison.evidence import (
     CrossValidation,
     Evidence,
@@ -183,19 +183,16 @@ def compare(
     given one is named with it. Rows that alone keep every law from describing the data are left
     out, and named.
     """
-    if len(set(laws)) < 2:
-        raise InputError(
-            f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
-        )
+    rule = "be two or more"
+    require(len(set(laws)) >= 2, "laws", rule, ", ".join(laws) or "none", "name those to compare")
     # Parameters of laws; those of machine and runs, and unknown names, are checked by the fit.
     nobodys = [
         p for p in free or () if p in _of_any_law() and not any(p in _parameters(n) for n in laws)
     ]
     if nobodys:
-        raise InputError(
-            f"free must be parameters of the laws that are compared, got '{nobodys[0]}', which "
-            f"none of {', '.join(dict.fromkeys(laws))} has; leave it out, or add a law with it"
-        )
+        rule = "be parameters of the laws that are compared"
+        got = f"'{nobodys[0]}', which none of {', '.join(dict.fromkeys(laws))} has"
+        raise InputError("free", rule, got, "leave it out, or add a law with it")
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {
         name: (

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
@@ -109,9 +109,8 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
         ),
     ):
         if value is None:
-            raise InputError(
-                f"{name} must have {field} for a fit of its cycles, got none; give it, as {example}"
-            )
+            rule = f"have {field} for a fit of its cycles"
+            raise InputError(name, rule, "none", f"give it, as {example}")
     regular = [r for r in measurement.regimes if r.kind == REGULAR]
     if not regular:
         raise InputError(
@@ -121,11 +120,8 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
         )
     longest = max(regular, key=lambda r: r.stop - r.first)
     kept = slice(longest.first, longest.stop)
-    if longest.stop - longest.first <= _FEWEST:
-        raise InputError(
-            f"{name} must have more than {_FEWEST} regular cycles, got "
-            f"{longest.stop - longest.first}; record for longer"
-        )
+    rule, got = f"have more than {_FEWEST} regular cycles", longest.stop - longest.first
+    require(not longest.stop - longest.first <= _FEWEST, name, rule, got, "record for longer")
     time, force = measurement.time, measurement.friction
     step = float(time[-1] - time[0]) / (time.size - 1)
     onset, end, drop = (getattr(events, n)[kept] for n in ("onset", "end", "drop"))

@@ -107,10 +107,8 @@ def design(
     _require_candidates(plan, candidates)
     cost = plan.cost(candidates.points["V"])
     if cost.min() > plan.budget:
-        raise InputError(
-            f"{plan.name}.time must suffice for one reading, got {plan.budget:g} s; the shortest "
-            f"takes {cost.min():g} s"
-        )
+        rule, got = "suffice for one reading", f"{plan.budget:g} s"
+        raise InputError(f"{plan.name}.time", rule, got, f"the shortest takes {cost.min():g} s")
     shape = tuple(levels.size for levels in plan.axes.values())
     grid = even_grid(shape, candidates.index, cost, plan.budget)
     expected, jacobian = expected.without(unseen), jacobian[~unseen]
@@ -121,11 +119,9 @@ def design(
 def _require_candidates(plan: DesignPlan, candidates: Candidates) -> None:
     if not candidates.index.size:
         why = "; ".join(f"{count} times: {text}" for text, count in candidates.left_out.items())
-        raise InputError(
-            f"{plan.name}.ranges must hold operating points at which the slider slides steadily, "
-            f"got none of {candidates.total} ({why}); lower W0, stiffen the spring, or widen the "
-            "ranges"
-        )
+        rule = "hold operating points at which the slider slides steadily"
+        advice = "lower W0, stiffen the spring, or widen the ranges"
+        raise InputError(f"{plan.name}.ranges", rule, f"none of {candidates.total} ({why})", advice)
 
 
 def fisher_information(jacobian: Float) -> Float:

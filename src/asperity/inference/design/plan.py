@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.inference.fitting.inputs import (
     fixed_values,
     priors_of,
@@ -180,13 +180,9 @@ def _checked(question: Design, name: str) -> DesignPlan:
         rival_law = _law(question.rival, "plan.rival")
         free = question.rival_free or tuple(n for n in truth.names if n in _known(rival_law))
         rival = _hypothesis(question, rival_law, law, free, material, table)
-        if rival_law is law and set(truth.names) <= set(rival.names):
-            raise InputError(
-                "plan.rival",
-                "differ from the law",
-                f"{law.name} with the same free parameters",
-                "name another law, or leave one out in rival_free",
-            )
+        holds = rival_law is not law or not set(truth.names) <= set(rival.names)
+        rule, got = "differ from the law", f"{law.name} with the same free parameters"
+        require(holds, "plan.rival", rule, got, "name another law, or leave one out in rival_free")
     noise = _noise(question)
     uncertainty = _uncertainties(question, known, material, truth) if question.draws else {}
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
@@ -194,43 +190,25 @@ def _checked(question: Design, name: str) -> DesignPlan:
     if rival is not None:
         require_motion(rival.names, plan.motion, label="plan.rival_free", plan=True)
     for parameter in question.measure:
-        if parameter not in truth.names:
-            raise InputError(
-                "plan.measure",
-                "name free parameters",
-                f"'{parameter}'",
-                f"free it or choose among {', '.join(truth.names)}",
-            )
+        rule, advice = "name free parameters", f"free it or choose among {', '.join(truth.names)}"
+        require(parameter in truth.names, "plan.measure", rule, f"'{parameter}'", advice)
     largest = float(axes["epsilon"].max())
     for hypothesis in (truth, rival) if rival else (truth,):
         carried = {**hypothesis.fixed, **expected_values(hypothesis)}["eps_ratio"] * largest
-        if carried >= 1:
-            raise InputError(
-                "plan.ranges.epsilon times eps_ratio",
-                "be below 1",
-                f"{carried:g}",
-                "contact would be lost",
-            )
+        got, advice = f"{carried:g}", "contact would be lost"
+        require(not carried >= 1, "plan.ranges.epsilon times eps_ratio", "be below 1", got, advice)
     unknown = sum(1 for u in truth.unknowns if u.prior is None)
     if question.points is not None and question.points * len(noise) < unknown:
-        raise InputError(
-            "plan.points",
-            "give at least as many data as free parameters",
-            f"{question.points * len(noise)} for {unknown} without a prior",
-            "plan more, or free fewer",
-        )
+        rule = "give at least as many data as free parameters"
+        got = f"{question.points * len(noise)} for {unknown} without a prior"
+        raise InputError("plan.points", rule, got, "plan more, or free fewer")
     return plan
 
 
 def _law(name: str, field: str) -> type[Law]:
     law = get_law(known_law(name))
-    if not law.rate_dependent:
-        raise InputError(
-            field,
-            "depend on the velocity",
-            law.name,
-            "its one number follows from the mean friction",
-        )
+    advice = "its one number follows from the mean friction"
+    require(law.rate_dependent, field, "depend on the velocity", law.name, advice)
     return law
 
 
@@ -251,9 +229,8 @@ def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> di
     result = {}
     for name, value in getattr(question, field).items():
         if name not in known:
-            raise InputError(
-                f"plan.{field}", "have names of parameters", f"'{name}'", closest(name, known)
-            )
+            rule = "have names of parameters"
+            raise InputError(f"plan.{field}", rule, f"'{name}'", closest(name, known))
         result[name] = _quantity(value, known[name], f"plan.{field}.{name}")
     return result
 
@@ -263,18 +240,12 @@ def _axes(question: Design, known: Mapping[str, Parameter]) -> dict[str, Float]:
     axes = {}
     for name, given in question.ranges.items():
         if name not in known or name == EPS_RATIO.name:
-            raise InputError(
-                "plan.ranges",
-                "be of the drive or the machine",
-                f"'{name}'",
-                closest(name, known),
-            )
+            rule = "be of the drive or the machine"
+            raise InputError("plan.ranges", rule, f"'{name}'", closest(name, known))
         axes[name] = _levels(name, given, known[name])
     count = math.prod(levels.size for levels in axes.values())
-    if count > MOST:
-        raise InputError(
-            "plan.ranges", f"have at most {MOST} combinations", count, "give fewer levels"
-        )
+    rule = f"have at most {MOST} combinations"
+    require(not count > MOST, "plan.ranges", rule, count, "give fewer levels")
     return axes
 
 
@@ -288,17 +259,11 @@ def _levels(name: str, given: Range, parameter: Parameter) -> Float:
         return levels
     low = _quantity(given.from_, parameter, f"{label}.from")
     high = _quantity(given.to, parameter, f"{label}.to")
-    if not low < high:
-        raise InputError(f"{label}.to", "be above from", f"{high:g}", "exchange the two")
+    require(low < high, f"{label}.to", "be above from", f"{high:g}", "exchange the two")
     if (given.spacing or ("log" if name in _LOGARITHMIC else "linear")) == "linear":
         return np.linspace(low, high, given.levels)
-    if low <= 0:
-        raise InputError(
-            f"{label}.from",
-            "be positive with spacing 'log'",
-            f"{low:g}",
-            "raise it, or choose 'linear'",
-        )
+    rule = "be positive with spacing 'log'"
+    require(not low <= 0, f"{label}.from", rule, f"{low:g}", "raise it, or choose 'linear'")
     return np.geomspace(low, high, given.levels)
 
 
@@ -306,9 +271,8 @@ def _noise(question: Design) -> dict[str, NoiseLevel]:
     """Standard uncertainties of a reading, by observable."""
     for name in question.noise:
         if name not in OBSERVABLES:
-            raise InputError(
-                "plan.noise", "be of observables", f"'{name}'", closest(name, OBSERVABLES)
-            )
+            rule = "be of observables"
+            raise InputError("plan.noise", rule, f"'{name}'", closest(name, OBSERVABLES))
     return {n: _level(n, question.noise[n]) for n in OBSERVABLES if n in question.noise}
 
 
@@ -316,24 +280,19 @@ def _level(name: str, given: Noise) -> NoiseLevel:
     """Standard uncertainty of one observable."""
     label = f"plan.noise.{name}"
     phase = name.startswith("phase")
-    if phase and given.relative:
-        raise InputError(label, "be absolute", "a relative part", "give an angle")
+    rule = "be absolute"
+    require(not phase or not given.relative, label, rule, "a relative part", "give an angle")
     absolute = given.absolute
     if phase and not isinstance(absolute, str) and absolute != 0:
-        raise InputError(
-            label,
-            "be an angle in rad or deg, with its unit",
-            repr(absolute),
-            "write it like '1 deg' or '20 mrad'",
-        )
+        rule = "be an angle in rad or deg, with its unit"
+        raise InputError(label, rule, repr(absolute), "write it like '1 deg' or '20 mrad'")
     a = to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label)
     r = to_si(given.relative, "dimensionless", f"{label}.relative")
     a, r = float(a), float(r)
     if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
         worst = max(a, r) if min(a, r) >= 0 else min(a, r)
-        raise InputError(
-            label, "be positive", f"{worst:g}", "give the standard uncertainty of one reading"
-        )
+        rule = "be positive"
+        raise InputError(label, rule, f"{worst:g}", "give the standard uncertainty of one reading")
     return NoiseLevel(a, r)
 
 
@@ -357,29 +316,21 @@ def _hypothesis(
         for field in ("values", "fixed")
     )
     for name, field in itertools.chain(((n, "fixed") for n in fixed), ((n, "free") for n in free)):
-        if name in table.points:
-            raise InputError(
-                f"plan.{field}",
-                "not have what ranges has",
-                f"'{name}'",
-                "drop one" if field == "fixed" else "it is set, not fitted",
-            )
+        rule = "not have what ranges has"
+        advice = "drop one" if field == "fixed" else "it is set, not fitted"
+        require(name not in table.points, f"plan.{field}", rule, f"'{name}'", advice)
     for name in given:
-        if name in fixed and name not in free:
-            raise InputError(f"plan.{name}", "be given once", "two", "drop one")
+        rule = "be given once"
+        require(name not in fixed or name in free, f"plan.{name}", rule, "two", "drop one")
         if name not in free and first is law:
             fixed[name] = given[name]
     start = start_values(law, free, {n: v for n, v in given.items() if n in free}, material)
     if "eps_ratio" in free:
         start.setdefault("eps_ratio", 1.0)
     missing = [n for n in free if n in known and n not in start]
-    if missing:
-        raise InputError(
-            "plan.values",
-            f"have a value for each free parameter of {law.name}",
-            f"none for {', '.join(missing)}",
-            "a design is made for values that are expected",
-        )
+    rule = f"have a value for each free parameter of {law.name}"
+    got = f"none for {', '.join(missing)}"
+    require(not missing, "plan.values", rule, got, "a design is made for values that are expected")
     unknowns = unknowns_of(
         law,
         free,
@@ -402,10 +353,8 @@ def _uncertainties(
     given = {}
     for name, value in question.uncertainty.items():
         label = f"plan.uncertainty.{name}"
-        if name not in known or name not in truth.names:
-            raise InputError(
-                "plan.uncertainty", "be of free parameters", f"'{name}'", "free it or leave it out"
-            )
+        holds, rule = name in known and name in truth.names, "be of free parameters"
+        require(holds, "plan.uncertainty", rule, f"'{name}'", "free it or leave it out")
         with_unit(value, known[name].kind, label)
         given[name] = float(to_si(value, known[name].kind, label))
         if given[name] < 0:
@@ -413,11 +362,6 @@ def _uncertainties(
     for name in truth.names:
         if material is not None and name in material and material[name].uncertainty:
             given.setdefault(name, float(material[name].si_uncertainty or 0.0))
-    if not given:
-        raise InputError(
-            "plan.uncertainty",
-            "have a free parameter to draw",
-            "none",
-            "add one, or leave draws out",
-        )
+    rule = "have a free parameter to draw"
+    require(given, "plan.uncertainty", rule, "none", "add one, or leave draws out")
     return {n: given[n] for n in truth.names if n in given}

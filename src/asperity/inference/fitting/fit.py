@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.cycles.cycle import AveragedCycle
 from asperity.inference.cycles.term import CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
@@ -251,11 +251,8 @@ def _hold_objective(
     """The function to minimise for a table of holds, everything wrong refused."""
     numbers = law_parameters(law)
     for name in free:
-        if name not in numbers:
-            raise InputError(
-                f"free must be parameters of {law.name} with holds, got '{name}'; leave it out: "
-                "the table has stiffness and velocity"
-            )
+        holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
+        require(holds, "free", f"be parameters of {law.name} with holds", f"'{name}'", advice)
     priors = given.priors(free)
     require_free(law, free, priors, bare=bare)
     # Healing is counted from the level of sliding: the level itself does not enter.
@@ -285,26 +282,19 @@ def _cycle_objective(
     level = float(np.mean(first.values[:-1]))
     fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
     names = [n for n in (*numbers, "K", "M") if n not in fixed] if free is None else list(free)
-    if "mu0" in names:
-        raise InputError(
-            "free must be what the shape of a cycle shows, got 'mu0'; leave it out: a constant "
-            "friction is fitted in each cycle"
-        )
+    advice = "leave it out: a constant friction is fitted in each cycle"
+    require("mu0" not in names, "free", "be what the shape of a cycle shows", "'mu0'", advice)
     unseen = [c.name for c in cycles if not c.resolved]
     if unseen and "M" in names:
-        raise InputError(
-            f"M must be fixed where a slip is shorter than four samples, got it free for "
-            f"{unseen[0]}; fix M, or sample faster"
-        )
+        rule = "be fixed where a slip is shorter than four samples"
+        raise InputError("M", rule, f"it free for {unseen[0]}", "fix M, or sample faster")
     constants = fixed_values(law, None, names, fixed, given.material)
     if "K" in fixed and "K" not in names:
         constants["K"] = float(MACHINE["K"].check(fixed["K"]))
     missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
     if missing:
-        raise InputError(
-            f"{missing[0]} must be free or fixed for a fit of cycles, got neither; name it in "
-            "--free, or give it with --fix"
-        )
+        advice = "name it in --free, or give it with --fix"
+        raise InputError(f"{missing[0]}", "be free or fixed for a fit of cycles", "neither", advice)
     priors = given.priors(names)
     require_free(law, names, priors, bare=False)
     # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.inference.cycles.cycle import AveragedCycle
 from asperity.inference.holds.table import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
@@ -104,10 +104,8 @@ def start_values(
         if material is not None and name in material and material[name].value is not None
     }
     for name, value in (start or {}).items():
-        if name not in free and not (name.startswith("K") and runs):
-            raise InputError(
-                "start", "be of free parameters", f"'{name}'", "free it or leave it out"
-            )
+        rule, advice = "be of free parameters", "free it or leave it out"
+        require(name in free or (name.startswith("K") and runs), "start", rule, f"'{name}'", advice)
         # A stiffness is read with the run that it belongs to.
         known[name] = value if name.startswith("K") else float(_checked(law, "start", name, value))
     return known
@@ -129,14 +127,13 @@ def of_the_table(
     over = over_load(text)
     elsewhere = prior is not None and prior.unit not in ("", "N/m")
     if (over is not None or elsewhere) and not (load.size == 1 and math.isfinite(load[0])):
-        raise InputError(
-            "K over the load", "come with one fixed W0", "several or none", "give K in N/m"
-        )
+        rule = "come with one fixed W0"
+        raise InputError("K over the load", rule, "several or none", "give K in N/m")
     if text is not None:
         start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
     if prior is not None and elsewhere:
-        if prior.unit != "1/m":
-            raise InputError("prior of K", "be in N/m or 1/m for a table", prior.unit, "convert it")
+        rule = "be in N/m or 1/m for a table"
+        require(prior.unit == "1/m", "prior of K", rule, prior.unit, "convert it")
         W0 = float(load[0])
         priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
     return start, priors
@@ -176,22 +173,11 @@ def fixed_values(
         assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
-        if name in free:
-            raise InputError(name, "be free or fixed", "both", "leave one out")
-        if name in MODULATION:
-            raise InputError(
-                "fixed",
-                "be parameters of a harmonic load",
-                f"'{name}'",
-                "leave it out: fits take no other load",
-            )
-        if name not in known and name != "eps_ratio":
-            raise InputError(
-                "fixed",
-                f"be parameters of {law.name}",
-                f"'{name}'",
-                "leave it out or choose another law",
-            )
+        require(name not in free, name, "be free or fixed", "both", "leave one out")
+        rule, advice = "be parameters of a harmonic load", "leave it out: fits take no other load"
+        require(name not in MODULATION, "fixed", rule, f"'{name}'", advice)
+        rule, advice = f"be parameters of {law.name}", "leave it out or choose another law"
+        require(name in known or name == "eps_ratio", "fixed", rule, f"'{name}'", advice)
     result: dict[str, Any] = {}
     missing = []
     for name, parameter in known.items():
@@ -219,22 +205,16 @@ def fixed_values(
         )
     if over_load(given.get("K")) is not None:
         if "W0" not in result:
-            raise InputError(
-                "K over the load",
-                "come with a fixed W0",
-                f"'{given['K']}' and W0 free",
-                "give K as a stiffness, or fix W0",
-            )
+            rule, got = "come with a fixed W0", f"'{given['K']}' and W0 free"
+            raise InputError("K over the load", rule, got, "give K as a stiffness, or fix W0")
         result["K"] = result["K"] * result["W0"]
     if "eps_ratio" not in free:
         result["eps_ratio"] = ratio = float(
             _checked(law, "fixed", "eps_ratio", given.get("eps_ratio", 1.0))
         )
         largest = ratio * float(np.max(points.get("epsilon", 0.0)))
-        if largest >= 1:
-            raise InputError(
-                "eps_ratio times epsilon", "be below 1", f"{largest:g}", "contact would be lost"
-            )
+        advice = "contact would be lost"
+        require(not largest >= 1, "eps_ratio times epsilon", "be below 1", f"{largest:g}", advice)
     return result
 
 
@@ -256,15 +236,11 @@ def require_free(
     ------
     InputError
     """
-    if not free and not bare:
-        raise InputError(
-            "free", f"name a parameter of {law.name}", "none", "free one, such as A or eps_ratio"
-        )
+    rule = f"name a parameter of {law.name}"
+    require(free or bare, "free", rule, "none", "free one, such as A or eps_ratio")
     for name in priors:
-        if name not in free:
-            raise InputError(
-                "prior", "be of free parameters", f"'{name}'", "free it or leave the prior out"
-            )
+        rule = "be of free parameters"
+        require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
 
 
 def require_motion(
@@ -292,12 +268,9 @@ def require_motion(
     ):
         if name in free and not motion[option]:
             switch = f"--{option.replace('_', '-')} ({option}=True in Python)"
-            raise InputError(
-                label,
-                "be parameters that count",
-                f"'{name}', which has no influence without {word}",
-                f"add {f'{option} = true' if plan else switch} or fix {name}",
-            )
+            got = f"'{name}', which has no influence without {word}"
+            advice = f"add {f'{option} = true' if plan else switch} or fix {name}"
+            raise InputError(label, "be parameters that count", got, advice)
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
@@ -317,13 +290,9 @@ def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
 def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
     """The same for a number of data."""
     needed = sum(1 for u in unknowns if u.prior is None)
-    if count < max(needed + (needed > 1), 1):
-        raise InputError(
-            name,
-            "hold more data than free parameters",
-            f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})",
-            "free fewer or measure more",
-        )
+    rule, advice = "hold more data than free parameters", "free fewer or measure more"
+    got = f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})"
+    require(not count < max(needed + (needed > 1), 1), name, rule, got, advice)
 
 
 def priors_of(
@@ -348,12 +317,9 @@ def priors_of(
     for name, prior in given.items():
         if prior is None:
             if free is None:
-                raise InputError(
-                    f"{Argument('prior', value=name)}",
-                    f"go with {Argument('free')}",
-                    "no free parameters",
-                    "name those that the priors of the material are meant for",
-                )
+                rule, got = f"go with {Argument('free')}", "no free parameters"
+                advice = "name those that the priors of the material are meant for"
+                raise InputError(f"{Argument('prior', value=name)}", rule, got, advice)
             result |= material_priors(load_material(name), free)
             continue
         parameter = known.get(name.partition("[")[0])
@@ -361,13 +327,9 @@ def priors_of(
             raise InputError("prior", "name a parameter", f"'{name}'", "correct the name")
         mean, unit = _of_some_kind(parameter, prior.mean, f"prior {name}")
         sd, other = _of_some_kind(parameter, prior.std, f"prior {name}")
-        if not sd > 0 or unit != other:
-            raise InputError(
-                f"prior {name}",
-                "have a positive deviation" if unit == other else "have one unit",
-                f"{sd:g}" if unit == other else f"{unit} and {other}",
-                "give one",
-            )
+        rule = "have a positive deviation" if unit == other else "have one unit"
+        got = f"{sd:g}" if unit == other else f"{unit} and {other}"
+        require(sd > 0 and unit == other, f"prior {name}", rule, got, "give one")
         result[name] = Prior(mean, sd, "given", unit)
     return result
 

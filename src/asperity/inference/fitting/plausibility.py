@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.minima import minima_of
 from asperity.inference.fitting.result import Fit
@@ -215,11 +215,9 @@ def shift_of_estimates(
         If the fit is of anything but one table of lock-in readings.
     """
     tables = fit.objective.terms_of(LockInTerm)
-    if len(tables) != 1 or len(fit.objective.terms) != 1:
-        raise InputError(
-            f"fit must be of one table of lock-in readings, got {len(fit.objective.terms)} parts; "
-            "fit the table alone"
-        )
+    rule, got = "be of one table of lock-in readings", f"{len(fit.objective.terms)} parts"
+    advice = "fit the table alone"
+    require(len(tables) == 1 and len(fit.objective.terms) == 1, "fit", rule, got, advice)
     (term,) = tables
     sides = []
     for change in (high, low):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import LEVELS, UNDETERMINED, Interval
 from asperity.inference.fitting.result import Fit
@@ -138,7 +138,7 @@ def fit_windows(
     trace = recording if isinstance(recording, Trace) else read(recording)
     given = dict(reading or {})
     if windows is not None and len(windows) < 2:
-        raise InputError(f"windows must be two or more, got {len(windows)}; add one")
+        raise InputError("windows", "be two or more", len(windows), "add one")
     first = recorded_run(trace, **given, window=None if windows is None else windows[0])
     spans = (
         _automatic(first) if windows is None else tuple((float(a), float(b)) for a, b in windows)
@@ -180,11 +180,8 @@ def _physical(result: Fit) -> list[Any]:
 
 def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
     """The whole run, and the same without parts of the first and the last segment."""
-    if not run.cuts:
-        raise InputError(
-            f"windows must be given for {run.name}, got none: its velocity does not change; write "
-            "them"
-        )
+    rule = f"be given for {run.name}"
+    require(run.cuts, "windows", rule, "none: its velocity does not change", "write them")
     begin, end = run.origin, run.origin + float(run.time[-1])
     edges = run.drive.edges[[run.cuts[0], run.cuts[-1]]]
     later = begin + _LEFT_OUT * float(edges[0])

@@ -144,10 +144,9 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
     tables = list(tables)
     known = [t.errors is not None for t in tables]
     if any(known) != all(known):
-        raise InputError(
-            "healing_err must be given for all tables of holds or for none, got it for "
-            f"{sum(known)} of {len(known)}; one error is estimated for all rows that have none"
-        )
+        rule = "be given for all tables of holds or for none"
+        advice = "one error is estimated for all rows that have none"
+        raise InputError("healing_err", rule, f"it for {sum(known)} of {len(known)}", advice)
     if len(tables) == 1:
         return tables[0]
 

@@ -20,7 +20,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
@@ -89,13 +89,9 @@ def sample_posterior(
         On Ctrl-C.
     """
     require_bayes()
-    if not fit.converged:
-        raise InputError(
-            f"fit must have converged, got '{fit.message}'; a posterior is sampled from its "
-            "maximum on"
-        )
-    if not fit.parameters:
-        raise InputError("posterior must be of free parameters, got none; free one, such as A")
+    advice = "a posterior is sampled from its maximum on"
+    require(fit.converged, "fit", "have converged", f"'{fit.message}'", advice)
+    require(fit.parameters, "posterior", "be of free parameters", "none", "free one, such as A")
     require_sizes(chains, draws)
     whitened = Whitened.of(fit)
     density, data = whitened.compiled()
@@ -134,14 +130,11 @@ def require_sizes(chains: int, draws: int) -> None:
     InputError
     """
     for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
-        if value < least:
-            raise InputError(f"{name} must be at least {least}, got {value}; ask for more")
+        require(not value < least, name, f"be at least {least}", value, "ask for more")
     each = WARM_UP + -(-draws // BLOCK) * BLOCK
-    if chains * each > _MOST_DRAWS:
-        raise InputError(
-            f"chains times draws must be {_MOST_DRAWS} at most, those of the warm-up included, "
-            f"got {chains} chains of {each}; ask for fewer"
-        )
+    rule = f"be {_MOST_DRAWS} at most, those of the warm-up included"
+    got = f"{chains} chains of {each}"
+    require(not chains * each > _MOST_DRAWS, "chains times draws", rule, got, "ask for fewer")
 
 
 def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
@@ -154,10 +147,9 @@ def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
         if np.isfinite(whitened.log_density(z)[0]):
             return np.asarray(jax.random.key_data(key)), z
         spread *= 0.9
-    raise InputError(
-        f"posterior must have a first position for chain {chain + 1}, got none in {_TRIES} draws "
-        "about the estimate: the law has no solution there; fix parameters or give priors"
-    )
+    rule = f"have a first position for chain {chain + 1}"
+    got = f"none in {_TRIES} draws about the estimate: the law has no solution there"
+    raise InputError("posterior", rule, got, "fix parameters or give priors")
 
 
 def warmed_up(log_density: LogDensity, data: Any, key: Any, z: Float) -> tuple[ChainState, None]:
@@ -266,8 +258,5 @@ def require_bayes() -> None:
         Naming what is missing.
     """
     missing = [name for name in ("blackjax", "arviz_stats", "arviz_base") if not find_spec(name)]
-    if missing:
-        raise InputError(
-            f"posterior must have the extra 'bayes' installed, got no {', '.join(missing)}; "
-            "install it by: pip install 'asperity[bayes]'"
-        )
+    rule, got = "have the extra 'bayes' installed", f"no {', '.join(missing)}"
+    require(not missing, "posterior", rule, got, "install it by: pip install 'asperity[bayes]'")

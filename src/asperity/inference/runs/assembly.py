@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
@@ -115,26 +115,21 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
     """
     names = ", ".join(run.name for run in runs)
     for name in ("alpha", "eps_ratio"):
-        if name in free and not any(run.load_varies for run in runs):
-            raise InputError(
-                f"{name} must be seen in a change of the load, got a constant load in {names}; fix "
-                f"{name}, or add a recording with load steps or a modulated load"
-            )
+        rule, got = "be seen in a change of the load", f"a constant load in {names}"
+        advice = f"fix {name}, or add a recording with load steps or a modulated load"
+        require(name not in free or any(run.load_varies for run in runs), name, rule, got, advice)
     if "M" in free:
         return
     for name in ("A", "B", "D0", "K"):
-        if name in free and not any(run.cuts or run.load_varies for run in runs):
-            raise InputError(
-                f"{name} must be seen in a change of the velocity or of the load, got neither in "
-                f"{names}; add a recording with velocity steps or holds, or give the steps"
-            )
+        holds = name not in free or any(run.cuts or run.load_varies for run in runs)
+        rule = "be seen in a change of the velocity or of the load"
+        advice = "add a recording with velocity steps or holds, or give the steps"
+        require(holds, name, rule, f"neither in {names}", advice)
     for run in runs:
         needed = _SAMPLES_PER_PARAMETER * (len(free) + len(run.cuts) + 2)
-        if run.time.size < needed:
-            raise InputError(
-                f"{run.name} must have at least {needed} samples for {len(free)} free parameters, "
-                f"got {run.time.size}; free fewer or give a longer window"
-            )
+        rule = f"have at least {needed} samples for {len(free)} free parameters"
+        advice = "free fewer or give a longer window"
+        require(not run.time.size < needed, f"{run.name}", rule, run.time.size, advice)
 
 
 def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
@@ -148,11 +143,9 @@ def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior])
     # Of every run by itself.
     shared = {name.partition("[")[0] for name in known}
     for name in priors:
-        if name not in known and name not in shared:
-            raise InputError(
-                f"prior must be of free parameters ({', '.join(known)}), got '{name}'; free it, "
-                "correct the name, or leave the prior out"
-            )
+        rule = f"be of free parameters ({', '.join(known)})"
+        advice = "free it, correct the name, or leave the prior out"
+        require(name in known or name in shared, "prior", rule, f"'{name}'", advice)
 
 
 def require_no_layer(free: Sequence[str]) -> None:
@@ -207,9 +200,8 @@ def run_terms(
     """
     if len({run.name for run in runs}) < len(runs):
         twice = [run.name for run in runs]
-        raise InputError(
-            f"runs must have different names, got {', '.join(twice)}; give names, or each file once"
-        )
+        rule = "have different names"
+        raise InputError("runs", rule, ", ".join(twice), "give names, or each file once")
     terms, unknowns = [], []
     for run in runs:
         suffix = f"[{run.name}]" if len(runs) > 1 or beside_table else ""
@@ -267,10 +259,8 @@ def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
         return prior
     if prior.unit == "1/m":
         return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
-    raise InputError(
-        f"prior of K must be in {run.stiffness_unit} or 1/m for {run.name}, got {prior.unit}; "
-        "convert it"
-    )
+    rule = f"be in {run.stiffness_unit} or 1/m for {run.name}"
+    raise InputError("prior of K", rule, prior.unit, "convert it")
 
 
 def shared_stiffness(
@@ -284,11 +274,9 @@ def shared_stiffness(
         If their loads have different units.
     """
     units = list(dict.fromkeys(run.load_unit or "none" for run in runs))
-    if len(units) > 1:
-        raise InputError(
-            f"K must be one for all runs if it is named, got loads in {' and '.join(units)}; leave "
-            "K out of the free parameters: each run then has its own"
-        )
+    rule = "be one for all runs if it is named"
+    advice = "leave K out of the free parameters: each run then has its own"
+    require(len(units) <= 1, "K", rule, f"loads in {' and '.join(units)}", advice)
     return free_stiffness(runs[0], "K", start, priors)
 
 
@@ -372,25 +360,19 @@ def require_calibrated(
     given = [n for n in priors if n.partition("[")[0] == GAIN]
     several = len(runs) > 1 or beside_table
     for name in free:
-        if name.partition("[")[0] == GAIN and name not in given and GAIN not in given:
-            raise InputError(
-                f"{name} must have a prior, got none: A, B, mu0 and K scale with it, so that a "
-                "recording cannot tell it; give one by a calibration of the gauge, like "
-                f'--prior "{name}=1+-0.02"'
-            )
+        holds = name.partition("[")[0] != GAIN or name in given or GAIN in given
+        got = "none: A, B, mu0 and K scale with it, so that a recording cannot tell it"
+        advice = f'give one by a calibration of the gauge, like --prior "{name}=1+-0.02"'
+        require(holds, name, "have a prior", got, advice)
     known = [GAIN, *((f"{GAIN}[{run.name}]" for run in runs) if several else ())]
     for name in [*given, *(n for n in free if n.partition("[")[0] == GAIN)]:
-        if name not in known:
-            raise InputError(
-                f"prior of a gain must name {' or '.join(known)}, got '{name}'; correct the name"
-            )
+        rule = f"name {' or '.join(known)}"
+        require(name in known, "prior of a gain", rule, f"'{name}'", "correct the name")
     varying = [run.name for run in runs if run.load_varies]
     if given and varying and not mu0_given:
-        raise InputError(
-            f"mu0 must be free or given with a gain under a load that changes, as in {varying[0]}, "
-            "got neither: the first friction would stand for it, without the gain; free mu0, or "
-            "fix it"
-        )
+        rule = f"be free or given with a gain under a load that changes, as in {varying[0]}"
+        got = "neither: the first friction would stand for it, without the gain"
+        raise InputError("mu0", rule, got, "free mu0, or fix it")
 
 
 #: Equal samples in a row that chance does not make, if they have so many different values.
@@ -410,11 +392,9 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
         if shared is None:
             continue
         a, b = (run.origin + run.time[k] for run, k in zip((first, second), shared, strict=True))
-        raise InputError(
-            f"{second.name} must hold samples of its own, got those from {b:.6g} s on equal to "
-            f"those of {first.name} from {a:.6g} s on; give each recording once, in windows that "
-            "do not overlap: they would count twice"
-        )
+        got = f"those from {b:.6g} s on equal to those of {first.name} from {a:.6g} s on"
+        advice = "give each recording once, in windows that do not overlap: they would count twice"
+        raise InputError(f"{second.name}", "hold samples of its own", got, advice)
 
 
 def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:

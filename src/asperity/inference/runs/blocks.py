@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
 from asperity.recording.defects.lines import find_lines, take_off
 from asperity.units import to_si
@@ -99,11 +99,9 @@ def _require_blocks(run: RecordedRun, length: float) -> None:
     shortest = min(
         step * (b - a) for step, (a, b) in zip(_intervals(run), run.stretches, strict=True)
     )
-    if length > shortest / _SHORTEST:
-        raise InputError(
-            f"fit_rate must leave {_SHORTEST} means or more of {run.name}, got "
-            f"{1 / length:.4g} Hz for {shortest:.4g} s; give {_SHORTEST / shortest:.4g} Hz or more"
-        )
+    holds, got = not length > shortest / _SHORTEST, f"{1 / length:.4g} Hz for {shortest:.4g} s"
+    rule = f"leave {_SHORTEST} means or more of {run.name}"
+    require(holds, "fit_rate", rule, got, f"give {_SHORTEST / shortest:.4g} Hz or more")
 
 
 def coarser(runs: Sequence[RecordedRun]) -> list[RecordedRun]:
@@ -129,8 +127,8 @@ def checked_rate(rate: Any) -> float | None:
     if isinstance(rate, str) and rate.strip() == "full":
         return math.inf
     value = float(to_si(rate, "frequency", "fit_rate"))
-    if not (value > 0 and math.isfinite(value)):
-        raise InputError(f"fit_rate must be positive, got {rate}; give blocks a second, or full")
+    advice = "give blocks a second, or full"
+    require(value > 0 and math.isfinite(value), "fit_rate", "be positive", rate, advice)
     return value
 
 

@@ -257,10 +257,8 @@ def _of_the_user(
     for at in given:
         k = int(np.argmin(np.abs(times - (at - origin))))
         if not 0 < k < times.size - 1:
-            raise InputError(
-                f"{name} must lie inside the recording, got {at:.10g} s; it runs from "
-                f"{origin:.10g} s to {origin + times[-1]:.10g} s"
-            )
+            advice = f"it runs from {origin:.10g} s to {origin + times[-1]:.10g} s"
+            raise InputError(name, "lie inside the recording", f"{at:.10g} s", advice)
         result.append(float(times[k]))
     return tuple(sorted(result))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.inference.runs.run import recorded_load
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
@@ -122,23 +122,16 @@ def measured_stiffness(
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
     low, high = span
-    if not low < high:
-        raise InputError(
-            f"span must end after it begins, got {low:g} s to {high:g} s; give its two times"
-        )
+    rule = "end after it begins"
+    require(low < high, "span", rule, f"{low:g} s to {high:g} s", "give its two times")
     signals = sliding_signals(trace, load, force, None)
     if signals.displacement is None:
-        raise InputError(
-            f"recording must have the displacement of the load point, got none: "
-            f"{signals.no_motion}; name a channel"
-        )
+        rule = "have the displacement of the load point"
+        raise InputError("recording", rule, f"none: {signals.no_motion}", "name a channel")
     here = (signals.time >= low) & (signals.time <= high)
     count = int(here.sum())
-    if count < _FEWEST:
-        raise InputError(
-            f"span must hold at least {_FEWEST} samples, got {count} from {low:g} to {high:g} s; "
-            "give a longer one"
-        )
+    rule, got = f"hold at least {_FEWEST} samples", f"{count} from {low:g} to {high:g} s"
+    require(not count < _FEWEST, "span", rule, got, "give a longer one")
     inside = signals.time[here]
     known = recorded_load(trace, load, inside, "span", "give another one")
     weight = np.ones(count) if known is None else np.interp(inside, *known)
@@ -150,11 +143,9 @@ def measured_stiffness(
     t, moved, F = columns[: count // q * q].reshape(-1, q, 3).mean(axis=1).T
     noise /= math.sqrt(q)
     spread = float(moved.std())
-    if not spread > _MOVES * noise:
-        raise InputError(
-            f"span must have a load point that moves, got {spread:.3g} m from {low:g} to {high:g} s"
-            f" with noise of {noise:.2g} m; give a stretch of unloading or reloading"
-        )
+    rule = "have a load point that moves"
+    got = f"{spread:.3g} m from {low:g} to {high:g} s with noise of {noise:.2g} m"
+    require(spread > _MOVES * noise, "span", rule, got, "give a stretch of unloading or reloading")
     half = float(np.ptp(moved)) / 2
     u = (moved - moved.mean()) / half
     (_, slope), covariance = _least_squares(np.stack([np.ones_like(u), u], axis=1), F)

@@ -96,10 +96,8 @@ def _given_or_measured(
         _require_segments(time, steps, name)
     if velocities is not None:
         if steps is None or len(velocities) != len(steps) + 1:
-            raise InputError(
-                f"{name}.velocities must be one more than the steps, got {len(velocities)} for "
-                f"{len(steps or ())}; give both"
-            )
+            got = f"{len(velocities)} for {len(steps or ())}"
+            raise InputError(f"{name}.velocities", "be one more than the steps", got, "give both")
         speeds = [float(v) for v in velocities]
         return partition_at(time, None, np.array(steps)), speeds, [v == 0 for v in speeds]
     if displacement is None:

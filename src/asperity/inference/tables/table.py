@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
@@ -231,25 +231,17 @@ def read_table(
 def _cells(shown: str, text: str) -> dict[str, NDArray[np.str_]]:
     """Columns of a text by name, as texts without space about them."""
     lines = [x for x in text.splitlines() if x.strip() and not x.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise InputError(
-            f"{shown} must have a header and rows, got {len(lines)} lines; give one "
-            "operating point a row"
-        )
+    rule = "have a header and rows"
+    require(len(lines) >= 2, shown, rule, f"{len(lines)} lines", "give one operating point a row")
     names, *rows = csv.reader(lines, delimiter=max(_DELIMITERS, key=lines[0].count))
     names = [cell.strip() for cell in names]
     for column in names:
         if names.count(column) > 1:
-            raise InputError(
-                f"{shown} must have each column once, got '{column}' {names.count(column)} times; "
-                "remove all but one"
-            )
+            got = f"'{column}' {names.count(column)} times"
+            raise InputError(shown, "have each column once", got, "remove all but one")
     for number, row in enumerate(rows, start=1):
-        if len(row) != len(names):
-            raise InputError(
-                f"{shown} must have {len(names)} cells in each row, got {len(row)} in row "
-                f"{number}; correct the separators"
-            )
+        rule, got = f"have {len(names)} cells in each row", f"{len(row)} in row {number}"
+        require(len(row) == len(names), shown, rule, got, "correct the separators")
     columns = np.char.strip(np.array(rows, dtype=str).T)
     return {n: c for n, c in zip(names, columns, strict=True) if n not in _OF_RESPONSES}
 
@@ -307,10 +299,9 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
         except ValueError:
             if canonical_name(name, _known()) is None and _observable_of(name) is None:
                 continue
-            raise InputError(
-                f"{shown} must have numbers in SI without unit in column {name}, got '{cell}' in "
-                f"row {row + 1}; write it with a decimal point"
-            ) from None
+            rule = f"have numbers in SI without unit in column {name}"
+            got = f"'{cell}' in row {row + 1}"
+            raise InputError(shown, rule, got, "write it with a decimal point") from None
     return values
 
 
@@ -438,9 +429,7 @@ def _require(
     """Refuse a column with the first row that breaks a rule."""
     if not good.all():
         row = int(np.argmin(good))
-        raise InputError(
-            f"{table}.{column} must {rule}, got {values[row]:g} in row {row + 1}; {advice}"
-        )
+        raise InputError(f"{table}.{column}", rule, f"{values[row]:g} in row {row + 1}", advice)
 
 
 def _observables(
@@ -509,10 +498,8 @@ def _refuse_impossible(table: LockInTable) -> None:
     for pair in table.covariances:
         absent = [n for n in pair if n not in table.values]
         if absent:
-            raise InputError(
-                f"{table.name} must report both observables of {'_'.join(pair)}_cov, got no column "
-                f"{absent[0]}; add it or remove the covariance"
-            )
+            rule, got = f"report both observables of {'_'.join(pair)}_cov", f"no column {absent[0]}"
+            raise InputError(f"{table.name}", rule, got, "add it or remove the covariance")
     correlation = table.correlations()
     smallest = np.linalg.eigvalsh(correlation)[:, 0]
     bad = np.flatnonzero(smallest < _SMALLEST_EIGENVALUE)

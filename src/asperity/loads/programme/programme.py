@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
 from asperity.parameters.arguments import number, typed
@@ -83,11 +83,8 @@ class Programme:
         for i, step in enumerate(steps):
             new, reached = step.lay_out(reached, f"{name}.steps[{i}]")
             segments.extend(new)
-        if not segments:
-            raise InputError(
-                f"{name}.steps must take time, got {len(steps)} steps of no duration; "
-                "add one such as Slide('10 s')"
-            )
+        got = f"{len(steps)} steps of no duration"
+        require(segments, f"{name}.steps", "take time", got, "add one such as Slide('10 s')")
         durations = [float(s.duration) for s in segments]
         # Frozen: attributes are set once, here.
         object.__setattr__(self, "steps", steps)

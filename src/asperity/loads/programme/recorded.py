@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.loads.programme.segment import ProgrammeSegment, Scalar
 from asperity.units import to_si
 
@@ -161,11 +161,8 @@ def interpolated(
         return PiecewiseCubic.of(span, np.array([[0.0], [0.0], [0.0], [level]])), np.array([level])
     field = f"{name}.{_FIELDS[kind]}"
     values = np.asarray(to_si(recorded, kind, field), float)
-    if values.shape != time.shape:
-        raise InputError(
-            f"{field} must be as long as time, got {values.shape} for {time.shape}; "
-            "give one sample for each time"
-        )
+    rule, got = "be as long as time", f"{values.shape} for {time.shape}"
+    require(values.shape == time.shape, field, rule, got, "give one sample for each time")
     pieces = _pieces(interpolant, name)(time - time[0], values)
     # Splines overshoot, so the bounds include extrema between samples.
     between = pieces(np.concatenate([pieces.x, 0.5 * (pieces.x[1:] + pieces.x[:-1])]))
@@ -178,22 +175,17 @@ def _pieces(interpolant: str, name: str) -> Any:
 
     known = {"pchip": PchipInterpolator, "spline": CubicSpline}
     if interpolant not in known:
-        raise InputError(
-            f"{name}.interpolant must be known, got '{interpolant}'; {closest(interpolant, known)}"
-        )
+        got = f"'{interpolant}'"
+        raise InputError(f"{name}.interpolant", "be known", got, closest(interpolant, known))
     return known[interpolant]
 
 
 def _check_time(time: np.ndarray, name: str) -> None:
-    if time.ndim != 1 or time.size < 2:
-        raise InputError(
-            f"{name}.time must have two samples or more, got shape {time.shape}; "
-            "give the time of every sample"
-        )
+    holds, rule = time.ndim == 1 and not time.size < 2, "have two samples or more"
+    require(holds, f"{name}.time", rule, f"shape {time.shape}", "give the time of every sample")
     fall = np.flatnonzero(np.diff(time) <= 0)
     if fall.size:
         i = int(fall[0])
-        raise InputError(
-            f"{name}.time must rise, got {time[i]:.10g} s and then {time[i + 1]:.10g} s at "
-            f"sample {i + 1}; remove repeated and backward time stamps first"
-        )
+        got = f"{time[i]:.10g} s and then {time[i + 1]:.10g} s at sample {i + 1}"
+        advice = "remove repeated and backward time stamps first"
+        raise InputError(f"{name}.time", "rise", got, advice)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.errors import InputError
+from asperity.errors import require
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
 from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
@@ -151,11 +151,9 @@ class Modulate(ProgrammeStep):
         whole = _duration(self.duration, name)
         rise = _at_least_zero(self.rise, "time", f"{name}.rise")
         fall = _at_least_zero(self.fall, "time", f"{name}.fall")
-        if rise + fall > whole:
-            raise InputError(
-                f"{name}.duration must be at least rise and fall together, {rise + fall:g} s, "
-                f"got {whole:g} s; lengthen it or shorten them"
-            )
+        rule = f"be at least rise and fall together, {rise + fall:g} s"
+        advice = "lengthen it or shorten them"
+        require(not rise + fall > whole, f"{name}.duration", rule, f"{whole:g} s", advice)
         epsilon = _at_least_zero(self.epsilon, "dimensionless", f"{name}.epsilon")
         frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
         level = level._replace(velocity=_velocity(self.velocity, level, name))

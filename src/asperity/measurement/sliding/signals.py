@@ -163,12 +163,9 @@ def with_normalised_force(trace: Trace) -> Trace:
 
 def _check_window(window: tuple[float, float], trace: Trace) -> None:
     if not window[0] < window[1]:
-        raise InputError(
-            "measure.window",
-            "end after it begins",
-            f"{window[0]:g} s to {window[1]:g} s",
-            f"the recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s",
-        )
+        rule = "end after it begins"
+        advice = f"the recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s"
+        raise InputError("measure.window", rule, f"{window[0]:g} s to {window[1]:g} s", advice)
 
 
 def _friction(

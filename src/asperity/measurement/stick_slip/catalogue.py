@@ -125,12 +125,8 @@ def check_catalogue(path: Path) -> str:
     """Ending of the catalogue's file; raises `InputError` for one that is not written."""
     ending = path.suffix.lower()
     if ending not in (".csv", ".nc", ".json"):
-        raise InputError(
-            Argument("measure.events"),
-            "be a CSV, NetCDF or JSON file",
-            f"'{path}'",
-            "write it like events.csv",
-        )
+        rule = "be a CSV, NetCDF or JSON file"
+        raise InputError(Argument("measure.events"), rule, f"'{path}'", "write it like events.csv")
     return ending
 
 

@@ -262,12 +262,9 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
     steps = np.diff(time)
     usual, widest = float(np.median(steps)), int(steps.argmax())
     if steps[widest] > _LONGEST_GAP * usual:
-        raise InputError(
-            Argument("measure.trace"),
-            f"be without gaps of more than {_LONGEST_GAP:g} samples for slip events",
-            f"one of {steps[widest]:.4g} s at {time[widest]:.10g} s",
-            "give a window without it",
-        )
+        rule = f"be without gaps of more than {_LONGEST_GAP:g} samples for slip events"
+        got = f"one of {steps[widest]:.4g} s at {time[widest]:.10g} s"
+        raise InputError(Argument("measure.trace"), rule, got, "give a window without it")
     even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / usual) + 1)
     moved = signals.displacement
     # A line would make an impulse of one sample one of two or three.

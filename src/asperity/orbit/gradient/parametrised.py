@@ -166,10 +166,8 @@ def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
     if isinstance(load, Harmonic):
         return None
     if not isinstance(load, Periodic):
-        raise InputError(
-            "modulation must be given by its Fourier coefficients for derivatives, "
-            f"got {type(load).__name__}; give its samples to asperity.loads.sampled"
-        )
+        rule, got = "be given by its Fourier coefficients for derivatives", type(load).__name__
+        raise InputError("modulation", rule, got, "give its samples to asperity.loads.sampled")
     return len(load.load), len(load.shear), len(load.pull)
 
 

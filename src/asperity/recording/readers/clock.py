@@ -74,12 +74,9 @@ def settle_time(
     exact = [n for n in candidates("time", kinds) if "".join(words(n)) in ("time", "t")]
     fitting = exact if len(exact) == 1 else candidates("time", kinds)
     if len(fitting) > 1:
-        raise InputError(
-            Argument("columns", "time"),
-            "be chosen",
-            f"{' and '.join(map(repr, fitting))}, which both can be it",
-            f"choose one, like {Argument('columns', 'time', fitting[0])}",
-        )
+        got = f"{' and '.join(map(repr, fitting))}, which both can be it"
+        advice = f"choose one, like {Argument('columns', 'time', fitting[0])}"
+        raise InputError(Argument("columns", "time"), "be chosen", got, advice)
     if fitting:
         return _from_column(fitting[0], values, units)
     if recorded.step is not None:
@@ -141,12 +138,9 @@ def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
     """Seconds since the first stamp, of dates or of hours:minutes:seconds."""
     stamps = _elapsed(raw)
     if stamps is None:
-        raise InputError(
-            Argument("columns", "time"),
-            "hold numbers, dates or hours:minutes:seconds",
-            f"'{raw[0]}' in '{name}'",
-            f"choose another column, or give {Argument('rate', value='10 kHz')}",
-        )
+        rule = "hold numbers, dates or hours:minutes:seconds"
+        advice = f"choose another column, or give {Argument('rate', value='10 kHz')}"
+        raise InputError(Argument("columns", "time"), rule, f"'{raw[0]}' in '{name}'", advice)
     return Clock(stamps[0], f"column '{name}', since {stamps[1]}", name)
 
 

@@ -39,12 +39,8 @@ def reader_points() -> dict[str, EntryPoint]:
     """
     points = {point.name: point for point in entry_points(group=GROUP)}
     for name in sorted(set(points) & set(FORMATS)):
-        raise InputError(
-            "read.format",
-            "have a name of its own",
-            f"'{name}' of '{points[name].value}', which asperity reads itself",
-            "rename the entry point",
-        )
+        got = f"'{name}' of '{points[name].value}', which asperity reads itself"
+        raise InputError("read.format", "have a name of its own", got, "rename the entry point")
     return points
 
 
@@ -66,20 +62,13 @@ def reader_named(name: str) -> Any:
         reader = points[name].load()
     # Code of another package: any exception becomes a sentence for the user.
     except Exception as error:
-        raise InputError(
-            "read.format",
-            "be a reader that can be loaded",
-            f"'{name}' of '{points[name].value}' ({error})",
-            "correct or remove that package",
-        ) from None
+        rule = "be a reader that can be loaded"
+        got = f"'{name}' of '{points[name].value}' ({error})"
+        raise InputError("read.format", rule, got, "correct or remove that package") from None
     for wanted in ("is_format", "read"):
         if not callable(getattr(reader, wanted, None)):
-            raise InputError(
-                "read.format",
-                f"be a reader with {wanted}(path)",
-                f"'{name}' of '{points[name].value}' without",
-                "add the function",
-            )
+            got, advice = f"'{name}' of '{points[name].value}' without", "add the function"
+            raise InputError("read.format", f"be a reader with {wanted}(path)", got, advice)
     return reader
 
 
@@ -102,12 +91,10 @@ def format_of(path: Path) -> str:
     for name in FORMATS:
         if reader_named(name).is_format(path):
             return name
-    raise InputError(
-        "recording.path",
-        "be CSV or other text, HDF5, MATLAB, TDMS or LOOK",
-        f"'{path.name}', which looks like none of them",
-        f"give {Argument('format', value='...')} if it is one of them",
-    )
+    rule = "be CSV or other text, HDF5, MATLAB, TDMS or LOOK"
+    got = f"'{path.name}', which looks like none of them"
+    advice = f"give {Argument('format', value='...')} if it is one of them"
+    raise InputError("recording.path", rule, got, advice)
 
 
 def raw_recording(
@@ -138,21 +125,16 @@ def raw_recording(
     taken = inspect.signature(reader.read).parameters
     for option, value in options.items():
         if value is not None and option not in taken:
-            raise InputError(
-                f"read.{option}",
-                f"be left out for format '{name}'",
-                f"'{value}'",
-                "its reader takes none",
-            )
+            rule = f"be left out for format '{name}'"
+            raise InputError(f"read.{option}", rule, f"'{value}'", "its reader takes none")
     layout = {k: v if v is not None else defaults.get(k) for k, v in options.items() if k in taken}
     try:
         recorded: Any = reader.read(path, **layout)
     except InputError:
         raise
     except MemoryError:
-        raise InputError(
-            "recording.path", "fit into memory", f"'{path.name}', which holds more", "cut it"
-        ) from None
+        got = f"'{path.name}', which holds more"
+        raise InputError("recording.path", "fit into memory", got, "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
         raise InputError(
@@ -163,11 +145,7 @@ def raw_recording(
             "copy it again from where it was recorded",
         ) from None
     if not isinstance(recorded, RawRecording):
-        raise InputError(
-            "read.format",
-            "be a reader that returns a RawRecording",
-            f"{type(recorded).__name__} of '{name}'",
-            "correct the reader",
-        )
+        rule, advice = "be a reader that returns a RawRecording", "correct the reader"
+        raise InputError("read.format", rule, f"{type(recorded).__name__} of '{name}'", advice)
     recorded.provenance.setdefault("format", name)
     return recorded

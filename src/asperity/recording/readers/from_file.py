@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.errors import InputError, printable
+from asperity.errors import InputError, printable, require
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive
@@ -139,15 +139,9 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
 
 
 def _with_content(file: Path) -> Path:
-    if not file.is_file():
-        raise InputError("recording.path", "be a file", f"'{file}'", "check the name")
-    if file.stat().st_size == 0:
-        raise InputError(
-            "recording.path",
-            "hold data",
-            f"'{file.name}', which is empty",
-            "copy it again from where it was recorded",
-        )
+    require(file.is_file(), "recording.path", "be a file", f"'{file}'", "check the name")
+    got, advice = f"'{file.name}', which is empty", "copy it again from where it was recorded"
+    require(file.stat().st_size != 0, "recording.path", "hold data", got, advice)
     return file
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
@@ -468,13 +468,8 @@ def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, 
     ]
     if not ways and wanted is not None and len(wanted) == 1 and wanted.isprintable():
         ways = [(wanted, decimal or ".")]
-    if not ways:
-        raise InputError(
-            "read.delimiter",
-            "be one character or 'blank'",
-            f"{delimiter!r}",
-            "leave it out to have it recognised",
-        )
+    rule = "be one character or 'blank'"
+    require(ways, "read.delimiter", rule, f"{delimiter!r}", "leave it out to have it recognised")
     return ways
 
 

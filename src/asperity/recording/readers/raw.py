@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, require
 from asperity.parameters.arguments import typed
 from asperity.recording.finding import Finding, with_cause
 
@@ -58,11 +58,8 @@ class RawColumn:
     unit: str | None = None
 
     def __post_init__(self) -> None:
-        if self.values.ndim != 1:
-            raise InputError(
-                f"RawColumn.values must be an array of one dimension, got {self.values.ndim} in "
-                f"'{self.label}'; correct the reader"
-            )
+        rule, got = "be an array of one dimension", f"{self.values.ndim} in '{self.label}'"
+        require(self.values.ndim == 1, "RawColumn.values", rule, got, "correct the reader")
 
 
 @typed
@@ -97,15 +94,11 @@ class RawRecording:
 
     def __post_init__(self) -> None:
         sizes = sorted({column.values.size for column in self.columns})
-        if len(sizes) != 1:
-            raise InputError(
-                f"RawRecording.columns must be of one length, got {sizes} rows; correct the reader"
-            )
+        rule, got = "be of one length", f"{sizes} rows"
+        require(len(sizes) == 1, "RawRecording.columns", rule, got, "correct the reader")
         if not (np.isfinite(self.start) and (self.step is None or 0 < self.step < np.inf)):
-            raise InputError(
-                f"RawRecording.step must be positive and start finite, in seconds, got "
-                f"{self.step} and {self.start}; correct the reader"
-            )
+            rule, got = "be positive and start finite, in seconds", f"{self.step} and {self.start}"
+            raise InputError("RawRecording.step", rule, got, "correct the reader")
 
 
 def beginning(path: Path) -> bytes:

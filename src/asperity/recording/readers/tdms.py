@@ -43,12 +43,9 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     try:
         import nptdms
     except ImportError:
-        raise InputError(
-            "recording.path",
-            "be in a format that can be read here",
-            f"'{path.name}', which is TDMS",
-            "install npTDMS, as 'pip install asperity[lab]' does",
-        ) from None
+        rule = "be in a format that can be read here"
+        advice = "install npTDMS, as 'pip install asperity[lab]' does"
+        raise InputError("recording.path", rule, f"'{path.name}', which is TDMS", advice) from None
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
         channels = {g.name: g.channels() for g in file.groups()}
@@ -115,11 +112,7 @@ def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
         return 0.0, None
     if len(steps) > 1:
         listed = " and ".join(f"{s:g} s" for s in sorted(steps))
-        raise InputError(
-            "read.group",
-            "be chosen where channels differ in interval",
-            f"{listed} in '{path.name}'",
-            "choose a group, or give rate= to override them",
-        )
+        rule, got = "be chosen where channels differ in interval", f"{listed} in '{path.name}'"
+        raise InputError("read.group", rule, got, "choose a group, or give rate= to override them")
     starts = [float(p.get("wf_start_offset", 0.0)) for p in properties if "wf_increment" in p]
     return starts[0], steps.pop()

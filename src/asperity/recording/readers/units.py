@@ -166,12 +166,9 @@ def required(text: str, name: str) -> Unit:
     except ArithmeticError:  # decimals have a largest power of ten themselves
         factor = Decimal(0)
     if not _SMALLEST < abs(factor) < 1 / _SMALLEST:
-        raise InputError(
-            Argument("units", name),
-            f"be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in SI",
-            f"'{shortened(text)}'",
-            "give what one recorded unit is, like '12.5 N'",
-        )
+        rule = f"be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in SI"
+        advice = "give what one recorded unit is, like '12.5 N'"
+        raise InputError(Argument("units", name), rule, f"'{shortened(text)}'", advice)
     return Unit(unit.kind, factor)
 
 
