@@ -54,10 +54,10 @@ def test_priors_of_a_material_want_the_free_parameters(recording):
         (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
         (["--velocities", "1 um/s"], "must be one more than the steps"),
         (["--gauge", "-1 Hz"], "--gauge must be positive"),
-        (["--fit-rate", "-1 Hz"], "fit_rate must be positive"),
+        (["--fit-rate", "-1 Hz"], "--fit-rate must be positive"),
         (
             ["--fit-rate", "0.1 Hz"],
-            "fit_rate must leave 16 means or more of steps",
+            "--fit-rate must leave 16 means or more of steps",
         ),
     ],
 )

@@ -166,7 +166,10 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
         "stiffness_from_slope_uncertainty": doubt,
         "smallest_drop": measurement.smallest_drop,
     }
-    frequency, error = linear_frequency(events)
+    K, V, W0 = (
+        math.nan if v is None else v for v in (machine.stiffness, machine.velocity, machine.load)
+    )
+    frequency, error = linear_frequency(events, K * V / W0)
     row |= {"linear_frequency": frequency, "linear_frequency_uncertainty": error}
     known = (machine.stiffness, machine.velocity, machine.mass, machine.load)
     row |= {n: v for n, v in zip(("K", "V", "M", "W0"), known, strict=True) if v is not None}
