@@ -11,6 +11,7 @@ from asperity.orbit.floquet import (
     from_logs,
     kind_of_crossing,
     log_multipliers,
+    sorted_logs,
     without_lost_arguments,
 )
 
@@ -91,6 +92,11 @@ def test_only_the_multiplier_that_overflows_loses_its_argument():
 
 def test_a_vanishing_multiplier_is_zero():
     assert from_logs(np.array([-800.0 + 0j])) == 0
+
+
+def test_a_vanishing_multiplier_is_the_last():
+    logs = np.array([[-np.inf + 0j], [-0.1 - 1j], [-0.1 + 1j]])
+    np.testing.assert_array_equal(sorted_logs(logs), logs[[2, 1, 0]])
 
 
 def test_a_determinant_that_the_matrix_cannot_have_gives_no_multipliers():

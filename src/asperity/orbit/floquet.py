@@ -305,6 +305,7 @@ def without_lost_arguments(logs: Complex) -> Complex:
 def sorted_logs(logs: Any) -> Any:
     """By falling real part; of a complex pair the one with the positive argument first."""
     xp = logs.__array_namespace__()
-    margin = 1e-9 * (1 + abs(logs.real))
+    # The logarithm of a disturbance that vanishes within a period is -inf.
+    margin = 1e-9 * (1 + xp.minimum(abs(logs.real), 1e300))
     order = xp.argsort(-logs.real - margin * xp.sign(logs.imag), axis=0, stable=True)
     return xp.take_along_axis(logs, order, axis=0)

@@ -119,9 +119,12 @@ def partition(time: Array, displacement: Array | None) -> Partition:
     if displacement is None:
         return Partition((), (np.nan,), (False,))
     motion = _motion(time, displacement)
-    pieces, means, doubts = _segments(motion, _pieces(motion))
-    speeds, holds, unsure = _speeds(motion, pieces, means)
+    pieces, parts, doubts = _segments(motion, _pieces(motion))
     cuts = tuple(_intersection(motion, before, after) for before, after in pairwise(pieces))
+    # A piece may hold samples from beyond the cut.
+    between = pairwise([0, *(cut.sample for cut in cuts), time.size])
+    means = [_mean_velocity(motion, *each) for each in zip(parts, between, strict=True)]
+    speeds, holds, unsure = _speeds(motion, pieces, means)
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
 
@@ -278,6 +281,17 @@ def _velocity(motion: _Motion, piece: Piece) -> float:
     return float(away @ (x - x.mean()) / (away @ away))
 
 
+def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> float:
+    """Mean of the slopes over the parts of a segment that lie between two samples, m/s.
+
+    A gauge that jumps from one part to the next has no share in it.
+    """
+    inside = [(max(a, between[0]), min(b, between[1])) for a, b in parts]
+    inside = [part for part in inside if part[1] - part[0] >= _FEWEST] or parts
+    slopes = [_velocity(motion, part) for part in inside]
+    return float(np.average(slopes, weights=[_duration(motion, part) for part in inside]))
+
+
 def _duration(motion: _Motion, piece: Piece) -> float:
     """Seconds from the first sample of a piece to its last."""
     return float(motion.time[piece[1] - 1] - motion.time[piece[0]])
@@ -301,9 +315,12 @@ def _still(motion: _Motion, piece: Piece, speed: float) -> bool:
     return abs(speed) * _duration(motion, piece) <= _STILL * motion.noise
 
 
-def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[float], list[str]]:
-    """Pieces without transitions and small changes, their velocities, and doubts."""
+def _segments(
+    motion: _Motion, pieces: list[Piece]
+) -> tuple[list[Piece], list[list[Piece]], list[str]]:
+    """Pieces without transitions and small changes, the parts that each is made of, and doubts."""
     doubts: list[str] = []
+    parts = [[piece] for piece in pieces]
     speeds = [_velocity(motion, piece) for piece in pieces]
     while len(pieces) > 1:
         rounded = [
@@ -318,10 +335,10 @@ def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[f
         allowed = np.where(share < _TRANSITION, np.log(_CLEAR_RATIO), np.log(_RATIO))
         least = int(np.argmin(ratios / allowed))
         if ratios[least] < allowed[least]:
-            # A gauge that jumps between the two has no part in the mean.
-            mean = float(np.average(speeds[least : least + 2], weights=spans[least : least + 2]))
-            pieces[least : least + 2] = [(pieces[least][0], pieces[least + 1][1])]
-            speeds[least : least + 2] = [mean]
+            whole = pieces[least][0], pieces[least + 1][1]
+            parts[least : least + 2] = [parts[least] + parts[least + 1]]
+            pieces[least : least + 2] = [whole]
+            speeds[least : least + 2] = [_mean_velocity(motion, parts[least], whole)]
             continue
         transition = _transition(motion, pieces, speeds)
         if transition is None:
@@ -341,8 +358,8 @@ def _segments(motion: _Motion, pieces: list[Piece]) -> tuple[list[Piece], list[f
             if share > _TRANSITION
             or _course(motion, pieces[k], speeds[k], (speeds[i], speeds[j])) == "even"
         ]
-        del pieces[i + 1 : j], speeds[i + 1 : j]
-    return pieces, speeds, doubts
+        del pieces[i + 1 : j], parts[i + 1 : j], speeds[i + 1 : j]
+    return pieces, parts, doubts
 
 
 def _transition(
