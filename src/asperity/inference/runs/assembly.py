@@ -129,7 +129,7 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
         needed = _SAMPLES_PER_PARAMETER * (len(free) + len(run.cuts) + 2)
         rule = f"have at least {needed} samples for {len(free)} free parameters"
         advice = "free fewer or give a longer window"
-        require(not run.time.size < needed, f"{run.name}", rule, run.time.size, advice)
+        require(not run.time.size < needed, run.name, rule, run.time.size, advice)
 
 
 def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
@@ -394,7 +394,7 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
         a, b = (run.origin + run.time[k] for run, k in zip((first, second), shared, strict=True))
         got = f"those from {b:.6g} s on equal to those of {first.name} from {a:.6g} s on"
         advice = "give each recording once, in windows that do not overlap: they would count twice"
-        raise InputError(f"{second.name}", "hold samples of its own", got, advice)
+        raise InputError(second.name, "hold samples of its own", got, advice)
 
 
 def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:

@@ -499,7 +499,7 @@ def _refuse_impossible(table: LockInTable) -> None:
         absent = [n for n in pair if n not in table.values]
         if absent:
             rule, got = f"report both observables of {'_'.join(pair)}_cov", f"no column {absent[0]}"
-            raise InputError(f"{table.name}", rule, got, "add it or remove the covariance")
+            raise InputError(table.name, rule, got, "add it or remove the covariance")
     correlation = table.correlations()
     smallest = np.linalg.eigvalsh(correlation)[:, 0]
     bad = np.flatnonzero(smallest < _SMALLEST_EIGENVALUE)
