@@ -36,6 +36,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from asperity.errors import InputError, closest
 
@@ -148,11 +149,18 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_FUNCTIONS: Mapping[str, Callable[[float], float]] = {"sqrt": math.sqrt, "ln": math.log}
+_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt, "ln": math.log, "abs": abs
+}  # fmt: skip
 
 
-def formula_value(formula: str, numbers: Mapping[str, float], place: str) -> float:
-    """The value of a formula with + - * / **, sqrt, ln, pi and the paper's numbers.
+def formula_value(
+    formula: str,
+    numbers: Mapping[str, float],
+    place: str,
+    terms: Mapping[str, Any] | None = None,
+) -> float:
+    """The value of a formula with + - * / **, sqrt, ln, abs, pi and the paper's numbers.
 
     Parameters
     ----------
@@ -162,29 +170,36 @@ def formula_value(formula: str, numbers: Mapping[str, float], place: str) -> flo
         From `asperity.ledger.claims.printed_numbers`.
     place : str
         Of the formula, for messages.
+    terms : mapping of str to object, optional
+        Further names: functions, and what they are given.
 
     Raises
     ------
     InputError
         If it is no such formula, or names something else.
     """
+    known = {**_FUNCTIONS, **(terms or {})}
 
-    def value(node: ast.expr) -> float:
+    def value(node: ast.expr) -> Any:
         match node:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
                 return _OPERATIONS[type(op)](value(left), value(right))
-            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
-                return _FUNCTIONS[name](value(inner))
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -value(inner)
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in known:
+                return known[name](*map(value, args))
             case ast.Constant(value=int() | float() as constant):
                 return float(constant)
+            case ast.Name(id=name) if name in known:
+                return known[name]
             case ast.Name() | ast.Attribute():
                 name = re.sub(r"_(?=$|\.)", "", ast.unparse(node))
                 return number(name, {**numbers, "pi": math.pi}, place)
         raise SyntaxError
 
     try:
-        return value(ast.parse(formula, mode="eval").body)
-    except (SyntaxError, ArithmeticError, ValueError) as error:
+        return float(value(ast.parse(formula, mode="eval").body))
+    except (SyntaxError, ArithmeticError, ValueError, TypeError) as error:
         if isinstance(error, InputError):
             raise
         rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"

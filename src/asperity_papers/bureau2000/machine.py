@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, TypeVar
+from functools import cache, cached_property
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,8 @@ PAPER = Paper("bureau2000", "asperity_papers.bureau2000")
 Float = NDArray[np.float64]
 Pair = tuple[float, float]
 Result = TypeVar("Result")
+#: A law with parameters that replace the paper's; None is the elasto-plastic one with inertia.
+Law: TypeAlias = tuple[str, dict[str, float]] | None
 
 RR, LD, EXT = "rice-ruina", "linker-dieterich", "elasto-plastic"
 #: The elasto-plastic law with the plastic velocity in the age law too, which the paper does not.
@@ -227,11 +229,60 @@ class Machine:
             "mu2": float((without.mu2 / full.mu2)[0]) - 1,
         }
 
-    def velocity_exponent(self, values: Float, applied: float = STRONGEST) -> float:
-        """Logarithmic slope d ln y / d ln V between the two velocities, at one amplitude."""
-        slow, fast = at(np.abs(values), applied)
-        low, high = self.velocities
-        return float(np.log(fast / slow) / np.log(high / low))
+    @cached_property
+    def terms(self) -> dict[str, Any]:
+        """What formulas of claims.toml may name.
+
+        Observables take a law, ``slow`` or ``fast``, and an applied amplitude, eps = 0.5 by
+        default; ``exponent`` and the slopes take an observable first. ``borne`` takes a frequency
+        and an air layer: that of the appendix, one of the nominal area, one under a disc of some
+        radius, rarefied air, or the vacuum.
+        """
+        p, (low, high) = self.numbers, self.velocities
+
+        def observable(name: str) -> Callable[..., float]:
+            def value(law: Law, speed: int, applied: float = STRONGEST) -> float:
+                if law is None:
+                    pair: Pair = getattr(self.inertial_outputs(), name)
+                else:
+                    pair = at(getattr(self.curve(law[0], **law[1]), name), applied)
+                return pair[speed]
+
+            return value
+
+        def exponent(quantity: Any, law: Law, applied: float = STRONGEST) -> float:
+            """Logarithmic slope d ln y / d ln V between the two velocities."""
+            fast, slow = quantity(law, 1, applied), quantity(law, 0, applied)
+            return float(np.log(abs(fast / slow)) / np.log(high / low))
+
+        def slopes(quantity: Any, law: Law, speed: int) -> Float:
+            """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes."""
+            values = np.abs([quantity(law, speed, applied) for applied in APPLIED])
+            return np.diff(np.log(values)) / np.diff(np.log(APPLIED))
+
+        observables = {n: observable(n) for n in ("mu_ss", "delta_mu", "mu1", "mu2")}
+        return {
+            "slow": 0,
+            "fast": 1,
+            "RR": (RR, {}),
+            "LD": (LD, {}),
+            "EXT": (EXT, {}),
+            "LD_low": (LD, {"alpha": p.alpha_low}),
+            "AMONTONS": ("amontons", {}),
+            "EXT_inertia": None,
+            "vacuum": None,
+            **observables,
+            "drop": lambda *point: -observables["delta_mu"](*point),
+            "exponent": exponent,
+            "last_slope": lambda *curve: slopes(*curve)[-1],
+            "least_slope": lambda *curve: slopes(*curve).min(),
+            "borne": self.borne,
+            "stiffness": lambda layer: layer.stiffness,
+            "disc": lambda radius: self.air_layer(R=radius),
+            "air": self.air_layer(),
+            "nominal": self.air_layer(R=self.nominal_radius),
+            "rarefied": self.air_layer(P0=p.P_vacuum, R=self.nominal_radius),
+        }
 
     # --- Closed forms and the reference integration ----------------------------------------------
 
@@ -347,11 +398,6 @@ def relative(values: Pair) -> float:
 def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
     """Numbers at the two velocities by their names, with a prefix such as ``"mu1, "``."""
     return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
-
-
-def amplitude_slopes(values: Float) -> Float:
-    """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes, (2, n - 1)."""
-    return np.diff(np.log(np.abs(values))) / np.diff(np.log(APPLIED))
 
 
 def steady_growth(slider: Slider, V: ArrayLike) -> Float:
