@@ -190,6 +190,8 @@ def formula_value(
                 return known[name](*map(value, args))
             case ast.Constant(value=int() | float() as constant):
                 return float(constant)
+            case ast.Constant(value=str() as text):
+                return text
             case ast.Name(id=name) if name in known:
                 return known[name]
             case ast.Name() | ast.Attribute():

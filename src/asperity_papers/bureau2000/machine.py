@@ -159,6 +159,12 @@ class Machine:
             effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=p.lambda_z, layer=layer)
         )
 
+    def elastic_slope(self, velocity: float) -> float:
+        """D mu1/d eps of the velocity-independent plateau, mu l/(1 + l) with l = lambda K/W0."""
+        slider = self.slider(EXT)
+        ratio = float(np.asarray(slider.law.elastic_length) * slider.K / slider.W0)
+        return float(slider.law.mu_ss(velocity)) * ratio / (1 + ratio)
+
     @property
     def nominal_radius(self) -> float:
         """Radius (m) of the disc of the stated area, 49 cm^2."""
