@@ -5,9 +5,8 @@ import pytest
 
 from asperity.figures.style import style
 from asperity.ledger import FigureNumbers
-from asperity_papers.bureau2000.curves import WORDS, variations
+from asperity_papers.bureau2000.curves import WORDS, late_over_early_slope, variations
 from asperity_papers.bureau2000.figures import draw
-from asperity_papers.bureau2000.curves import late_over_early_slope
 from asperity_papers.bureau2000.machine import Machine
 
 pytestmark = pytest.mark.slow
