@@ -39,13 +39,8 @@ def _lines(figure: str, numbers: Material) -> list[dict[str, Any]]:
     machine = _machine(numbers)
     ends = tuple(f", {end}" for end in variations(machine))
     curves = [c for c in CURVES[figure](machine) if not (c.inertia or c.name.endswith(ends))]
-    values = [_fast_curve(machine, curve) for curve in curves]
-    for curve, columns in zip(curves, values, strict=True):
-        _fill_in(machine, curve, columns)
-    return [
-        {"name": curve.name.replace("um", "µm"), "values": {c: v[c] for c in _columns(figure)}}
-        for curve, v in zip(curves, values, strict=True)
-    ]
+    lines = [(curve.name.replace("um", "µm"), _fast_curve(machine, curve)) for curve in curves]
+    return [{"name": n, "values": {c: v[c] for c in _columns(figure)}} for n, v in lines]
 
 
 def _columns(figure: str) -> tuple[str, ...]:
@@ -53,7 +48,7 @@ def _columns(figure: str) -> tuple[str, ...]:
 
 
 def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
-    """Points of a line; NaN where the method that takes milliseconds finds none."""
+    """Points of a line, most of them by the method that takes milliseconds."""
     _check_share(curve)
     slider = machine.slider(curve.law, **curve.overrides)
     f = machine.numbers.frequency if curve.frequency is None else curve.frequency
@@ -66,33 +61,20 @@ def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
         "K": slider.K, "W0": slider.W0, "M": slider.M, "V": V, "frequency": frequency,
         "epsilon": curve.share * applied,
     }  # fmt: skip
-    response = function(
-        {
-            n: np.array(np.broadcast_to(np.asarray(values[n], float), V.shape))
-            for n in function.parameters
-        }
-    )
+    response = function({n: values[n] for n in function.parameters})
     mean = np.asarray(response.mean_friction)
     first, second = np.abs(np.asarray(response.harmonics)).T
     solved = np.asarray(response.outcome) == Outcome.CONVERGED
     columns = (mean, mean - np.asarray(law.mu_ss(V)), first, second)
+    solution = dict(zip(_SOLVED, map(np.array, columns), strict=True))
+    if not solved.all():
+        part = replace(curve, V=V[~solved], applied=applied[~solved])
+        rows = solve_curves(machine, [part], methods=("fourier",))
+        for column, x in solution.items():
+            x[~solved] = rows[column].to_numpy(float)
     return {
-        "V": V,
-        "epsilon_applied": applied,
-        "epsilon_eff": curve.share * applied,
-        **{n: np.where(solved, x, np.nan) for n, x in zip(_SOLVED, columns, strict=True)},
-    }
-
-
-def _fill_in(machine: Machine, curve: FigureCurve, values: dict[str, Any]) -> None:
-    """Solve for the points that the fast method leaves open."""
-    left = np.isnan(values["mean_friction"])
-    if not left.any():
-        return
-    part = replace(curve, V=values["V"][left], applied=values["epsilon_applied"][left])
-    rows = solve_curves(machine, [part], methods=("fourier",))
-    for column in _SOLVED:
-        values[column][left] = rows[column].to_numpy(float)
+        "V": V, "epsilon_applied": applied, "epsilon_eff": curve.share * applied, **solution
+    }  # fmt: skip
 
 
 @cache
