@@ -249,15 +249,13 @@ def figure_numbers(
     points: pd.DataFrame | None = None,
 ) -> FigureNumbers:
     """A figure with curves, and what the text states for its captions and marks."""
-    seen = machine.stated()
     stated = {
-        "share": seen.share,
-        "epsilon_eff at 0.5": seen.epsilon_eff,
-        "collapse": seen.collapse,
+        "share": machine.share,
+        "epsilon_eff at 0.5": machine.strongest,
+        "collapse": 1 / machine.numbers.collapse_divisor_200Hz,
         "onset": machine.numbers.epsilon_onset,
     }
-    pairs = {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2, "ratio": seen.ratio}
-    for quantity, pair in pairs.items():
+    for quantity, pair in machine.stated().items():
         stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
     return FigureNumbers(name, data, scalars, stated | dict(quoted or {}), points)
 

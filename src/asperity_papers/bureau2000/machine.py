@@ -314,18 +314,19 @@ class Machine:
 
     # --- What the text states --------------------------------------------------------------------
 
-    def stated(self) -> Stated:
-        """The statements of section II and of the captions, as numbers."""
+    def stated(self) -> dict[str, Pair]:
+        """Two numbers of each quantity as the text states them; none is read off a figure.
+
+        drop: "a typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is
+        named: -20 % of the friction coefficient at 1 and at 10 um/s. mu1: "of order 1e-3", half a
+        decade to either side. ratio: mu2/mu1. mu2: what both leave to it.
+        """
         p = self.numbers
-        half_decade = 10**0.5
         slow, fast = (-p.relative_drop * self.mu_ss(V) for V in self.velocities)
-        return Stated(
-            drops=(slow, fast),
-            mu1=(p.mu1_order / half_decade, p.mu1_order * half_decade),
-            ratio=p["mu2_over_mu1"].si_range or (0.0, 0.0),
-            share=self.share,
-            collapse=1 / p.collapse_divisor_200Hz,
-        )
+        low, high = p.mu1_order / 10**0.5, p.mu1_order * 10**0.5
+        ratio = self.range_of("mu2_over_mu1")
+        mu2 = low * ratio[0], high * ratio[1]
+        return {"drop": (slow, fast), "mu1": (low, high), "mu2": mu2, "ratio": ratio}
 
 
 @dataclass(frozen=True)
@@ -351,42 +352,6 @@ class Outputs:
     def mu2_over_mu1(self) -> Pair:
         """Second over first harmonic."""
         return self.mu2[0] / self.mu1[0], self.mu2[1] / self.mu1[1]
-
-
-@dataclass(frozen=True)
-class Stated:
-    """What the text says about the measurements; nothing here is read off a figure.
-
-    Attributes
-    ----------
-    drops : (float, float)
-        "A typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is named:
-        -20 % of the friction coefficient at 1 and at 10 um/s.
-    mu1 : (float, float)
-        "Of order 1e-3": half a decade to either side.
-    ratio : (float, float)
-        mu2/mu1.
-    share : float
-        eps_eff/eps at 120 Hz.
-    collapse : float
-        eps_eff in air over that in vacuum at 200 Hz (Fig. 5).
-    """
-
-    drops: Pair
-    mu1: Pair
-    ratio: Pair
-    share: float
-    collapse: float
-
-    @property
-    def epsilon_eff(self) -> float:
-        """Amplitude that the contacts bear at eps = 0.5."""
-        return STRONGEST * self.share
-
-    @property
-    def mu2(self) -> Pair:
-        """What "of order 1e-3" and "0.1 to 0.2 of it" leave to mu2."""
-        return self.mu1[0] * self.ratio[0], self.mu1[1] * self.ratio[1]
 
 
 def at(values: Float, applied: float = STRONGEST) -> Pair:

@@ -113,15 +113,16 @@ def _inertial_line(figure: str, numbers: Material, name: str, progress: Any) -> 
 
 def _marks(figure: str, numbers: Material) -> Mapping[str, Sequence[dict[str, Any]]]:
     """What the text states at one amplitude, by observable; an interval has two ends."""
-    seen = _machine(numbers).stated()
-    at = seen.epsilon_eff if FIGURES[figure].x == "epsilon_eff" else STRONGEST
+    machine = _machine(numbers)
+    seen = machine.stated()
+    at = machine.strongest if FIGURES[figure].x == "epsilon_eff" else STRONGEST
     return {
         "delta_mu": [
             {"x": at, "ends": [drop], "text": f"stated: 20 % of the friction coefficient at {V}"}
-            for drop, V in zip(seen.drops, ("1 µm/s", "10 µm/s"), strict=True)
+            for drop, V in zip(seen["drop"], ("1 µm/s", "10 µm/s"), strict=True)
         ],
-        "mu1": [{"x": at, "ends": list(seen.mu1), "text": "stated: of order 10⁻³"}],
-        "mu2": [{"x": at, "ends": list(seen.mu2), "text": "stated: 0.1 to 0.2 of μ₁"}],
+        "mu1": [{"x": at, "ends": list(seen["mu1"]), "text": "stated: of order 10⁻³"}],
+        "mu2": [{"x": at, "ends": list(seen["mu2"]), "text": "stated: 0.1 to 0.2 of μ₁"}],
     }
 
 
@@ -129,7 +130,7 @@ def _element_lines(numbers: Material) -> list[dict[str, Any]]:
     """What the element does over a period: stretch of the asperities, and rates over V."""
     machine, lines = _machine(numbers), []
     for name, V in zip(("1 µm/s", "10 µm/s"), machine.velocities, strict=True):
-        period = one_period(machine, EXT, V, machine.stated().epsilon_eff, samples=_INSTANTS)
+        period = one_period(machine, EXT, V, machine.strongest, samples=_INSTANTS)
         stretch = 1e9 * machine.numbers["lambda"].si * period["force"] / period["load"]
         columns = {
             "phase": period["phase"], "stretch": stretch, "slider_velocity": period["velocity"],
@@ -175,7 +176,7 @@ def _python(figure: str, changes: Mapping[str, float]) -> str:
 
 
 def _element_python(changes: Mapping[str, float]) -> str:
-    epsilon = Machine(altered(printed(), changes)).stated().epsilon_eff
+    epsilon = Machine(altered(printed(), changes)).strongest
     return _PYTHON.format(
         imports="from asperity_papers.bureau2000.motion import one_period",
         changes=dict(changes),
