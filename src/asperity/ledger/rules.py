@@ -38,7 +38,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, code_of_others
 
 #: Relative tolerance of "about".
 ABOUT = 0.05
@@ -197,15 +197,11 @@ def formula_value(
             case ast.Name() | ast.Attribute():
                 name = re.sub(r"_(?=$|\.)", "", ast.unparse(node))
                 return number(name, {**numbers, "pi": math.pi}, place)
-        raise SyntaxError
+        raise SyntaxError(f"'{ast.unparse(node)}' is neither a number nor a known name")
 
-    try:
+    rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
+    with code_of_others(place, rule, advice, f"'{formula}'"):
         return float(value(ast.parse(formula, mode="eval").body))
-    except (SyntaxError, ArithmeticError, ValueError, TypeError) as error:
-        if isinstance(error, InputError):
-            raise
-        rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
-        raise InputError(place, rule, f"'{formula}'", advice) from None
 
 
 #: Rules that claims.toml may name, with the names of their numbers in the order of arguments.

@@ -40,8 +40,6 @@ LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
 _BLOCKS = 700
 #: Channels that are drawn, and findings and rows that are listed.
 _MOST_CHANNELS, _MOST_LISTED = 24, 200
-#: Slip events at close range.
-_CLOSE = 8
 #: Largest lock-in table (bytes).
 LARGEST_TABLE = 1024**2
 
@@ -197,16 +195,13 @@ def _sliding_record(measurement: SlidingMeasurement, name: str) -> dict[str, Any
 
 
 def _stick_slip_record(measurement: StickSlipMeasurement, name: str) -> dict[str, Any]:
+    from asperity.measurement.record import middle_events
     from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
 
     time, friction, events = measurement.time, measurement.friction, measurement.events
     curves = {"friction": thinned(time, friction, _BLOCKS)}
     if len(events):
-        first = max((len(events) - _CLOSE) // 2, 0)
-        last = min(first + _CLOSE, len(events)) - 1
-        begin, end = float(events.onset[first]), float(events.end[last])
-        around = max((end - begin) / (2 * _CLOSE), float(events.slip_duration[first]))
-        near = (time >= begin - around) & (time <= end + around)
+        _, near = middle_events(measurement)
         curves["close"] = thinned(time[near], friction[near], _BLOCKS)
     return {
         "record": stick_slip_record(measurement),
