@@ -13,7 +13,6 @@ from asperity_papers.bureau2000.machine import (
     SPEEDS,
     STRONGEST,
     Machine,
-    Outputs,
     at,
 )
 
@@ -50,11 +49,6 @@ def depends_on_normal_stiffness(machine: Machine) -> Numbers:
 # --- III.B: Linker and Dieterich's ageing law ----------------------------------------------------
 
 
-def _low_alpha(machine: Machine) -> Outputs:
-    """Response at eps = 0.5 with alpha = 0.02."""
-    return machine.outputs(LD, alpha=machine.numbers.alpha_low)
-
-
 @check("caption-harmonics")
 def caption_harmonics(machine: Machine) -> Numbers:
     a, b = machine.curve(LD, alpha=machine.numbers.alpha_low), machine.curve(LD)
@@ -70,7 +64,7 @@ def alpha_upper_limit(machine: Machine) -> Numbers:
     p = machine.numbers
     needed = _share_for_the_drop(machine, LD, np.linspace(STRONGEST, 1.0, 11))
     measured = p.transmission_air_over_vacuum * machine.borne(p.frequency_vacuum, None)
-    loss = 1 - _low_alpha(machine).delta_mu[0] / machine.outputs(RR).delta_mu[0]
+    loss = 1 - machine.outputs(LD, alpha=p.alpha_low).delta_mu[0] / machine.outputs(RR).delta_mu[0]
     return {"1 um/s": needed / measured, "needed": needed, "measured": measured, "loss": loss}
 
 
