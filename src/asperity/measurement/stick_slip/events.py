@@ -20,7 +20,7 @@ from asperity.recording.defects.autoregression import Autoregression, fitted
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 #: Of each event peak, trough, and the run around them that is read.
-Bounds = tuple[Index, Index, Index, Index]
+Bounds = tuple[Index, ...]
 Shape = Callable[[Array, Array], Array]
 
 #: A line long enough that noise moves its end by this share of the drop; longer ones bend.
