@@ -200,7 +200,7 @@ def judged(seed):
     true, read = matched(truth, events, 0.6 * (truth.end - truth.onset)[0] + 0.01)
     seen = truth.drop > result.smallest_drop
     missed = np.setdiff1d(np.flatnonzero(seen), true).size / max(seen.sum(), 1)
-    false = 1 - np.unique(read).size / max(len(events), 1)
+    false = (len(events) - np.unique(read).size) / max(len(events), 1)
     drop, timing = events.drop[read] - truth.drop[true], events.onset[read] - truth.onset[true]
     beside = np.diff(true) == 1
     recurrence = np.diff(timing)[beside]
