@@ -31,11 +31,9 @@ from asperity.orbit.mesh.equations import (
     CondensedEquations,
     collocated,
     condensed,
-    read_orbit,
     transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit, equidistributed
-from asperity.orbit.observables import Observables
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
@@ -295,10 +293,8 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
     return scales
 
 
-def refined_orbit(
-    problem: Problem, guess: Orbit, *, intervals: int, harmonics: int
-) -> tuple[Orbit, Observables, Float]:
-    """The orbit on an equidistributed mesh of `intervals`, its observables and last Newton change.
+def refined_orbit(problem: Problem, guess: Orbit, *, intervals: int) -> tuple[Orbit, Float]:
+    """The orbit on an equidistributed mesh of `intervals`, and the last Newton change.
 
     Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
     a finer one than the last iterate.
@@ -315,8 +311,7 @@ def refined_orbit(
         done = error < ACCEPTED
         best = _where(done, best, result.orbit)
         error = np.where(done, error, result.error)
-    orbit = _where(error < ACCEPTED, best, first)
-    return orbit, read_orbit(problem, orbit, harmonics), error
+    return _where(error < ACCEPTED, best, first), error
 
 
 def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:
