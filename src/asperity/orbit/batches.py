@@ -24,8 +24,9 @@ FAST_BLOCK = 240
 #: Points in a call for a single operating point, as a slider of the page moves it.
 FEW = 8
 
-#: Points in a call that works on orbits on meshes: all go on until the slowest has converged.
-MESH_CHUNK = 8
+#: Points in a chunk of orbits on meshes, for up to three states and for more: a few points that
+#: need a finer mesh than the others take a smaller chunk.
+_MESH_CHUNKS = ((24, 8), (8,))
 
 
 def points_of(tree: Any) -> int:
@@ -51,7 +52,7 @@ def run_chunks(
     function: Callable[..., Any],
     inputs: tuple[Any, ...],
     index: Indices,
-    chunk: int,
+    chunk: int | tuple[int, ...],
 ) -> Iterator[tuple[Indices, Any]]:
     """Apply `function` to the points `index` of `inputs`.
 
@@ -64,25 +65,33 @@ def run_chunks(
         Its arguments.
     index : array of int
         The points to work on.
-    chunk : int
-        Points per call; the last one is filled up with copies of its last point.
+    chunk : int or tuple of int
+        Points per call. Of several numbers, falling, the last chunk has the smallest that holds
+        what is left; it is filled up with copies of its last point.
 
     Yields
     ------
     indices, outputs
         As NumPy arrays without the filling.
     """
+    sizes = (chunk,) if isinstance(chunk, int) else chunk
 
     def work(part: Indices) -> tuple[Indices, Any]:
-        filled = np.concatenate([part, np.full(chunk - len(part), part[-1])])
+        size = min(size for size in sizes if size >= len(part))
+        filled = np.concatenate([part, np.full(size - len(part), part[-1])])
         outputs = function(*take(inputs, filled))
         return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
 
-    for start in range(0, len(index), chunk):
+    for start in range(0, len(index), sizes[0]):
         spare_mappings()
-        yield work(index[start : start + chunk])
+        yield work(index[start : start + sizes[0]])
 
 
 def chunk_of(index: Indices, most: int) -> int:
     """Points in a call that works on the points `index`: `FEW` if they are few, else `most`."""
     return FEW if len(index) <= FEW else most
+
+
+def mesh_chunk(size: int) -> tuple[int, ...]:
+    """Points in a call that works on orbits with `size` states on meshes."""
+    return _MESH_CHUNKS[size > 3]

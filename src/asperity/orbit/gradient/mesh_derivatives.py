@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
-from asperity.orbit.batches import MESH_CHUNK, run_chunks
+from asperity.orbit.batches import mesh_chunk, run_chunks
 from asperity.orbit.gradient.parametrised import (
     Parameters,
     ParametrisedProblem,
@@ -312,8 +312,8 @@ def derivatives_of(
     def table(problem: Problem, orbit: Orbit, logs: Any) -> Float:
         return np.moveaxis(orbit_derivatives(equations, problem, orbit, count, logs, names), 1, -1)
 
-    inputs = problem, orbits.orbit, logs
-    parts = [part for _, part in run_chunks(table, inputs, everyone, MESH_CHUNK)]
+    inputs, chunk = (problem, orbits.orbit, logs), mesh_chunk(problem.system.size)
+    parts = [part for _, part in run_chunks(table, inputs, everyone, chunk)]
     return np.moveaxis(np.concatenate(parts, axis=-1), -1, 1)
 
 

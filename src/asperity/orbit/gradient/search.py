@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.loads import Modulate, Programme
-from asperity.orbit.batches import MESH_CHUNK, Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
@@ -132,7 +132,7 @@ class KnownOrbits:
             return
         remesh = partial(remeshed, intervals=len(self.orbit.mesh) - 1)
         inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
-        for part, kept in run_chunks(remesh, inputs, everyone, MESH_CHUNK):
+        for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
     def picked(self, index: Indices) -> KnownOrbits:
@@ -174,16 +174,15 @@ def followed_orbits(
     size, points = guess.centre.shape
     known, agreements = numbers is not None, _MESH_AGREEMENT if numbers is None else _AGREEMENT
     before = np.full((1 + harmonics, points), np.nan + 0j) if numbers is None else numbers
+    read = partial(_numbers, harmonics=harmonics)
     for intervals in meshes if known else (FIRST_MESH, *meshes):
         agreement = agreements[(intervals,) == meshes[-1:]]
-
-        def solve(problem: Problem, guess: Orbit, intervals: int = intervals) -> Any:
-            fine, error = refined_orbit(problem, guess, intervals=intervals)
-            return fine, _numbers(problem, fine, harmonics), error
-
+        solve = partial(refined_orbit, intervals=intervals, read=read)
         finer = Orbit.empty(guess.scheme, size, intervals, points)
         left = [index[:0]]
-        for part, (fine, now, error) in run_chunks(solve, (problem, guess), index, MESH_CHUNK):
+        for part, (fine, now, error) in run_chunks(
+            solve, (problem, guess), index, mesh_chunk(size)
+        ):
             put(finer, part, fine)
             solved = error < ACCEPTED
             served = solved & (response_gap(before[:, part], now, each=1) < agreement)
@@ -271,7 +270,9 @@ def search_orbits(
     slow = rows[is_slow(take(problem, rows))]
     series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0])
     read = partial(_numbers, harmonics=harmonics)
-    for some, numbers in run_chunks(read, (problem, series), exact, MESH_CHUNK):
+    for some, numbers in run_chunks(
+        read, (problem, series), exact, mesh_chunk(problem.system.size)
+    ):
         keep(some, MeshOrbits.of(take(series, some), numbers))
     rows = left()
     if known is not None and known.orbit is not None:

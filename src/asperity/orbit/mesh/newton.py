@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -39,6 +39,7 @@ from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Newton's method ends at this change; the error is then about the square of the change.
 TOLERANCE = 1e-8
@@ -293,8 +294,12 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
     return scales
 
 
-def refined_orbit(problem: Problem, guess: Orbit, *, intervals: int) -> tuple[Orbit, Float]:
-    """The orbit on an equidistributed mesh of `intervals`, and the last Newton change.
+def refined_orbit(
+    problem: Problem, guess: Orbit, *, intervals: int, read: Callable[[Problem, Orbit], T]
+) -> tuple[Orbit, T, Float]:
+    """The orbit on an equidistributed mesh of `intervals`, what is read of it, and its error.
+
+    The error is the last change by Newton's method.
 
     Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
     a finer one than the last iterate.
@@ -311,7 +316,8 @@ def refined_orbit(problem: Problem, guess: Orbit, *, intervals: int) -> tuple[Or
         done = error < ACCEPTED
         best = _where(done, best, result.orbit)
         error = np.where(done, error, result.error)
-    return _where(error < ACCEPTED, best, first), error
+    orbit = _where(error < ACCEPTED, best, first)
+    return orbit, read(problem, orbit), error
 
 
 def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
-from asperity.orbit.batches import MESH_CHUNK, Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, put, run_chunks, take
 from asperity.orbit.mesh.arclength import (
     ContinuationPoint,
     ParameterLine,
@@ -34,6 +34,9 @@ from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
+
+#: Branches that are followed in a call.
+CHUNK = 8
 
 
 class BranchMesh(NamedTuple):
@@ -94,7 +97,7 @@ def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: in
     def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
         return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
 
-    for part, begun in run_chunks(begin, (line, orbit, t), index, MESH_CHUNK):
+    for part, begun in run_chunks(begin, (line, orbit, t), index, CHUNK):
         put(pair, part, begun)
     return pair
 
@@ -179,7 +182,7 @@ class SteadyBranches(Curves):
         """
         stuck = np.flatnonzero((failures >= _RESTART) & (failures < self.control.most_failures))
         self.span[stuck] = length[stuck] = np.abs(length[stuck])
-        for part, fresh in run_chunks(straight, (self.pair.point, length), stuck, MESH_CHUNK):
+        for part, fresh in run_chunks(straight, (self.pair.point, length), stuck, CHUNK):
             put(self.pair, part, fresh)
         t, ratio = self.pair.point.t, length / self.span
         last, left = t - self.pair.t_before, 1 - t
@@ -197,7 +200,7 @@ class SteadyBranches(Curves):
         """Steps on the moving mesh."""
         advance = partial(moving_step, max_steps=_NEWTON_STEPS)
         inputs = (self.line, self.pair, length / self.span)
-        for part, step in run_chunks(advance, inputs, rows, MESH_CHUNK):
+        for part, step in run_chunks(advance, inputs, rows, CHUNK):
             miss = np.where(step.miss * step.length < _NOISE, 0.0, step.miss)
             converged = np.isfinite(step.error)
             yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)

@@ -14,7 +14,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.orbit.batches import MESH_CHUNK, Indices, points_of, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, points_of, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.mesh.equations import VANISHING_GROWTH, read_orbit, split_observables
 from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
@@ -52,23 +52,17 @@ def refine(
     """
     size, points = orbit.centre.shape
     coarse, previous = len(orbit.mesh) - 1, Solution.unsolved(problem, points, options)
-    read = partial(read_orbit, harmonics=options.harmonics)
-    for part, initial in run_chunks(read, (problem, orbit), index, MESH_CHUNK):
+    evaluate = partial(read_orbit, harmonics=options.harmonics)
+    for part, initial in run_chunks(evaluate, (problem, orbit), index, mesh_chunk(size)):
         previous.store(part, initial)
     for intervals in (intervals for intervals in MESHES if intervals >= coarse):
         close = intervals == len(orbit.mesh) - 1
         agreement = _CLOSE_AGREEMENT if close else AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, points)
-
-        def solve(
-            problem: Problem, guess: Orbit, intervals: int = intervals
-        ) -> tuple[Orbit, Observables, Float]:
-            fine, error = refined_orbit(problem, guess, intervals=intervals)
-            return fine, read(problem, fine), error
-
+        solve = partial(refined_orbit, intervals=intervals, read=evaluate)
         resolved = np.zeros(points, dtype=bool)
         for part, (fine, observables, error) in run_chunks(
-            solve, (problem, orbit), index, MESH_CHUNK
+            solve, (problem, orbit), index, mesh_chunk(size)
         ):
             put(finer, part, fine)
             solution.iterations[part] = intervals
@@ -87,13 +81,15 @@ def _keep(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> 
     """Write waveforms and orbits of the points `rows` to `solution`, which may have room."""
     phases = solution.waveform.shape[1]
     if phases:
+        chunk = mesh_chunk(problem.system.size)
         sample = partial(waveform, phases=phases)
-        for part, samples in run_chunks(sample, (problem, orbit), rows, MESH_CHUNK):
+        for part, samples in run_chunks(sample, (problem, orbit), rows, chunk):
             solution.waveform[..., part] = samples
     intervals = len(solution.orbit.mesh) - 1
     if intervals:
         remesh = partial(remeshed, intervals=intervals)
-        for part, kept in run_chunks(remesh, (problem, orbit), rows, MESH_CHUNK):
+        chunk = mesh_chunk(problem.system.size)
+        for part, kept in run_chunks(remesh, (problem, orbit), rows, chunk):
             put(solution.orbit, part, kept)
 
 
@@ -111,9 +107,10 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     """
     intervals = orbit.mesh.shape[0] - 1
     evaluate = partial(read_orbit, harmonics=options.harmonics)
+    chunk = mesh_chunk(problem.system.size)
     points = np.arange(orbit.centre.shape[1])
     stiff = []
-    for part, observables in run_chunks(evaluate, (problem, orbit), points, MESH_CHUNK):
+    for part, observables in run_chunks(evaluate, (problem, orbit), points, chunk):
         logs = observables.log_multipliers
         known = extreme_multipliers(observables, logs)
         solution.store(part, observables, logs)
@@ -197,7 +194,9 @@ def orbits_from_averaged_limit(problem: Problem, index: Indices) -> tuple[Orbit,
     """
     system, solved = problem.system, [index[:0]]
     orbit = Orbit.empty(scheme_for(system), system.size, FIRST_MESH, len(system.V))
-    for part, (first, error) in run_chunks(_first_orbit, (problem,), index, MESH_CHUNK):
+    for part, (first, error) in run_chunks(
+        _first_orbit, (problem,), index, mesh_chunk(system.size)
+    ):
         good = error < ACCEPTED
         put(orbit, part[good], take(first, np.flatnonzero(good)))
         solved.append(part[good])
@@ -304,7 +303,7 @@ def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, inde
     for parts in splits:
         solve = partial(split_observables, parts=parts)
         most = _MOST_SIDE_BY_SIDE // (intervals * parts)
-        chunk = MESH_CHUNK if most >= MESH_CHUNK else 1
+        chunk = tuple(k for k in mesh_chunk(problem.system.size) if k <= most) or 1
         for part, observables in run_chunks(solve, (problem, orbit), index, chunk):
             logs = observables.log_multipliers
             gap = multiplier_gap(solution.log_multipliers[:, part], logs)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.orbit.batches import MESH_CHUNK, Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import remeshed, solve
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit, refine
@@ -61,7 +61,8 @@ class FrequencyPath(Method):
 def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, Indices]:
     """Orbits of the points that reach the end of their path in frequency, and these points."""
     rate, everyone = np.zeros(points), np.arange(points)
-    for part, value in run_chunks(_rate, (problem,), everyone, MESH_CHUNK):
+    chunk = mesh_chunk(problem.system.size)
+    for part, value in run_chunks(_rate, (problem,), everyone, chunk):
         rate[part] = value
     end = np.asarray(problem.system.omega)
     first = end * np.maximum(rate / _FAST_MODULATION, 1.0)
@@ -73,7 +74,7 @@ def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, I
         # Evenly in the logarithm of the frequency.
         trial = np.minimum(1.0, reached + step)
         inputs = (_at_frequency(problem, first * (end / first) ** trial), orbit)
-        for part, (moved, error) in run_chunks(_advance, inputs, active, MESH_CHUNK):
+        for part, (moved, error) in run_chunks(_advance, inputs, active, chunk):
             # The re-meshed orbit, which is the next guess, must also be finite.
             good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
             put(orbit, part[good], take(moved, np.flatnonzero(good)))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import MESH_CHUNK, Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -110,7 +110,7 @@ def series_orbits(
         harmonics, exact = _solve(part)
         return _on_even_mesh(harmonics, scheme, intervals), exact
 
-    for rows, (some, exact) in run_chunks(solve, (problem,), index, MESH_CHUNK):
+    for rows, (some, exact) in run_chunks(solve, (problem,), index, mesh_chunk(system.size)):
         put(orbit, rows, some)
         resolved.append(rows[exact])
     return orbit, np.concatenate(resolved)
