@@ -53,7 +53,13 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
         places = max(0, 1 - math.floor(math.log10(error))) if error else 6
         shown = f"{value:.{places}f} +- {error:.{places}f}"
         kind = "velocity weakening" if value < 0 else "velocity strengthening"
-        known = abs(value) > _KNOWN_SIGN * error
+        # A minimum that the data allow as well may have the other sign.
+        others = [
+            other.values["A"] - other.values["B"]
+            for other in fit.optima
+            if other.chi2 - fit.chi2 < _KNOWN_SIGN**2
+        ]
+        known = abs(value) > _KNOWN_SIGN * error and all(value * other > 0 for other in others)
         sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))

@@ -221,12 +221,12 @@ def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
 def _which_force(trace: Trace) -> InputError:
     (name,) = trace.channels
     friction, force = (Argument("columns", role, name) for role in ("friction", "F"))
+    load = Argument("channels", "load", "1200 N")
     return InputError(
         Argument("columns", "friction"),
         "name the friction in a recording of one column",
         f"'{name}'",
-        f"where it is F/W write {friction}; where it is the force write {force} and give the load "
-        "too",
+        f"where it is F/W write {friction}; where it is the force write {force} {load}",
     )
 
 

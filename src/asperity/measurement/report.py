@@ -47,7 +47,7 @@ def _modulated(measurement: Measurement, name: str, names: Names) -> list[Sectio
         for number, of, meaning in (
             ("W0", unit, "mean load"),
             ("epsilon", "", "amplitude of W/W0"),
-            ("frequency", "Hz", ""),
+            ("frequency", "Hz", f"period {_duration(1 / reading.frequency)}"),
             ("mean_force", unit, ""),
             ("mean_friction", "", "mean of F/W0"),
         )
@@ -69,7 +69,7 @@ def _modulated(measurement: Measurement, name: str, names: Names) -> list[Sectio
             _row(f"phase{n}", phasor.phase, phasor.phase_uncertainty, "rad", "against the load")
         )
     head = (
-        f"{name}: {reading.start:.6g} s to {reading.end:.6g} s, {reading.samples} samples, "
+        f"{name}: {_time(reading.start)} s to {_duration(reading.end)}, {reading.samples} samples, "
         f"{reading.periods:.5g} periods; window chosen by the {measurement.chosen_by}"
     )
     return [
@@ -182,8 +182,18 @@ def healing_section(campaign: StickSlipCampaign, names: Names = "friction") -> S
 
 
 def _time(seconds: float) -> str:
-    """A time of a recording, to a nanosecond: what a fit of the clock leaves about zero is zero."""
-    return f"{round(float(seconds), 9) + 0.0:.10g}"
+    """A time of a recording, to 0.01 ms: what a fit of the clock leaves about zero is zero."""
+    return f"{round(float(seconds), 5) + 0.0:.10g}"
+
+
+def _duration(seconds: float) -> str:
+    """A duration in the unit that reads best, hours and days among them."""
+    from asperity.units import quantity_text
+
+    for unit, size in (("d", 86400), ("h", 3600)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.6g} {unit}"
+    return quantity_text(seconds, "s", 6)
 
 
 def velocity_text(velocity: float) -> str:
@@ -245,7 +255,11 @@ def _holds(measurement: SlidingMeasurement) -> list[Section]:
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
     """A number with as many digits as its uncertainty allows: two uncertain ones."""
-    number, uncertain = rounded(value, doubt)
+    from asperity.units import display_unit
+
+    # A recording of the tide lasts for days, a stress is one of MPa.
+    unit, power = display_unit(value, unit)
+    number, uncertain = rounded(value * 10.0**-power, doubt * 10.0**-power)
     return name, f"{number} {unit}".strip(), uncertain, meaning
 
 

@@ -118,12 +118,19 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
     if W.kind == F.kind:
         return
     area = Argument("read.area", value="25 cm^2")
+    unit = " and ".join(
+        str(Argument("units", side.recorded_name, other.unit if other.kind else "N"))
+        for side, other in ((F, W), (W, F))
+        if side.kind is None
+    )
     raise InputError(
         "measure.force",
         "have the dimension of the load",
         f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
         f"give the area that makes the stress a force, like {area}"
         if {W.kind, F.kind} == {"force", "pressure"}
+        else f"give the unit when reading, like {unit}"
+        if unit
         else "name the units when reading",
     )
 

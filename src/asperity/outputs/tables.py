@@ -134,7 +134,9 @@ def rounded(value: float, doubt: float) -> tuple[str, str]:
     if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
         return f"{value:.9g}", ""
     last = math.floor(math.log10(doubt)) - 1
-    if value and (abs(value) < 1e-3 or abs(value) >= 1e6):
+    if value and (max(abs(value), doubt) < 1e-3 or abs(value) >= 1e6):
         power = math.floor(math.log10(abs(value)))
         return f"{value:.{max(0, min(15, power - last))}e}", f"+- {doubt:.2g}"
-    return f"{value:.{max(0, min(15, -last))}f}", f"+- {doubt:.2g}"
+    places = max(0, min(15, -last))
+    # Without the sign of a zero.
+    return f"{round(value, places) + 0.0:.{places}f}", f"+- {doubt:.2g}"

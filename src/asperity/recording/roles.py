@@ -73,7 +73,7 @@ ROLES: Mapping[str, Role] = {
         "load,normal load,normal force,normal stress",
         "w fn ns n fz load sigma sigman signorm normalkraft normalspannung normallast auflast "
         "auflagekraft anpresskraft σ σn",
-        "nor norm normal normale normala normalkraft normalspannung normallast auflast sigman",
+        "nor norm normal normale normala normalkraft normalspannung normallast auflast sigman fn",
         weak="load loadcell pressure axialforce axialload axialstress last belastung charge carico "
         "carga",
         without=_MOTION + " shear shr tangential coefficient koeffizient",
@@ -84,7 +84,7 @@ ROLES: Mapping[str, Role] = {
         "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
         "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
         "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
-        "shear shr tangential tangentiel tangentielle tangenziale tangencial lateral laterale "
+        "shear shr ft tangential tangentiel tangentielle tangenziale tangencial lateral laterale "
         "traction tau τ reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
         "tangentialkraft cisaillement taglio cizalla cortante",
         weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
@@ -238,5 +238,7 @@ def _missing(role: str, kinds: Mapping[str, str | None]) -> str:
     if role == "W":
         ways.append(f"give a constant one, like {Argument('channels', 'load', '1200 N')}")
     if role in ("W", "F"):
-        ways.append(f"name F/W, like {Argument('columns', 'friction', 'mu')}")
+        # The last free column; the first stands for the load or the force.
+        of_column = Argument("columns", "friction", (free or [*kinds])[-1])
+        ways.append(f"name the column of F/W, like {of_column}")
     return ", or ".join(ways) or closest(role, kinds)

@@ -17,6 +17,7 @@ from asperity.inference.fitting.plausibility import (
     contradicted_stiffness,
     unusual_numbers,
 )
+from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, without_spikes
 from asperity.laws import RiceRuina, get_law
@@ -398,6 +399,17 @@ def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, f
     given = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0, **fixed}
     with pytest.raises(InputError, match=r"K must be in Pa/m for .*, got that of a table in N/m"):
         fit([readings(), term.run], "rice-ruina", free, fixed=given)
+
+
+def test_a_transient_longer_than_its_recording_leaves_its_length_open(monkeypatch):
+    """It is a trend, of any D0 and of B in proportion, whose A - B has no sign."""
+    monkeypatch.setitem(coverage.TRUTH, "D0", 60e-6)
+    short = coverage.Case((1e-6, 1e-5), (5.0,), 8.0, 10.0)
+    (run,) = runs_of(short, 1, noise=lambda random, n, rate: 2e-4 * random.normal(size=n))
+    fitted = fit(run, "rice-ruina", FREE)
+    assert {"B", "D0"} <= {*fitted.undetermined}
+    assert not any("A - B" in sentence for sentence in fit_in_words(fitted))
+    assert coverage.TRUTH["A"] == pytest.approx(fitted.values["A"], rel=0.1)
 
 
 def test_a_gain_with_a_prior_widens_the_intervals(found):

@@ -65,6 +65,11 @@ def test_a_motion_that_settles_and_a_drift_are_no_jumps():
     for seconds in (1.0, 2.0, 5.0):
         motion = 0.6 + 0.01 * np.exp(-time / seconds) + 1e-4 * time
         assert find_jumps(motion + ar1(random, 2000, 5.0), [(0, 2000)]) == []
+    # Most easily taken for one: the end of a transient where a stretch begins, after a longer one.
+    transient = np.concatenate([np.zeros(400), 0.0224 * np.exp(-np.arange(800) / 20)])
+    for _ in range(16):
+        values = transient + 3e-4 * random.normal(size=1200)
+        assert find_jumps(values, [(0, 375), (450, 1200)]) == []
 
 
 def test_a_stretch_keeps_to_itself():

@@ -499,7 +499,9 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
     if by_likelihood:
         nearest = by_likelihood[0]
         which = (
-            f"{nearest}, the nearest of them, has an AICc" if by_likelihood[1:] else "its AICc is"
+            f"{nearest}, the nearest of them, has an AICc"
+            if by_likelihood[1:]
+            else f"the AICc of {nearest} is"
         )
         gap = judged[nearest].fit.aicc - judged[best].fit.aicc
         parts.append(f"{which} {gap:.3g} above that of {best}, and {EXCLUDED:g} excludes")

@@ -104,6 +104,9 @@ def described_fit(
     # A search would not improve intervals under a law that the data contradict.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
+    if not objective.noise_is_known and (open_ended := _open_ended(objective, at, bent)):
+        at = replace(at, undetermined=tuple(dict.fromkeys([*at.undetermined, *open_ended])))
+        bent = [name for name in bent if name not in open_ended]
     rivals = _rivals(objective, minima, at.sd)
     odd = set() if far_off else {*bent, *at.undetermined}
     profiled = _profiled(objective, at.covariance, odd, everything=profile)
@@ -354,6 +357,38 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
                 result.append(unknown.name)
                 break
     return result
+
+
+def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list[str]:
+    """Parameters among `bent` that the data leave open on one side, and those that follow them.
+
+    A transient longer than its recording is a trend, of any D0 and of B in proportion: where
+    chi-squared, minimised at two factors of e from the estimate, has not risen by what 95 %
+    allow, the estimate is one of many, and so are those of the others that changed as much there.
+    """
+    result = []
+    best = objective.named(at.u)
+    for name in bent:
+        i = objective.names.index(name)
+        for sign in (-1, 1):
+            x = float(
+                np.clip(at.u[i] + sign * _TRIED_AT * UNDETERMINED, *objective.unknowns[i].bounds)
+            )
+            there = objective.minimise(at.u, {i: x}, tolerance=1e-4)
+            if there.chi2 - at.chi2 < _TRIED_AT**2:
+                values = objective.named(there.u)
+                changed = [
+                    k.name
+                    for k in objective.unknowns
+                    if not k.nuisance and _apart(values[k.name], best[k.name])
+                ]
+                result += [name, *changed]
+    return list(dict.fromkeys(result))
+
+
+def _apart(value: float, other: float) -> bool:
+    """Whether two values differ by more than a factor of e, or in their sign."""
+    return abs(value - other) > (1 - math.exp(-UNDETERMINED)) * max(abs(value), abs(other))
 
 
 def _lowered(objective: Objective, u: Float, i: int) -> float:

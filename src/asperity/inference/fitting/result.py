@@ -66,13 +66,14 @@ class Shown(NamedTuple):
     value, unit : str
     power : int
         Of ten, of the unit over the SI unit.
-    se : float
-        Standard error, in that unit.
+    number, se : float
+        Value and standard error, in that unit.
     """
 
     value: str
     unit: str
     power: int
+    number: float
     se: float
 
     @classmethod
@@ -80,18 +81,22 @@ class Shown(NamedTuple):
         """Of a value and its standard error in SI; the larger of the two chooses the unit."""
         shown, power = display_unit(max(abs(value), se) if math.isfinite(se) else value, unit)
         scale = 10.0**-power
-        return cls(rounded(value * scale, se * scale)[0], shown, power, se * scale)
+        return cls(rounded(value * scale, se * scale)[0], shown, power, value * scale, se * scale)
 
     def error(self, se: float) -> str:
         """A standard error in SI as text."""
-        return f"{se * 10.0**-self.power:.2g}"
+        return f"{float(f'{se * 10.0**-self.power:.2g}'):g}"
 
     def interval(self, ends: Interval) -> str:
         """An interval in SI in words; one that the data do not bound on either side is none."""
         low, high = ends
         if not (math.isfinite(high) or (math.isfinite(low) and low > 0)):
             return NOT_DETERMINED
-        low_text, high_text = (rounded(end * 10.0**-self.power, self.se)[0] for end in ends)
+        # The far end of a skew interval bears fewer digits.
+        low_text, high_text = (
+            rounded(end, max(self.se, abs(end - self.number) / 4))[0]
+            for end in (low * 10.0**-self.power, high * 10.0**-self.power)
+        )
         if not math.isfinite(high):
             return f"above {low_text}"
         return f"{low_text} to {high_text}" if math.isfinite(low) else f"below {high_text}"

@@ -317,7 +317,7 @@ class RunTerm(DataTerm):
         if effective < 3 * (len(self.linear) + 4):
             said.append(
                 f"{self.name} has {effective:.3g} independent samples only, its noise is so slow; "
-                "a longer window would help"
+                "a longer window would help, or a drift (--drift) if friction drifts with time"
             )
         if self.run.spikes:
             said.append(self._said_of_spikes())

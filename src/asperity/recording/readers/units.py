@@ -47,7 +47,7 @@ _PURE = frozenset({"-", "--", "1", ".", "/", "dimensionless", "unitless", "nd", 
 _EMPTY = frozenset({"", "no_val", "no_info", "none", "n/a", "na", "unknown", "?"})
 #: Units that a heading may end in, in addition to those that SI values are displayed in.
 _ALSO_USUAL = frozenset(
-    ("min", "h", "mm/min", "um/min", "cm", "cm/s", "kgf", "gf", "lbf", "psi", "bar")
+    ("min", "h", "d", "mm/min", "um/min", "cm", "cm/s", "kgf", "gf", "lbf", "psi", "bar")
 )
 #: Smallest size of one recorded unit (SI), and one over the largest.
 _SMALLEST = Decimal("1e-100")
