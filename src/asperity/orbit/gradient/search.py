@@ -25,7 +25,7 @@ from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
-from asperity.orbit.methods.series import is_slow, series_orbits
+from asperity.orbit.methods.series import follows_steady_sliding, series_orbits
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
@@ -266,8 +266,7 @@ def search_orbits(
         for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
             keep(some, orbits)
 
-    rows = left()
-    slow = rows[is_slow(take(problem, rows))]
+    slow = follows_steady_sliding(problem, left())
     series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0])
     read = partial(_numbers, harmonics=harmonics)
     for some, numbers in run_chunks(

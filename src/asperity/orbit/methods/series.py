@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
+from asperity.orbit.batches import FEW, Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import adiabatic_states, even_phases
+from asperity.theory.adiabatic import adiabatic_growth, adiabatic_states, even_phases
 
 Float = NDArray[np.float64]
 
@@ -90,9 +90,15 @@ class FourierSeries(Method):
         return solution
 
 
-def is_slow(problem: Problem) -> NDArray[np.bool_]:
-    """Whether modulation is slower than the relaxation of steady sliding, shape (points,)."""
-    return np.asarray(steady_sliding(problem)[0] >= _SLOW)
+def follows_steady_sliding(problem: Problem, index: Indices) -> Indices:
+    """The points of `index` at which a slider follows a modulation slower than its relaxation.
+
+    Steady sliding is stable at all phases there. Where it is not, the slider may leave the orbit of
+    a series for slip events, and the motion decides which orbit is the one that is measured.
+    """
+    slow = index[steady_sliding(take(problem, index))[0] >= _SLOW] if len(index) else index
+    growths = run_chunks(adiabatic_growth, (problem,), slow, FEW)
+    return np.concatenate([slow[:0], *(part[growth == 0] for part, growth in growths)])
 
 
 def series_orbits(
