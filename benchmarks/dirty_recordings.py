@@ -1,10 +1,13 @@
 """Fits to recordings with defects: how many answers are right, flagged, or wrong without a word.
 
     python -m benchmarks.dirty_recordings [--sets 50] [--kind spikes] [--out rows.jsonl]
+    python -m benchmarks.dirty_recordings --kind jump --without jumps
 
 The recordings are those of `benchmarks.coverage` with one kind of defect each, of a size drawn over
 a decade or more. An answer is wrong where a parameter is more than four standard errors off the
-truth, and flagged where the fit warns of anything, or refuses.
+truth, and flagged where the fit warns of anything, or refuses. ``--without`` leaves out one step of
+the cleaning, ``--rate`` samples faster: recordings of more than 20,000 samples are averaged, and
+lines are removed from those alone.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from scipy.signal import lfilter
 
 from asperity.errors import InputError
 from asperity.inference import fit, recorded_run
+from asperity.inference.runs import blocks, cleaning
 from asperity.recording import Channel, Trace
 from benchmarks.coverage import CASES, LOAD, LOAD_NOISE, NOISE, Case, coloured, friction
 
@@ -182,6 +186,14 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
     return row
 
 
+#: Steps of the cleaning that ``--without`` leaves out: where each is called, and what replaces it.
+STEPS: dict[str, tuple[Any, str, Any]] = {
+    "spikes": (cleaning, "spikes", lambda values: np.empty(0, np.intp)),
+    "jumps": (cleaning, "find_jumps", lambda values, stretches: []),
+    "lines": (blocks, "find_lines", lambda values, step, lowest: []),
+}
+
+
 def line_of(kind: str, rows: list[dict[str, Any]]) -> str:
     """A row of the table."""
     refused = sum("refused" in r for r in rows)
@@ -195,7 +207,8 @@ def line_of(kind: str, rows: list[dict[str, Any]]) -> str:
         inside = [v for r in these for v in r["covered"].values()]
         return f"{100 * np.mean(inside):.1f}" if inside else ""
 
-    cells = (len(rows), refused, sum(flagged), sum(wrong), silent, cover(done), cover(ok))
+    width = f"{100 * np.median([v for r in done for v in r['se'].values()]):.1f}" if done else ""
+    cells = (len(rows), refused, sum(flagged), sum(wrong), silent, cover(done), cover(ok), width)
     return f"| {kind} | " + " | ".join(map(str, cells)) + " |"
 
 
@@ -206,13 +219,19 @@ def main() -> None:
     parser.add_argument("--kind", choices=list(KINDS), action="append")
     parser.add_argument("--case", choices=list(CASES), action="append")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rate", type=float, default=10.0, help="samples a second")
+    parser.add_argument("--without", choices=list(STEPS), help="a step of the cleaning")
     parser.add_argument("--out", type=Path, help="file for a line of JSON for each recording")
     chosen = parser.parse_args()
     names = chosen.case or list(CASES)
-    cases = {name: replace(CASES[name]) for name in names}
+    cases = {name: replace(CASES[name], rate=chosen.rate) for name in names}
+    if chosen.without:
+        room, function, nothing = STEPS[chosen.without]
+        setattr(room, function, nothing)
     exact = {n: friction(c, np.arange(int(c.end * c.rate)) / c.rate) for n, c in cases.items()}
-    print("| kind | recordings | refused | flagged | wrong | wrong, no word | 95 % | of those ok |")
-    print("|---|---|---|---|---|---|---|---|")
+    columns = ("kind", "recordings", "refused", "flagged", "wrong", "wrong, no word")
+    columns += ("95 %", "of those ok", "SE, %")
+    print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     for kind in chosen.kind or list(KINDS):
         rows = []
         for k in range(chosen.sets):

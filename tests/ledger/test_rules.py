@@ -104,6 +104,22 @@ def test_a_formula_of_printed_numbers(formula, expected):
     assert rules.formula_value(formula, numbers, "x") == pytest.approx(expected, rel=1e-15)
 
 
+def test_a_formula_names_terms_of_the_model():
+    terms = {"law": {"n": 2.0}, "power": lambda law, x: x ** law["n"], "slow": 3}
+    value = rules.formula_value("-abs(power(law, slow) - a)", {"a": 10.0}, "x", terms)
+    assert value == -1.0
+    for wrong in (
+        "power(law)",
+        "power",
+        "law",
+        "power(a, slow)",
+        "power(law, slow).n",
+        "(slow)[0]",
+    ):
+        with pytest.raises(InputError, match=r"x must be a (formula|number)"):
+            rules.formula_value(wrong, {"a": 10.0}, "x", terms)
+
+
 @pytest.mark.parametrize("formula", ["a b", "__import__('os')", "a.b", "1/0", "[a]", "ln(0)", ""])
 def test_what_is_no_formula_of_printed_numbers_is_refused(formula):
     with pytest.raises(InputError, match=r"x.values must be a (formula|number)"):

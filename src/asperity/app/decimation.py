@@ -1,41 +1,19 @@
-"""Long curves in few points: the extremes of blocks of equally many samples."""
+"""Curves as the page draws them: in few points, of few digits."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.recording.extremes import extremes
+
 Array = NDArray[np.float64]
 
 
-def extremes(x: Array, y: Array, blocks: int) -> dict[str, Array]:
-    """The smallest and the largest sample of each block, in order of time.
-
-    Parameters
-    ----------
-    x, y : array, shape (n,)
-    blocks : int
-        A curve with fewer than four samples per block is returned whole.
-
-    Returns
-    -------
-    dict
-        ``x`` and ``y``, of at most 2 `blocks` + 2 points; NaN where all samples of a block are.
-    """
-    length = -(-y.size // blocks)
-    if length < 4:
-        return {"x": _rounded(x), "y": _rounded(y)}
-    whole = y.size // length * length
-    table = y[:whole].reshape(-1, length)
-    low = np.argmin(np.where(np.isnan(table), np.inf, table), axis=1)
-    high = np.argmax(np.where(np.isnan(table), -np.inf, table), axis=1)
-    first = np.arange(0, whole, length)
-    pair = np.sort(np.stack([first + low, first + high], axis=1), axis=1).ravel()
-    remainder = y[whole:]
-    if remainder.size and not np.isnan(remainder).all():
-        ends = sorted({whole + int(np.nanargmin(remainder)), whole + int(np.nanargmax(remainder))})
-        pair = np.concatenate([pair, ends])
-    return {"x": _rounded(x[pair]), "y": _rounded(y[pair])}
+def thinned(x: Array, y: Array, blocks: int) -> dict[str, Array]:
+    """The `asperity.recording.extremes` of a curve as ``x`` and ``y``."""
+    kept = extremes(y, blocks)
+    return {"x": _rounded(x[kept]), "y": _rounded(y[kept])}
 
 
 def _rounded(values: Array) -> Array:

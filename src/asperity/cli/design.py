@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,19 +58,16 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
     with bar("step", "design") as update:
         result = inference.design(checked, simulate=simulate, progress=update)
     if target is not None:
-        with written_file(target) as fresh:
-            fresh.write_text(_csv(result), encoding="utf-8")
+        rows = result.rows()
+        with (
+            written_file(target) as fresh,
+            fresh.open("w", encoding="utf-8", newline="") as stream,
+        ):
+            writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
     output.answer(result.record, lambda: _sections(result), checked.truth.law.name)
     return 0
-
-
-def _csv(result: Design) -> str:
-    rows = result.rows()
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def _sections(result: Design) -> list[Section]:

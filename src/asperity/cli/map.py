@@ -120,26 +120,19 @@ def map(
 
 
 def _record(dataset: xarray.Dataset, out: Path | None) -> dict[str, Any]:
+    from asperity.study.map.dataset import boundary_lines
+
     converged = dataset["converged"].values
     stable = int(dataset["stable"].values.sum())
-    sides = (dataset.attrs["x"], dataset.attrs["y"])
-    number = dataset["boundary_line"].values
-    kinds = dataset["boundary_kind"].values.astype(str)
-
-    def line(index: Any) -> dict[str, Any]:
-        values = {name: dataset[f"boundary_{name}"].values[index].tolist() for name in sides}
-        frequency = dataset["boundary_mode_frequency"].values[index].tolist()
-        return {**values, "kind": kinds[index].tolist(), "mode_frequency": frequency}
-
     return {
         "points": int(converged.size),
         "stable": stable,
         "unstable": int(converged.sum()) - stable,
         "failed": int((~converged).sum()),
-        "x": sides[0],
-        "y": sides[1],
-        "boundaries": [line(number == k) for k in range(number.max(initial=-1) + 1)],
-        "boundary_not_found": int((number < 0).sum()),
+        "x": dataset.attrs["x"],
+        "y": dataset.attrs["y"],
+        "boundaries": boundary_lines(dataset),
+        "boundary_not_found": int((dataset["boundary_line"].values < 0).sum()),
         "boundary_unresolved_chords": int(dataset.attrs["boundary_unresolved_chords"]),
         "out": str(out),
     }

@@ -19,7 +19,7 @@ from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.laws import Law
 from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
-from asperity.slider import Slider
+from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import flatten
 from asperity.theory.memory import steady_growth
 from asperity.transients.batch import End
@@ -342,7 +342,7 @@ def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float)
 
 def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
     """Whether a small disturbance of steady sliding dies out."""
-    run = lambda *arguments: steady_growth(*arguments[:2])  # noqa: E731
+    run = lambda slider, V, *_: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
     return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
 
 

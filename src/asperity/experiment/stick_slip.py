@@ -6,19 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.algebra.small_systems import jacobian_columns
 from asperity.errors import require
 from asperity.experiment.labelled import Labelled, measured, shaped
-from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn
-from asperity.slider import Motion, Slider, equation_of_motion
+from asperity.slider import Slider, equation_of_motion
 from asperity.slider.problem import flatten
+from asperity.theory.memory import steady_growth
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 Float = NDArray[np.float64]
@@ -154,17 +152,8 @@ def stick_slip_response(
         **{name: of(name) for name in (*numbers, "peak_velocity")},
         "slips": of("slips", int),
         "steady": of("end", object) == CycleEnd.STEADY,
-        "stable": _stable(motion),
+        "stable": np.asarray(steady_growth(motion)) < 0,
         "result": of("result", object),
     }
     shown = {name: shaped(a, shape) for name, a in columns.items()}
     return StickSlip(slider=slider, cycle=cycles[0] if len(cycles) == 1 else None, **shown)
-
-
-def _stable(motion: Motion) -> NDArray[np.bool_]:
-    """Whether a small disturbance of steady sliding dies out, at each point."""
-    steady = motion.steady()
-    at = Excitation(jnp.ones(steady.shape[1]))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), steady)
-    jacobian = np.moveaxis(np.stack(columns, axis=1), -1, 0)
-    return np.asarray(np.linalg.eigvals(jacobian).real.max(-1) < 0)

@@ -8,30 +8,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from asperity._lazy import lazy_names
-from asperity.figures.style import COLOURS, DASHES
+from asperity.figures.style import COLOURS
 
 if TYPE_CHECKING:
     from asperity.figures.map import draw_plane
-    from asperity.figures.plot import Plot
-    from asperity.figures.style import new_figure, save_picture, save_table
+    from asperity.figures.style import new_figure
 
-_HOMES = {
-    "Plot": "plot",
-    "draw_plane": "map",
-    "new_figure": "style",
-    "save_picture": "style",
-    "save_table": "style",
-}
+_HOMES = {"draw_plane": "map", "new_figure": "style"}
 
-__all__ = [
-    "COLOURS",
-    "DASHES",
-    "Plot",
-    "draw_plane",
-    "new_figure",
-    "save_picture",
-    "save_table",
-]
+__all__ = ["COLOURS", "draw_plane", "new_figure"]
 
 
 __getattr__ = lazy_names(__name__, _HOMES)

@@ -20,6 +20,7 @@ from asperity.figures.style import (
     new_figure,
 )
 from asperity.measurement.record import mean_cycle, residual_spectrum
+from asperity.recording.extremes import extremes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Number of columns of a long curve, about the number of pixels.
+#: Number of blocks of a long curve, about the number of pixels.
 _COLUMNS = 1200
 _POINTS = 20_000
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
@@ -179,7 +180,7 @@ def _since(start: float) -> str:
 
 
 def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
-    """A curve; a long curve is reduced to its extremes in columns of equal width.
+    """A curve; a long curve is reduced to the extremes of blocks of its samples.
 
     Nothing is drawn between samples that are far apart.
     """
@@ -187,22 +188,12 @@ def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> 
     for first, stop in pairwise([0, *breaks, x.size]):
         part_x, part_y = x[first:stop], y[first:stop]
         if y.size > _POINTS:
-            kept = _extremes(part_x, part_y, (x[-1] - x[0]) / _COLUMNS)
+            kept = extremes(part_y, max(_COLUMNS * part_y.size // y.size, 1))
             part_x, part_y = part_x[kept], part_y[kept]
         marker = "." if part_x.size == 1 else None
         axis.plot(part_x, part_y, color=color, linewidth=0.6, marker=marker, markersize=1)
     formatter = ScalarFormatter(useOffset=False)
     axis.yaxis.set_major_formatter(formatter)
-
-
-def _extremes(x: Array, y: Array, width: float) -> NDArray[np.intp]:
-    """First, last, smallest and largest sample of every column of a width, in their order."""
-    column = np.floor((x - x[0]) / width) if width > 0 else np.zeros(x.size)
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0]))
-    stops = np.append(starts[1:], y.size)
-    length = np.repeat(np.arange(starts.size), stops - starts)
-    order = np.lexsort((y, length))
-    return np.unique(np.concatenate([starts, stops - 1, order[starts], order[stops - 1]]))
 
 
 def _gaps(time: Array) -> list[int]:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from asperity.figures.plot import NORMAL
 from asperity.figures.recording import band
 from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, letter_panels, new_figure
+from asperity.measurement.record import middle_events
 from asperity.measurement.stick_slip.regimes import REPEATED
 
 if TYPE_CHECKING:
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
-#: Number of enlarged events.
-_CLOSE = 8
 #: Of the series of a campaign, in turn.
 _MARKS = "osD^vP"
 
@@ -70,15 +69,8 @@ def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
         axis.set_axis_off()
         axis.text(0.5, 0.5, "no events", transform=axis.transAxes, ha="center")
         return
-    first = max((len(events) - _CLOSE) // 2, 0)
-    last = min(first + _CLOSE, len(events)) - 1
-    around = (float(events.end[last]) - float(events.onset[first])) / (2 * _CLOSE)
-    around = max(around, float(events.slip_duration[first]))
-    near = (measurement.time >= events.onset[first] - around) & (
-        measurement.time <= events.end[last] + around
-    )
+    shown, near = middle_events(measurement)
     band(axis, measurement.time[near] - start, measurement.friction[near], color=GREY)
-    shown = slice(first, last + 1)
     axis.plot(
         np.stack([events.onset[shown], events.end[shown]]) - start,
         np.stack([events.force_before[shown], events.force_after[shown]]),

@@ -8,13 +8,12 @@ from asperity.ledger.claims import (
     Claim,
     Headline,
     Sensitivity,
-    Verdict,
     altered,
     check,
     find_checks,
     judge_claims,
 )
-from asperity.ledger.contents import KINDS, Contents, Kind
+from asperity.ledger.contents import KINDS, Contents
 from asperity.ledger.figures import (
     FigureNumbers,
     FigureTable,
@@ -28,13 +27,12 @@ from asperity.ledger.markup import rich, table
 from asperity.ledger.paper import Paper, available, find_paper
 from asperity.ledger.recipe import RecipeNumber, RecipeResult, read_columns
 from asperity.ledger.report import ReproductionSummary, reproduce
-from asperity.ledger.rules import WORDS, AcceptanceRule
+from asperity.ledger.rules import AcceptanceRule
 from asperity.ledger.sentences import fill
 
 __all__ = [
     "KINDS",
     "VERDICTS",
-    "WORDS",
     "AcceptanceRule",
     "Claim",
     "Contents",
@@ -42,7 +40,6 @@ __all__ = [
     "FigureTable",
     "FigureWords",
     "Headline",
-    "Kind",
     "Paper",
     "PaperFigure",
     "RecipeNumber",
@@ -51,7 +48,6 @@ __all__ = [
     "Section",
     "Sensitivity",
     "TabFigure",
-    "Verdict",
     "altered",
     "available",
     "check",

@@ -335,12 +335,15 @@ def judge_claims(
 def computed_numbers(
     entry: Entry, checks: Mapping[str, Check], model: Any, numbers: Material
 ) -> Computed:
-    """The numbers of a claim, by its formulas or by its check."""
+    """The numbers of a claim, by its formulas or by its check.
+
+    A model may have ``terms``, further names of its formulas.
+    """
     if not entry.values:
         return checks[entry.id](model)
-    printed = printed_numbers(numbers)
+    printed, terms = printed_numbers(numbers), getattr(model, "terms", {})
     return {
-        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}")
+        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms)
         for name, formula in entry.values.items()
     }
 

@@ -76,8 +76,8 @@ class Entry(Record):
     computed : str
         Sentence with the numbers of the check, see `asperity.ledger.sentences`.
     values : mapping of str to str
-        Formulas of the paper's printed numbers, by the names of their results, in place of a
-        check; see `asperity.ledger.rules.formula_value`.
+        Formulas of the paper's printed numbers and of the ``terms`` of its model, by the names of
+        their results, in place of a check; see `asperity.ledger.rules.formula_value`.
     judged : tuple of str
         Names of the numbers that the rule judges, ``*`` standing for any text: every one of them
         has to pass. All by default. A rule on a formula judges ``printed``, ``independent`` and,

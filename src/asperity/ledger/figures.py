@@ -19,7 +19,9 @@ from pydantic import ConfigDict, Field
 
 from asperity.errors import InputError
 from asperity.figures.plot import Panel, Plot
+from asperity.ledger.claims import printed_numbers
 from asperity.ledger.contents import read_words
+from asperity.ledger.rules import formula_value
 from asperity.ledger.sentences import fill
 from asperity.questions.record import Question, Record
 
@@ -147,6 +149,9 @@ class FigureWords(Record):
         Title on the browser page; that above by default.
     numbers : tuple of str
         The paper's numbers that the figure rests on, with which the browser page moves it.
+    scalars, quoted : mapping of str to str
+        Formulas (`asperity.ledger.rules.formula_value`) of the numbers that are read off the
+        curves, and of further ones that the words or the picture quote.
     plot : Plot
         Description of the figure; without it a function of the paper draws.
     """
@@ -157,6 +162,8 @@ class FigureWords(Record):
     alt: str
     short: str = ""
     numbers: tuple[str, ...] = ()
+    scalars: Mapping[str, str] = Field(default_factory=dict)
+    quoted: Mapping[str, str] = Field(default_factory=dict)
     plot: Plot | None = None
 
     @cached_property
@@ -164,6 +171,22 @@ class FigureWords(Record):
         """The quantities that measured points can be drawn on."""
         panels = () if self.plot is None else self.plot.panel
         return {p.y: (n, p) for n, p in enumerate(panels) if "/" not in p.y and not p.less}
+
+    def values(self, numbers: Material, terms: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
+        """The numbers of `scalars` and of `quoted`.
+
+        Parameters
+        ----------
+        numbers : Material
+            The paper's numbers.
+        terms : mapping of str to object
+            Further names of the formulas.
+        """
+        printed = printed_numbers(numbers)
+        return tuple(
+            {n: formula_value(f, printed, f"figures.{n}", terms) for n, f in formulas.items()}
+            for formulas in (self.scalars, self.quoted)
+        )
 
     def draw(self, numbers: FigureNumbers) -> Figure:
         """The picture; the style must be active."""

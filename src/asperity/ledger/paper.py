@@ -8,7 +8,8 @@ NAME = "package". It holds
 - ``checks``, a module or package: one function for each claim without formulas (``values``),
   marked with `asperity.ledger.check`, from the paper's numbers to computed numbers by name. A
   function ``model`` there, if any, turns the paper's numbers into what the checks are given, so
-  that they can share what is computed once;
+  that they can share what is computed once; its attribute ``terms``, if any, maps names to
+  functions and objects that formulas may use;
 - ``figures.toml``: titles, captions and alternative texts of its figures, and what is drawn;
 - ``figures``, a module or package: ``FIGURES``, functions that return a
   `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of
@@ -136,11 +137,11 @@ class Paper:
         return judge_claims(
             self.contents,
             {
-                name: _guarded(check, f"{where}, the check of '{name}'")
+                name: code_of_others(f"{where}, the check of '{name}'")(check)
                 for name, check in find_checks(module).items()
             },
             self.numbers,
-            _guarded(model, f"{where}.model"),
+            code_of_others(f"{where}.model")(model),
             sensitivity=sensitivity,
             progress=progress,
         )
@@ -194,16 +195,6 @@ def find_paper(name: str | None = None) -> Paper:
     return Paper(name, papers[name])
 
 
-def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
-    """A function of a paper whose exceptions become `InputError`."""
-
-    def run(*arguments: Any) -> Any:
-        with code_of_others(what):
-            return function(*arguments)
-
-    return run
-
-
 def _guarded_section(section: Any, where: str) -> Section:
     """A section of a paper; exceptions of its computations and drawings become `InputError`."""
     checked: Section = of_type(section, Section, where)
@@ -214,9 +205,7 @@ def _guarded_figure(compute: Callable[[], Any], where: str) -> Callable[[], Pape
     name = f"{where}.{getattr(compute, '__name__', 'figure')}"
 
     def run() -> PaperFigure:
-        with code_of_others(name):
-            made = compute()
-        figure: PaperFigure = of_type(made, PaperFigure, name)
-        return replace(figure, draw=_guarded(figure.draw, f"{name}, draw"))
+        figure: PaperFigure = of_type(code_of_others(name)(compute)(), PaperFigure, name)
+        return replace(figure, draw=code_of_others(f"{name}, draw")(figure.draw))
 
     return run

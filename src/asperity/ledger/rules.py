@@ -36,8 +36,9 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, code_of_others
 
 #: Relative tolerance of "about".
 ABOUT = 0.05
@@ -148,11 +149,18 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_FUNCTIONS: Mapping[str, Callable[[float], float]] = {"sqrt": math.sqrt, "ln": math.log}
+_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt, "ln": math.log, "abs": abs
+}  # fmt: skip
 
 
-def formula_value(formula: str, numbers: Mapping[str, float], place: str) -> float:
-    """The value of a formula with + - * / **, sqrt, ln, pi and the paper's numbers.
+def formula_value(
+    formula: str,
+    numbers: Mapping[str, float],
+    place: str,
+    terms: Mapping[str, Any] | None = None,
+) -> float:
+    """The value of a formula with + - * / **, sqrt, ln, abs, pi and the paper's numbers.
 
     Parameters
     ----------
@@ -162,33 +170,38 @@ def formula_value(formula: str, numbers: Mapping[str, float], place: str) -> flo
         From `asperity.ledger.claims.printed_numbers`.
     place : str
         Of the formula, for messages.
+    terms : mapping of str to object, optional
+        Further names: functions, and what they are given.
 
     Raises
     ------
     InputError
         If it is no such formula, or names something else.
     """
+    known = {**_FUNCTIONS, **(terms or {})}
 
-    def value(node: ast.expr) -> float:
+    def value(node: ast.expr) -> Any:
         match node:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
                 return _OPERATIONS[type(op)](value(left), value(right))
-            case ast.Call(func=ast.Name(id=name), args=[inner]) if name in _FUNCTIONS:
-                return _FUNCTIONS[name](value(inner))
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -value(inner)
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in known:
+                return known[name](*map(value, args))
             case ast.Constant(value=int() | float() as constant):
                 return float(constant)
+            case ast.Constant(value=str() as text):
+                return text
+            case ast.Name(id=name) if name in known:
+                return known[name]
             case ast.Name() | ast.Attribute():
                 name = re.sub(r"_(?=$|\.)", "", ast.unparse(node))
                 return number(name, {**numbers, "pi": math.pi}, place)
-        raise SyntaxError
+        raise SyntaxError(f"'{ast.unparse(node)}' is neither a number nor a known name")
 
-    try:
-        return value(ast.parse(formula, mode="eval").body)
-    except (SyntaxError, ArithmeticError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
-        raise InputError(place, rule, f"'{formula}'", advice) from None
+    rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
+    with code_of_others(place, rule, advice, f"'{formula}'"):
+        return float(value(ast.parse(formula, mode="eval").body))
 
 
 #: Rules that claims.toml may name, with the names of their numbers in the order of arguments.

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.series import MeanLevel
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
     from asperity.measurement.verdicts.verdict import Check
 
 CONVENTIONS = (
@@ -273,3 +274,17 @@ def residual_spectrum(measurement: Measurement) -> tuple[Array, Array]:
     top = min(frequency[-1], (order.size + 1) * reading.frequency)
     shown = (frequency > frequency[1]) & (frequency <= top)
     return frequency[shown], amplitude[shown]
+
+
+#: Number of enlarged events.
+_CLOSE = 8
+
+
+def middle_events(measurement: StickSlipMeasurement) -> tuple[slice, NDArray[np.bool_]]:
+    """Some events in the middle of a recording, and the samples around them, for a picture."""
+    time, events = measurement.time, measurement.events
+    first = max((len(events) - _CLOSE) // 2, 0)
+    last = min(first + _CLOSE, len(events)) - 1
+    begin, end = float(events.onset[first]), float(events.end[last])
+    around = max((end - begin) / (2 * _CLOSE), float(events.slip_duration[first]))
+    return slice(first, last + 1), (time >= begin - around) & (time <= end + around)

@@ -7,7 +7,6 @@ after an interruption.
 
 from asperity.outputs.targets import (
     free_disk,
-    free_memory,
     output_file,
     output_files,
     require_disk,
@@ -30,7 +29,6 @@ __all__ = [
     "UnfinishedText",
     "differences",
     "free_disk",
-    "free_memory",
     "output_file",
     "output_files",
     "require_disk",

@@ -23,13 +23,12 @@ from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require
 from asperity.parameters.arguments import FilePath, typed
 from asperity.protocol.protocol import Protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
+from asperity.slider import Slider, equation_of_motion
 from asperity.theory import closed_forms as cf
 from asperity.transients import Checkpoint, Trajectory, integrate_blocks
 
 if TYPE_CHECKING:
     import xarray
-
-    from asperity.protocol.protocol import Protocol, load_protocol
 
 
 #: Growth per slip distance (1/m) that counts as zero, far below that of any interface.
@@ -76,29 +75,19 @@ def stability_statement(protocol: Protocol) -> str:
 
 def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     """The sentence from the growth rate of a small disturbance of steady sliding."""
-    import jax
-    import numpy as np
-
-    from asperity.slider import Slider
-    from asperity.slider.problem import checked_problem, flatten
+    from asperity.slider.problem import flatten
+    from asperity.theory.memory import steady_growth
 
     law, level = protocol.slider.law, protocol.programme.level
     if not law.rate_dependent:
         return ""
     eta = numbers.get("eta", 0.0)
-    problem = checked_problem(
-        Slider(law, spring=numbers["K"], load=level.load, mass=numbers.get("M", 0.0)),
-        velocity=[level.velocity],
-        epsilon=0.0,
-        frequency=1 / (2 * math.pi),
-        inertia=protocol.solver.inertia,
-        radiation_damping=eta if eta > 0 else None,
+    slider = Slider(law, spring=numbers["K"], load=level.load, mass=numbers.get("M", 0.0))
+    (flat, V), _ = flatten((slider, np.array([level.velocity])), "start")
+    motion = equation_of_motion(
+        flat, V, np.ones(1), inertia=protocol.solver.inertia, eta=eta if eta > 0 else None
     )
-    system, load = flatten(problem)[0]
-    at = load.at(np.zeros(1))
-    # At 1 rad/s a radian is a second.
-    J = jax.jacfwd(lambda y: system.rates(y[:, None], at)[:, 0])(system.steady()[:, 0])
-    rate = float(np.linalg.eigvals(np.asarray(J)).real.max())
+    rate = float(steady_growth(motion)[0])
     if not rate > _ROUND_OFF * level.velocity:
         return ""
     return (

@@ -33,7 +33,7 @@ from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.loads import Excitation
 from asperity.parameters import obeying
 from asperity.parameters.arguments import number, typed
-from asperity.slider import QuasiStatic, Slider
+from asperity.slider import Motion, QuasiStatic, Slider
 
 Float = NDArray[np.float64]
 
@@ -110,20 +110,21 @@ def _growth(law: Law, V: float, k: Float) -> Float:
     """Growth rate of a small disturbance of steady sliding, at stiffnesses `k`."""
     wide = jax.tree.map(lambda a: np.broadcast_to(np.asarray(a, float), k.shape), law)
     slider = Slider(wide, spring=k, load=np.ones_like(k))
-    return np.asarray(steady_growth(slider, np.full(k.shape, V)))
+    return np.asarray(steady_growth(QuasiStatic(slider, np.full(k.shape, V), 1.0)))
 
 
 @jax.jit
-def steady_growth(slider: Slider, V: Array) -> Array:
-    """Growth rate of a small disturbance of steady sliding without inertia, over its phase.
+def steady_growth(motion: Motion) -> Array:
+    """Growth rate of a small disturbance of steady sliding.
 
     Parameters
     ----------
-    slider : Slider
-        Parameters of shape (points,), as `V` (m/s).
+    motion : Motion
+        Numbers of shape (points,). At 1 rad/s the rate is one per second.
     """
-    motion, at = QuasiStatic(slider, V, 1.0), Excitation(jnp.ones_like(V))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
+    steady = motion.steady()
+    at = Excitation(jnp.ones(steady.shape[1]))
+    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), steady)
     return spectral_abscissa(jnp.stack(columns, axis=1))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,6 +14,7 @@ from asperity import Slider, periodic_response
 from asperity.ledger import FigureNumbers, figure_words
 from asperity_papers.bureau2000.machine import (
     EXT,
+    FAST,
     PAPER,
     SLOW,
     Float,
@@ -181,18 +183,53 @@ class CurveFigure:
         The curves, from the machine.
     read : function
         From the machine and the solved curves to the numbers for the head of the table, and
-        further ones that the caption quotes.
+        further ones that the caption quotes: those that figures.toml has no formula of.
     """
 
     name: str
     curves: Callable[[Machine], Iterable[FigureCurve]]
-    read: Callable[[Machine, FigureNumbers], tuple[dict[str, float], dict[str, float]]]
+    read: Callable[[Machine, FigureNumbers], tuple[dict[str, float], dict[str, float]]] = (
+        lambda machine, read: ({}, {})
+    )
 
     def __call__(self, machine: Machine) -> FigureNumbers:
         """Solve the curves, and read the numbers off them."""
         data = solve_curves(machine, self.curves(machine))
-        scalars, quoted = self.read(machine, FigureNumbers(self.name, data))
+        read = FigureNumbers(self.name, data)
+        values = WORDS.figures[self.name].values(machine.numbers, _terms(machine, read))
+        scalars, quoted = map(operator.or_, values, self.read(machine, read))
         return figure_numbers(machine, self.name, data, scalars, quoted=quoted)
+
+
+def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """What formulas of figures.toml may name: quantities at a curve's end or at eps = 0.5."""
+
+    def amplitude(curve: str, column: str, value: float) -> float:
+        """Where a falling quantity has a value."""
+        rows = read.curve(curve)
+        return float(np.interp(-value, -rows[column], rows[BORNE]))
+
+    return {
+        **machine.terms,
+        "slow": SLOW,
+        "fast": FAST,
+        **{name: name for name in ("delta_mu", "mu1", "mu2")},
+        "last": read.last,
+        "at": lambda curve, column: read.at(curve, column, machine.strongest, BORNE),
+        "amplitude": amplitude,
+        "late_over_early": lambda curve, column: late_over_early_slope(read, curve, column),
+        "mu": machine.mu_ss,
+        "strongest": machine.strongest,
+        "elastic_slope": machine.elastic_slope,
+    }
+
+
+def late_over_early_slope(numbers: FigureNumbers, curve: str, column: str) -> float:
+    """Slope of a curve in its last tenth over its mean slope; small where it saturates."""
+    rows = numbers.curve(curve)
+    x, y = rows[BORNE].to_numpy(), rows[column].to_numpy()
+    tenth = len(x) // 10
+    return float((y[-1] - y[-1 - tenth]) / (x[-1] - x[-1 - tenth]) / (y[-1] / x[-1]))
 
 
 def curve_figure(
@@ -212,15 +249,13 @@ def figure_numbers(
     points: pd.DataFrame | None = None,
 ) -> FigureNumbers:
     """A figure with curves, and what the text states for its captions and marks."""
-    seen = machine.stated()
     stated = {
-        "share": seen.share,
-        "epsilon_eff at 0.5": seen.epsilon_eff,
-        "collapse": seen.collapse,
+        "share": machine.share,
+        "epsilon_eff at 0.5": machine.strongest,
+        "collapse": 1 / machine.numbers.collapse_divisor_200Hz,
         "onset": machine.numbers.epsilon_onset,
     }
-    pairs = {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2, "ratio": seen.ratio}
-    for quantity, pair in pairs.items():
+    for quantity, pair in machine.stated().items():
         stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
     return FigureNumbers(name, data, scalars, stated | dict(quoted or {}), points)
 
@@ -243,9 +278,3 @@ def variations(machine: Machine) -> dict[str, dict[str, float]]:
         ends[f"B {word}"] = {"B": machine.ends_of("B")[k]}
         ends[f"lambda {word}"] = {"lambda_": machine.ends_of("lambda_quasi_static")[k]}
     return ends
-
-
-def band_ends(machine: Machine, numbers: FigureNumbers, column: str) -> dict[str, float]:
-    """Value at eps = 0.5 and the slow velocity for each end of `variations`."""
-    at = machine.strongest
-    return {end: numbers.at(f"{SLOW}, {end}", column, at, BORNE) for end in variations(machine)}

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, TypeVar
+from functools import cache, cached_property
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,8 @@ PAPER = Paper("bureau2000", "asperity_papers.bureau2000")
 Float = NDArray[np.float64]
 Pair = tuple[float, float]
 Result = TypeVar("Result")
+#: A law with parameters that replace the paper's; None is the elasto-plastic one with inertia.
+Law: TypeAlias = tuple[str, dict[str, float]] | None
 
 RR, LD, EXT = "rice-ruina", "linker-dieterich", "elasto-plastic"
 #: The elasto-plastic law with the plastic velocity in the age law too, which the paper does not.
@@ -157,6 +159,12 @@ class Machine:
             effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=p.lambda_z, layer=layer)
         )
 
+    def elastic_slope(self, velocity: float) -> float:
+        """D mu1/d eps of the velocity-independent plateau, mu l/(1 + l) with l = lambda K/W0."""
+        slider = self.slider(EXT)
+        ratio = float(np.asarray(slider.law.elastic_length) * slider.K / slider.W0)
+        return float(slider.law.mu_ss(velocity)) * ratio / (1 + ratio)
+
     @property
     def nominal_radius(self) -> float:
         """Radius (m) of the disc of the stated area, 49 cm^2."""
@@ -227,11 +235,60 @@ class Machine:
             "mu2": float((without.mu2 / full.mu2)[0]) - 1,
         }
 
-    def velocity_exponent(self, values: Float, applied: float = STRONGEST) -> float:
-        """Logarithmic slope d ln y / d ln V between the two velocities, at one amplitude."""
-        slow, fast = at(np.abs(values), applied)
-        low, high = self.velocities
-        return float(np.log(fast / slow) / np.log(high / low))
+    @cached_property
+    def terms(self) -> dict[str, Any]:
+        """What formulas of claims.toml may name.
+
+        Observables take a law, ``slow`` or ``fast``, and an applied amplitude, eps = 0.5 by
+        default; ``exponent`` and the slopes take an observable first. ``borne`` takes a frequency
+        and an air layer: that of the appendix, one of the nominal area, one under a disc of some
+        radius, rarefied air, or the vacuum.
+        """
+        p, (low, high) = self.numbers, self.velocities
+
+        def observable(name: str) -> Callable[..., float]:
+            def value(law: Law, speed: int, applied: float = STRONGEST) -> float:
+                if law is None:
+                    pair: Pair = getattr(self.inertial_outputs(), name)
+                else:
+                    pair = at(getattr(self.curve(law[0], **law[1]), name), applied)
+                return pair[speed]
+
+            return value
+
+        def exponent(quantity: Any, law: Law, applied: float = STRONGEST) -> float:
+            """Logarithmic slope d ln y / d ln V between the two velocities."""
+            fast, slow = quantity(law, 1, applied), quantity(law, 0, applied)
+            return float(np.log(abs(fast / slow)) / np.log(high / low))
+
+        def slopes(quantity: Any, law: Law, speed: int) -> Float:
+            """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes."""
+            values = np.abs([quantity(law, speed, applied) for applied in APPLIED])
+            return np.diff(np.log(values)) / np.diff(np.log(APPLIED))
+
+        observables = {n: observable(n) for n in ("mu_ss", "delta_mu", "mu1", "mu2")}
+        return {
+            "slow": 0,
+            "fast": 1,
+            "RR": (RR, {}),
+            "LD": (LD, {}),
+            "EXT": (EXT, {}),
+            "LD_low": (LD, {"alpha": p.alpha_low}),
+            "AMONTONS": ("amontons", {}),
+            "EXT_inertia": None,
+            "vacuum": None,
+            **observables,
+            "drop": lambda *point: -observables["delta_mu"](*point),
+            "exponent": exponent,
+            "last_slope": lambda *curve: slopes(*curve)[-1],
+            "least_slope": lambda *curve: slopes(*curve).min(),
+            "borne": self.borne,
+            "stiffness": lambda layer: layer.stiffness,
+            "disc": lambda radius: self.air_layer(R=radius),
+            "air": self.air_layer(),
+            "nominal": self.air_layer(R=self.nominal_radius),
+            "rarefied": self.air_layer(P0=p.P_vacuum, R=self.nominal_radius),
+        }
 
     # --- Closed forms and the reference integration ----------------------------------------------
 
@@ -241,8 +298,7 @@ class Machine:
 
     def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
         """What the reference integration takes; rigid asperities, no inertia."""
-        numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
-        return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
+        return IntegratedPoint(**self._point(V, **overrides))
 
     def orbit(self, point: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
         """A periodic orbit of the reference integration, integrated once."""
@@ -258,18 +314,19 @@ class Machine:
 
     # --- What the text states --------------------------------------------------------------------
 
-    def stated(self) -> Stated:
-        """The statements of section II and of the captions, as numbers."""
+    def stated(self) -> dict[str, Pair]:
+        """Two numbers of each quantity as the text states them; none is read off a figure.
+
+        drop: "a typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is
+        named: -20 % of the friction coefficient at 1 and at 10 um/s. mu1: "of order 1e-3", half a
+        decade to either side. ratio: mu2/mu1. mu2: what both leave to it.
+        """
         p = self.numbers
-        half_decade = 10**0.5
         slow, fast = (-p.relative_drop * self.mu_ss(V) for V in self.velocities)
-        return Stated(
-            drops=(slow, fast),
-            mu1=(p.mu1_order / half_decade, p.mu1_order * half_decade),
-            ratio=p["mu2_over_mu1"].si_range or (0.0, 0.0),
-            share=self.share,
-            collapse=1 / p.collapse_divisor_200Hz,
-        )
+        low, high = p.mu1_order / 10**0.5, p.mu1_order * 10**0.5
+        ratio = self.range_of("mu2_over_mu1")
+        mu2 = low * ratio[0], high * ratio[1]
+        return {"drop": (slow, fast), "mu1": (low, high), "mu2": mu2, "ratio": ratio}
 
 
 @dataclass(frozen=True)
@@ -297,42 +354,6 @@ class Outputs:
         return self.mu2[0] / self.mu1[0], self.mu2[1] / self.mu1[1]
 
 
-@dataclass(frozen=True)
-class Stated:
-    """What the text says about the measurements; nothing here is read off a figure.
-
-    Attributes
-    ----------
-    drops : (float, float)
-        "A typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is named:
-        -20 % of the friction coefficient at 1 and at 10 um/s.
-    mu1 : (float, float)
-        "Of order 1e-3": half a decade to either side.
-    ratio : (float, float)
-        mu2/mu1.
-    share : float
-        eps_eff/eps at 120 Hz.
-    collapse : float
-        eps_eff in air over that in vacuum at 200 Hz (Fig. 5).
-    """
-
-    drops: Pair
-    mu1: Pair
-    ratio: Pair
-    share: float
-    collapse: float
-
-    @property
-    def epsilon_eff(self) -> float:
-        """Amplitude that the contacts bear at eps = 0.5."""
-        return STRONGEST * self.share
-
-    @property
-    def mu2(self) -> Pair:
-        """What "of order 1e-3" and "0.1 to 0.2 of it" leave to mu2."""
-        return self.mu1[0] * self.ratio[0], self.mu1[1] * self.ratio[1]
-
-
 def at(values: Float, applied: float = STRONGEST) -> Pair:
     """Entries of a curve at one applied amplitude, for the slow and the fast velocity."""
     slow, fast = values[:, APPLIED.index(applied)]
@@ -348,11 +369,6 @@ def relative(values: Pair) -> float:
 def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
     """Numbers at the two velocities by their names, with a prefix such as ``"mu1, "``."""
     return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
-
-
-def amplitude_slopes(values: Float) -> Float:
-    """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes, (2, n - 1)."""
-    return np.diff(np.log(np.abs(values))) / np.diff(np.log(APPLIED))
 
 
 def steady_growth(slider: Slider, V: ArrayLike) -> Float:

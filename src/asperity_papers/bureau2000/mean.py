@@ -10,16 +10,15 @@ from asperity.figures import COLOURS
 from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import (
     APPLIED,
-    BORNE,
     WORDS,
+    CurveFigure,
     FigureCurve,
-    band_ends,
     curve_figure,
     elastic_curves,
     speed_curves,
     with_inertia,
 )
-from asperity_papers.bureau2000.machine import EXT, RR, SLOW, SPEEDS, STRONGEST, Float, Machine
+from asperity_papers.bureau2000.machine import EXT, RR, SLOW, STRONGEST, Float, Machine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,17 +31,6 @@ _PER_DECADE = 12
 _TILT = 1180.0
 #: Curves of figure 5, with what bears the load.
 VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
-
-
-def drops(numbers: FigureNumbers, suffix: str = "") -> list[float]:
-    """Change of the mean at the largest amplitude, slow and fast."""
-    return [numbers.last(name + suffix, "delta_mu") for name in SPEEDS]
-
-
-def relative_drops(machine: Machine, numbers: FigureNumbers, suffix: str = "") -> list[float]:
-    """The same as a drop over the friction coefficient, in percent."""
-    pairs = zip(drops(numbers, suffix), machine.velocities, strict=True)
-    return [-100 * drop / machine.mu_ss(V) for drop, V in pairs]
 
 
 # --- Figure 2: change of the mean against eps at 120 Hz ------------------------------------------
@@ -61,25 +49,13 @@ def curves_2(machine: Machine) -> list[FigureCurve]:
 @curve_figure("figure-02", curves_2)
 def figure_2(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
     """Change of the mean against eps at 120 Hz."""
-    mu_slow = machine.mu_ss(machine.velocities[0])
-    slope, intercept, straightness = _straight_line(read, machine.numbers.epsilon_onset)
-    drop = drops(read)
-    relative = relative_drops(machine, read)
-    inertial = relative_drops(machine, read, ", inertia")
-    ends = band_ends(machine, read, "delta_mu")
+    slope, intercept, departure = _straight_line(read, machine.numbers.epsilon_onset)
     return {
-        "drop_slow": drop[0],
-        "drop_fast": drop[1],
-        "relative_drop_slow": relative[0] / 100,
-        "relative_drop_fast": relative[1] / 100,
-        "relative_drop_inertia_slow": inertial[0] / 100,
-        "relative_drop_inertia_fast": inertial[1] / 100,
-        **{f"drop {end}": value for end, value in ends.items()},
         "slope": slope,
         "intercept": intercept,
-        "departure_from_line": straightness,
+        "departure_from_line": departure,
         "transmission_air": machine.borne(machine.numbers.frequency, machine.air_layer()),
-    }, {f"relative drop A {end}": -ends[f"A {end}"] / mu_slow for end in ("low", "high")}
+    }, {}
 
 
 def _straight_line(read: FigureNumbers, onset: float) -> tuple[float, float, float]:
@@ -168,19 +144,8 @@ def curves_5(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-@curve_figure("figure-05", curves_5)
-def figure_5(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Change of the mean in air and in vacuum, at 200 Hz."""
-    p, (vacuum, air) = machine.numbers, vacuum_shares(machine)
-    disc, mu = machine.borne(p.frequency_vacuum, machine.air_layer()), machine.mu_ss(p.V_vacuum)
-    ends = {name: read.last(name, "delta_mu") for name in read.data["curve"].unique()}
-    percent = {f"relative drop {name}": -value / mu for name, value in ends.items()}
-    return {
-        "transmission_vacuum": vacuum,
-        "transmission_air": disc,
-        "air_over_vacuum": disc / vacuum,
-        **{f"drop {name}": value for name, value in ends.items()},
-    }, percent | {"transmission in air": air}
+#: Change of the mean in air and in vacuum, at 200 Hz.
+figure_5 = CurveFigure("figure-05", curves_5)
 
 
 # --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
@@ -191,16 +156,8 @@ def curves_6(machine: Machine) -> list[FigureCurve]:
     return speed_curves(machine, RR, machine.applied_amplitudes())
 
 
-@curve_figure("figure-06", curves_6)
-def figure_6(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Rice-Ruina: change of the mean against eps."""
-    drop, relative = drops(read), relative_drops(machine, read)
-    return {
-        "drop_slow": drop[0],
-        "drop_fast": drop[1],
-        "relative_drop_slow": relative[0] / 100,
-        "relative_drop_fast": relative[1] / 100,
-    }, {"slow over fast": drop[0] / drop[1] - 1, "points between": relative[0] - relative[1]}
+#: Rice-Ruina: change of the mean against eps.
+figure_6 = CurveFigure("figure-06", curves_6)
 
 
 def curves_7(machine: Machine) -> list[FigureCurve]:
@@ -208,16 +165,8 @@ def curves_7(machine: Machine) -> list[FigureCurve]:
     return curves_6(machine)[:1]
 
 
-@curve_figure("figure-07", curves_7)
-def figure_7(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop."""
-    data, drop = read.data, machine.stated().drops[0]
-    needed = float(np.interp(-drop, -data["delta_mu"], data[BORNE]))
-    return {
-        "drop_at_scaled": read.at(SLOW, "delta_mu", machine.strongest, BORNE),
-        "epsilon_needed": needed,
-        "share_needed": needed / STRONGEST,
-    }, {}
+#: Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop.
+figure_7 = CurveFigure("figure-07", curves_7)
 
 
 def draw_7(numbers: FigureNumbers) -> Figure:

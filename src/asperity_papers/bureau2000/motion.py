@@ -67,7 +67,7 @@ def one_period(
 
 def period_figure(machine: Machine) -> FigureNumbers:
     """One period at 0.5 of modulation and 1 um/s, with both age laws and with inertia."""
-    V, epsilon = machine.velocities[0], machine.stated().epsilon_eff
+    V, epsilon = machine.velocities[0], machine.strongest
     tables = [
         one_period(machine, law, V, epsilon, inertia=inertia) for law, inertia in PERIODS.values()
     ]

@@ -39,13 +39,8 @@ def _lines(figure: str, numbers: Material) -> list[dict[str, Any]]:
     machine = _machine(numbers)
     ends = tuple(f", {end}" for end in variations(machine))
     curves = [c for c in CURVES[figure](machine) if not (c.inertia or c.name.endswith(ends))]
-    values = [_fast_curve(machine, curve) for curve in curves]
-    for curve, columns in zip(curves, values, strict=True):
-        _fill_in(machine, curve, columns)
-    return [
-        {"name": curve.name.replace("um", "µm"), "values": {c: v[c] for c in _columns(figure)}}
-        for curve, v in zip(curves, values, strict=True)
-    ]
+    lines = [(curve.name.replace("um", "µm"), _fast_curve(machine, curve)) for curve in curves]
+    return [{"name": n, "values": {c: v[c] for c in _columns(figure)}} for n, v in lines]
 
 
 def _columns(figure: str) -> tuple[str, ...]:
@@ -53,7 +48,7 @@ def _columns(figure: str) -> tuple[str, ...]:
 
 
 def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
-    """Points of a line; NaN where the method that takes milliseconds finds none."""
+    """Points of a line, most of them by the method that takes milliseconds."""
     _check_share(curve)
     slider = machine.slider(curve.law, **curve.overrides)
     f = machine.numbers.frequency if curve.frequency is None else curve.frequency
@@ -66,33 +61,20 @@ def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
         "K": slider.K, "W0": slider.W0, "M": slider.M, "V": V, "frequency": frequency,
         "epsilon": curve.share * applied,
     }  # fmt: skip
-    response = function(
-        {
-            n: np.array(np.broadcast_to(np.asarray(values[n], float), V.shape))
-            for n in function.parameters
-        }
-    )
+    response = function({n: values[n] for n in function.parameters})
     mean = np.asarray(response.mean_friction)
     first, second = np.abs(np.asarray(response.harmonics)).T
     solved = np.asarray(response.outcome) == Outcome.CONVERGED
     columns = (mean, mean - np.asarray(law.mu_ss(V)), first, second)
+    solution = dict(zip(_SOLVED, map(np.array, columns), strict=True))
+    if not solved.all():
+        part = replace(curve, V=V[~solved], applied=applied[~solved])
+        rows = solve_curves(machine, [part], methods=("fourier",))
+        for column, x in solution.items():
+            x[~solved] = rows[column].to_numpy(float)
     return {
-        "V": V,
-        "epsilon_applied": applied,
-        "epsilon_eff": curve.share * applied,
-        **{n: np.where(solved, x, np.nan) for n, x in zip(_SOLVED, columns, strict=True)},
-    }
-
-
-def _fill_in(machine: Machine, curve: FigureCurve, values: dict[str, Any]) -> None:
-    """Solve for the points that the fast method leaves open."""
-    left = np.isnan(values["mean_friction"])
-    if not left.any():
-        return
-    part = replace(curve, V=values["V"][left], applied=values["epsilon_applied"][left])
-    rows = solve_curves(machine, [part], methods=("fourier",))
-    for column in _SOLVED:
-        values[column][left] = rows[column].to_numpy(float)
+        "V": V, "epsilon_applied": applied, "epsilon_eff": curve.share * applied, **solution
+    }  # fmt: skip
 
 
 @cache
@@ -131,15 +113,16 @@ def _inertial_line(figure: str, numbers: Material, name: str, progress: Any) -> 
 
 def _marks(figure: str, numbers: Material) -> Mapping[str, Sequence[dict[str, Any]]]:
     """What the text states at one amplitude, by observable; an interval has two ends."""
-    seen = _machine(numbers).stated()
-    at = seen.epsilon_eff if FIGURES[figure].x == "epsilon_eff" else STRONGEST
+    machine = _machine(numbers)
+    seen = machine.stated()
+    at = machine.strongest if FIGURES[figure].x == "epsilon_eff" else STRONGEST
     return {
         "delta_mu": [
             {"x": at, "ends": [drop], "text": f"stated: 20 % of the friction coefficient at {V}"}
-            for drop, V in zip(seen.drops, ("1 µm/s", "10 µm/s"), strict=True)
+            for drop, V in zip(seen["drop"], ("1 µm/s", "10 µm/s"), strict=True)
         ],
-        "mu1": [{"x": at, "ends": list(seen.mu1), "text": "stated: of order 10⁻³"}],
-        "mu2": [{"x": at, "ends": list(seen.mu2), "text": "stated: 0.1 to 0.2 of μ₁"}],
+        "mu1": [{"x": at, "ends": list(seen["mu1"]), "text": "stated: of order 10⁻³"}],
+        "mu2": [{"x": at, "ends": list(seen["mu2"]), "text": "stated: 0.1 to 0.2 of μ₁"}],
     }
 
 
@@ -147,7 +130,7 @@ def _element_lines(numbers: Material) -> list[dict[str, Any]]:
     """What the element does over a period: stretch of the asperities, and rates over V."""
     machine, lines = _machine(numbers), []
     for name, V in zip(("1 µm/s", "10 µm/s"), machine.velocities, strict=True):
-        period = one_period(machine, EXT, V, machine.stated().epsilon_eff, samples=_INSTANTS)
+        period = one_period(machine, EXT, V, machine.strongest, samples=_INSTANTS)
         stretch = 1e9 * machine.numbers["lambda"].si * period["force"] / period["load"]
         columns = {
             "phase": period["phase"], "stretch": stretch, "slider_velocity": period["velocity"],
@@ -193,7 +176,7 @@ def _python(figure: str, changes: Mapping[str, float]) -> str:
 
 
 def _element_python(changes: Mapping[str, float]) -> str:
-    epsilon = Machine(altered(printed(), changes)).stated().epsilon_eff
+    epsilon = Machine(altered(printed(), changes)).strongest
     return _PYTHON.format(
         imports="from asperity_papers.bureau2000.motion import one_period",
         changes=dict(changes),

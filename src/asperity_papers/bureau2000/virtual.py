@@ -20,7 +20,6 @@ import pandas as pd
 import asperity as asp
 from asperity.ledger import FigureNumbers, fill, rich, table
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
-from asperity_papers.bureau2000.harmonics import elastic_slope
 from asperity_papers.bureau2000.machine import EXT, SLOW, SPEEDS, Float
 from asperity_papers.bureau2000.mean import AIR, VACUUM, velocity_axis
 from asperity_papers.bureau2000.recordings import (
@@ -264,7 +263,7 @@ def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
         [last_point(points, name, column) for name in SPEEDS] for column in ("mu1", "mu2")
     )
     slow = _of(points, SLOW)
-    plateau = float(slow["epsilon_eff"].iloc[-1]) * elastic_slope(PRINTED, pair[0].velocity)
+    plateau = float(slow["epsilon_eff"].iloc[-1]) * PRINTED.elastic_slope(pair[0].velocity)
     reads = {
         "mu1, fast over slow": ratio(first[1], first[0]),
         "mu2, fast over slow": ratio(second[1], second[0]),

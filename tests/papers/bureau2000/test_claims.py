@@ -321,7 +321,7 @@ def test_a_wrong_model_would_turn_the_verdicts_on_the_measurements(model):
     right = model.outputs(EXT)
     wrong = replace(right, mu1=(right.mu1[0] / 30, right.mu1[1]))
     changed = Machine(model.numbers)
-    changed.outputs = lambda law, **_: wrong
+    changed.terms["mu1"] = lambda law, speed: wrong.mu1[speed]
     for name in ("mu1-order", "drop-over-mu1"):
         assert _one(name, changed).verdict == "differs"
     lacking = features.missed(features.at_strongest(wrong))

@@ -20,7 +20,7 @@ from pydantic import Field
 
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
-from asperity.app.decimation import extremes
+from asperity.app.decimation import thinned
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
@@ -314,7 +314,7 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
         run = term.run
         time, recorded = run.time + run.origin, run.friction
         curves = {"recorded": recorded, "fitted": fitted, "difference": recorded - fitted}
-        shown = {name: extremes(time, values, _BLOCKS) for name, values in curves.items()}
+        shown = {name: thinned(time, values, _BLOCKS) for name, values in curves.items()}
         transients = []
         edges = np.append(run.drive.edges[list(run.cuts)], np.inf)
         for begin, end in pairwise(edges[: _MOST_TRANSIENTS + 1]):
@@ -322,8 +322,8 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
             transients.append(
                 {
                     "time": begin + run.origin,
-                    "recorded": extremes(time[near], recorded[near], _BLOCKS),
-                    "fitted": extremes(time[near], fitted[near], _BLOCKS),
+                    "recorded": thinned(time[near], recorded[near], _BLOCKS),
+                    "fitted": thinned(time[near], fitted[near], _BLOCKS),
                 }
             )
         pictures.append({"name": term.name, **shown, "transients": transients})

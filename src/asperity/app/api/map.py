@@ -15,6 +15,7 @@ from asperity.errors import require
 from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
 from asperity.study.map import SHOWN, Axis, response_map
+from asperity.study.map.dataset import boundary_lines
 
 #: Points along each axis: at once and without a boundary, then ever finer, up to the
 #: number that the question states.
@@ -127,19 +128,9 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
     from asperity.figures.map import region_names, unmodulated
 
     values = result[question.show].values
-    line = result["boundary_line"].values
-    kinds = result["boundary_kind"].values.astype(str)
-    lines = []
-    for number in range(line.max(initial=-1) + 1):
-        on = line == number
-        lines.append(
-            {
-                "x": result[f"boundary_{x.name}"].values[on],
-                "y": result[f"boundary_{y.name}"].values[on],
-                "kind": kinds[on].tolist(),
-                "mode_frequency": result["boundary_mode_frequency"].values[on],
-            }
-        )
+    lines = [
+        {"x": line.pop(x.name), "y": line.pop(y.name), **line} for line in boundary_lines(result)
+    ]
     results = result["result"].values.astype(str)
     failed = ~result["converged"].values
     reasons = dict.fromkeys(results[failed].tolist())
@@ -155,7 +146,7 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
         "failed": int(failed.sum()),
         "reasons": list(reasons)[:5],
         "boundaries": lines,
-        "not_located": int((line < 0).sum()),
+        "not_located": int((result["boundary_line"].values < 0).sum()),
     }
 
 

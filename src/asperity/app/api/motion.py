@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
-from asperity.app.decimation import extremes
+from asperity.app.decimation import thinned
 from asperity.app.endpoints import Job
 from asperity.errors import require
 from asperity.laws import get_law
@@ -186,9 +186,9 @@ def _record(
     """Curves of the motion so far, and what it is."""
     time, W0, V = whole.time, values["W0"], values["V"]
     curves = {
-        "force": extremes(time, whole.force / W0, _BLOCKS),
-        "displacement": extremes(time, whole.displacement, _BLOCKS),
-        "velocity": extremes(time, whole.velocity, _BLOCKS),
+        "force": thinned(time, whole.force / W0, _BLOCKS),
+        "displacement": thinned(time, whole.displacement, _BLOCKS),
+        "velocity": thinned(time, whole.velocity, _BLOCKS),
     }
     record: dict[str, Any] = {"curves": curves, "reached": time[-1], "inertia": inertia, "V": V}
     if cycles is None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import field_validator
 
-from asperity.app.decimation import extremes
+from asperity.app.decimation import thinned
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming, printable
 from asperity.outputs.tables import Section
@@ -40,8 +40,6 @@ LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
 _BLOCKS = 700
 #: Channels that are drawn, and findings and rows that are listed.
 _MOST_CHANNELS, _MOST_LISTED = 24, 200
-#: Slip events at close range.
-_CLOSE = 8
 #: Largest lock-in table (bytes).
 LARGEST_TABLE = 1024**2
 
@@ -97,7 +95,7 @@ def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, An
         if finite.size:
             some = {"least": finite.min(), "mean": finite.mean(), "largest": finite.max()}
         if finite.size and number < _MOST_CHANNELS:
-            curve = {"curve": extremes(trace.time, channel.values, 120)}
+            curve = {"curve": thinned(trace.time, channel.values, 120)}
         channels.append(
             {
                 "name": channel_name, "recorded_name": channel.recorded_name,
@@ -177,10 +175,10 @@ def _modulated(
         "record": modulated_record(measurement),
         "rows": modulated_rows(Path(name), parts),
         "curves": {
-            "load": extremes(samples.time, samples.load / reading.W0, _BLOCKS),
-            "force": extremes(samples.time, samples.force / reading.W0, _BLOCKS),
+            "load": thinned(samples.time, samples.load / reading.W0, _BLOCKS),
+            "force": thinned(samples.time, samples.force / reading.W0, _BLOCKS),
             "cycle": cycle._asdict(),
-            "spectrum": extremes(frequencies, amplitudes, _BLOCKS),
+            "spectrum": thinned(frequencies, amplitudes, _BLOCKS),
         },
     }
 
@@ -192,22 +190,19 @@ def _sliding_record(measurement: SlidingMeasurement, name: str) -> dict[str, Any
     return {
         "record": sliding_record(measurement),
         "rows": sliding_rows(Path(name), measurement),
-        "curves": {"friction": extremes(measurement.time, measurement.values, _BLOCKS)},
+        "curves": {"friction": thinned(measurement.time, measurement.values, _BLOCKS)},
     }
 
 
 def _stick_slip_record(measurement: StickSlipMeasurement, name: str) -> dict[str, Any]:
+    from asperity.measurement.record import middle_events
     from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
 
     time, friction, events = measurement.time, measurement.friction, measurement.events
-    curves = {"friction": extremes(time, friction, _BLOCKS)}
+    curves = {"friction": thinned(time, friction, _BLOCKS)}
     if len(events):
-        first = max((len(events) - _CLOSE) // 2, 0)
-        last = min(first + _CLOSE, len(events)) - 1
-        begin, end = float(events.onset[first]), float(events.end[last])
-        around = max((end - begin) / (2 * _CLOSE), float(events.slip_duration[first]))
-        near = (time >= begin - around) & (time <= end + around)
-        curves["close"] = extremes(time[near], friction[near], _BLOCKS)
+        _, near = middle_events(measurement)
+        curves["close"] = thinned(time[near], friction[near], _BLOCKS)
     return {
         "record": stick_slip_record(measurement),
         "rows": [stick_slip_row(Path(name), measurement)],

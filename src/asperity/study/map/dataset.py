@@ -57,6 +57,17 @@ def as_dataset(
     )
 
 
+def boundary_lines(dataset: xarray.Dataset) -> list[dict[str, Any]]:
+    """The lines of the boundary: positions by the names of both axes, kind and frequency."""
+    names = (*(f"boundary_{dataset.attrs[side]}" for side in "xy"), "boundary_kind",
+             "boundary_mode_frequency")  # fmt: skip
+    number = dataset["boundary_line"].values
+    return [
+        {n.removeprefix("boundary_"): dataset[n].values[number == k].tolist() for n in names}
+        for k in range(number.max(initial=-1) + 1)
+    ]
+
+
 def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
     where, points = boundary.where, boundary.points
     values = plane.values(where)

@@ -176,45 +176,11 @@ def pressure_equation_gap(machine: Machine) -> Numbers:
 # --- Stiffnesses, the borne fraction at 120 Hz, the shear of the air -----------------------------
 
 
-@check("air-stiffness")
-def air_stiffness(machine: Machine) -> Numbers:
-    return {"kappa_air": float(machine.air_layer(R=machine.nominal_radius).stiffness)}
-
-
-@check("air-stiffer-than-contacts")
-def air_stiffer_than_contacts(machine: Machine) -> Numbers:
-    p, layer = machine.numbers, machine.air_layer(R=machine.nominal_radius)
-    return {"kappa_air/kappa_z": float(layer.stiffness) * p.lambda_z / p.W0}
-
-
 @check("squeeze-number")
 def squeeze_number(machine: Machine) -> Numbers:
     layer = machine.air_layer()
     value = complex(layer.gamma(2 * np.pi * machine.numbers.frequency) * layer.R)
     return {"real": value.real, "imaginary": -value.imag}
-
-
-@check("borne-fraction-120")
-def borne_fraction_120(machine: Machine) -> Numbers:
-    f = machine.numbers.frequency
-    nominal = machine.borne(f, machine.air_layer(R=machine.nominal_radius))
-    return {"120 Hz": machine.borne(f, machine.air_layer()), "with 49 cm^2": nominal}
-
-
-@check("borne-fraction-order")
-def borne_fraction_order(machine: Machine) -> Numbers:
-    p = machine.numbers
-    value = machine.borne(p.frequency, machine.air_layer())
-    return {"120 Hz": value, "factor": p.transmission / value}
-
-
-@check("small-effective-amplitude")
-def small_effective_amplitude(machine: Machine) -> Numbers:
-    p, (_, epsilon) = machine.numbers, machine.range_of("epsilon_range")
-    return {
-        "air, 120 Hz": epsilon * p.transmission,
-        "vacuum, 200 Hz": epsilon * machine.borne(p.frequency_vacuum, None),
-    }
 
 
 def _two_forces(machine: Machine) -> float:
@@ -250,56 +216,8 @@ def shear_negligible(machine: Machine) -> Numbers:
 # --- The control experiment in vacuo, and the patch of contacts ----------------------------------
 
 
-@check("vacuum-stiffness")
-def vacuum_stiffness(machine: Machine) -> Numbers:
-    p = machine.numbers
-    layer = machine.air_layer(P0=p.P_vacuum, R=machine.nominal_radius)
-    return {"1 mbar": float(layer.stiffness) * p.lambda_z / p.W0}
-
-
 @check("vacuum-mean-free-path")
 def vacuum_mean_free_path(machine: Machine) -> Numbers:
     p = machine.numbers
     layer = machine.air_layer(P0=p.P_vacuum, temperature=p.gas_temperature)
     return {"mean free path": float(layer.mean_free_path), "over the gap": float(layer.knudsen)}
-
-
-@check("vacuum-fraction")
-def vacuum_fraction(machine: Machine) -> Numbers:
-    return {"200 Hz": machine.borne(machine.numbers.frequency_vacuum, None)}
-
-
-@check("air-fraction-200")
-def air_fraction_200(machine: Machine) -> Numbers:
-    f, nominal = machine.numbers.frequency_vacuum, machine.air_layer(R=machine.nominal_radius)
-    stated = machine.borne(f, machine.air_layer())
-    return {"200 Hz": machine.borne(f, nominal), "with R = 3.9 cm": stated}
-
-
-@check("scaling-ratio")
-def scaling_ratio(machine: Machine) -> Numbers:
-    f, nominal = machine.numbers.frequency_vacuum, machine.air_layer(R=machine.nominal_radius)
-    vacuum = machine.borne(f, None)
-    return {
-        "200 Hz": machine.borne(f, nominal) / vacuum,
-        "with R = 3.9 cm": machine.borne(f, machine.air_layer()) / vacuum,
-    }
-
-
-@check("same-amount")
-def same_amount(machine: Machine) -> Numbers:
-    p, layer = machine.numbers, machine.air_layer()
-    at_120 = p.transmission / machine.borne(p.frequency, layer)
-    ratio = machine.borne(p.frequency_vacuum, layer) / machine.borne(p.frequency_vacuum, None)
-    at_200 = p.transmission_air_over_vacuum / ratio
-    return {"relative difference": at_200 / at_120 - 1, "120 Hz": at_120, "200 Hz": at_200}
-
-
-@check("patch-radius")
-def patch_radius(machine: Machine) -> Numbers:
-    p, patch = machine.numbers, machine.air_layer(R=machine.numbers.patch_radius)
-    vacuum = machine.borne(p.frequency_vacuum, None)
-    return {
-        "R = 2.5 cm": machine.borne(p.frequency, patch),
-        "air over vacuum": machine.borne(p.frequency_vacuum, patch) / vacuum,
-    }

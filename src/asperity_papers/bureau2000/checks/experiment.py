@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from asperity.air import AirLayer, NormalContact
+from asperity.air import NormalContact
 from asperity.ledger import check
 from asperity.orbit import PeriodicResponse
 from asperity.theory import closed_forms as cf
@@ -84,13 +84,6 @@ def systematic_lowering(machine: Machine) -> Numbers:
     }
 
 
-@check("onset")
-def onset(machine: Machine) -> Numbers:
-    r = machine.curve(EXT)
-    drop, mu = at(-r.delta_mu, machine.numbers.epsilon_onset), at(r.mu_ss)
-    return {**by_speed((drop[0] / mu[0], drop[1] / mu[1])), "drop": drop[0]}
-
-
 def _line(machine: Machine) -> tuple[Float, Float, Float]:
     """Straight lines through the drop from eps = 0.05 to 0.5: slopes, intercepts, residuals."""
     span = slice(APPLIED.index(machine.numbers.epsilon_onset), APPLIED.index(STRONGEST) + 1)
@@ -157,16 +150,6 @@ def change_with_velocity(machine: Machine, name: str) -> Numbers:
     return {f"eps = {e:g}": relative(at(values, e)) for e in READ}
 
 
-@check("mu1-order")
-def mu1_order(machine: Machine) -> Numbers:
-    return by_speed(machine.outputs(EXT).mu1)
-
-
-@check("drop-over-mu1")
-def two_orders(machine: Machine) -> Numbers:
-    return by_speed(machine.outputs(EXT).drop_over_mu1)
-
-
 # --- II.B.3: the air under the slider, and the control experiment in vacuo -----------------------
 
 
@@ -180,17 +163,6 @@ def larger_in_vacuum(machine: Machine) -> Numbers:
     r = machine.response(EXT, machine.velocities[1], amplitudes, frequency=p.frequency_vacuum)
     air, vacuum = (float(x) for x in -r.delta_mu)
     return {"eps = 0.2": vacuum / air, "air": air, "vacuum": vacuum}
-
-
-@check("collapse-order")
-def collapse_order(machine: Machine) -> Numbers:
-    f = machine.numbers.frequency_vacuum
-
-    def ratio(layer: AirLayer) -> float:
-        return machine.borne(f, layer) / machine.borne(f, None)
-
-    patch = machine.air_layer(R=machine.numbers.patch_radius)
-    return {"full area": ratio(machine.air_layer()), "patch": ratio(patch)}
 
 
 @check("linear-normal-response")

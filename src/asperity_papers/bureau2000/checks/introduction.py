@@ -13,14 +13,12 @@ from asperity.theory import ageing_response
 from asperity.theory import closed_forms as cf
 from asperity_papers.bureau2000.checks.features import at_strongest, met, missed, over_the_range
 from asperity_papers.bureau2000.machine import (
-    APPLIED,
     EXT,
     LD,
     RR,
     SPEEDS,
     STRONGEST,
     Machine,
-    at,
     by_speed,
 )
 
@@ -29,13 +27,6 @@ Mixed = dict[str, float | str]
 
 
 # --- Abstract, and the summary of results in section I -------------------------------------------
-
-
-@check("abstract-substantial-drop", EXT)
-@check("relative-drop", EXT)
-@check("rice-ruina-mean", RR)
-def relative_drop(machine: Machine, law: str) -> Numbers:
-    return by_speed(machine.outputs(law).relative_drop)
 
 
 @check("abstract-must-be-extended")
@@ -68,12 +59,6 @@ def missed_beyond(machine: Machine, law: str, other: str) -> Mixed:
     }
 
 
-@check("small-alpha-perturbation")
-def small_alpha_not_discriminating(machine: Machine) -> Numbers:
-    mu = float(machine.small_modulation(machine.velocities[0]).mu)
-    return {"relative change": abs(mu - machine.numbers.alpha_low) / mu - 1}
-
-
 @check("quasi-stationary-limit")
 def quasi_stationary(machine: Machine) -> Numbers:
     V, p = machine.velocities[0], machine.numbers
@@ -81,12 +66,6 @@ def quasi_stationary(machine: Machine) -> Numbers:
     elastic = ageing_response(machine.small_modulation(V, omega=slow, lambda_=p.lambda_)).transfer
     rigid = ageing_response(machine.small_modulation(V, omega=slow)).transfer
     return {"relative change": float(abs(elastic)) / float(abs(rigid)) - 1}
-
-
-@check("elastic-strain-relevant")
-def elastic_strain_relevant(machine: Machine) -> Numbers:
-    elastic, rigid = machine.outputs(EXT).mu1, machine.outputs(RR).mu1
-    return by_speed(a / b for a, b in zip(elastic, rigid, strict=True))
 
 
 # --- The laws and what they imply ----------------------------------------------------------------
@@ -137,22 +116,6 @@ def amontons_mean(machine: Machine) -> Numbers:
     return {"largest change": max(abs(float(x)) for x in changes)}
 
 
-@check("amontons-harmonic")
-def amontons_harmonic(machine: Machine) -> Numbers:
-    r, p = machine.curve("amontons"), machine.numbers
-    mu1 = at(r.mu1)[0] / (p.mu0 * p.transmission * STRONGEST)
-    return {
-        "mu1/(mu eps) - 1": abs(mu1 - 1),
-        "mu2/mu1": at(r.mu2)[0] / at(r.mu1)[0],
-        "mu1/(mu eps)": mu1,
-    }
-
-
-@check("anharmonic-response")
-def anharmonic(machine: Machine) -> Numbers:
-    return by_speed(machine.outputs(RR).mu2_over_mu1)
-
-
 @check("age-jump")
 def age_jump(machine: Machine) -> Numbers:
     law = cast(LinkerDieterich, machine.slider(LD).law)
@@ -187,20 +150,6 @@ def greenwood_williamson_exponent(separation: float) -> float:
 
 
 # --- Concluding remarks --------------------------------------------------------------------------
-
-
-@check("as-soon-as-applied")
-def as_soon_as_applied(machine: Machine) -> Numbers:
-    drop = machine.curve(EXT).delta_mu
-    onset = at(drop, machine.numbers.epsilon_onset)[0]
-    return {**by_speed(at(drop, APPLIED[0])), "at the onset": onset}
-
-
-@check("harmonics-essential")
-def harmonics_essential(machine: Machine) -> Numbers:
-    a, b = machine.outputs(EXT), machine.outputs(RR)
-    drop, mu1 = a.delta_mu[0] / b.delta_mu[0], a.mu1[0] / b.mu1[0]
-    return {"1 um/s": (mu1 - 1) / abs(drop - 1), "drop": drop, "mu1": mu1}
 
 
 @check("velocity-controls", EXT)

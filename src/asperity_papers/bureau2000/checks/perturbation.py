@@ -9,7 +9,7 @@ from asperity.ledger import check
 from asperity.theory import ageing_response
 from asperity.theory import closed_forms as cf
 from asperity_papers.bureau2000.integration import IntegratedOrbit
-from asperity_papers.bureau2000.machine import APPLIED, RR, SPEEDS, Machine, at
+from asperity_papers.bureau2000.machine import RR, SPEEDS, Machine
 
 Numbers = dict[str, float]
 
@@ -64,17 +64,6 @@ def inertia_negligible(machine: Machine) -> Numbers:
         )
         changes[name] = float(heavy / light) - 1
     return changes
-
-
-@check("perturbation-out-of-reach")
-def out_of_reach(machine: Machine) -> Numbers:
-    p, drop = machine.numbers, -machine.curve(RR).delta_mu
-    smallest = at(drop, APPLIED[0])[0]
-    return {
-        "eps mu/A": p.perturbative_epsilon * p.mu0 / p.A,
-        "smallest drop": smallest,
-        "noise over it": at(drop, p.epsilon_onset)[0] / smallest,
-    }
 
 
 # --- Formulas, as printed and as derived, against an integration ---------------------------------
