@@ -21,7 +21,7 @@ export function scrolling(label, children, tall = false) {
 /** A table of texts or elements; the first cell of a row is its head. */
 export function table(head, rows, label, tall = false) {
   return scrolling(label, el("table", {},
-    head.length && el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, worded(t)) : el("td", {}))))),
+    head.length > 0 && el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, worded(t)) : el("td", {}))))),
     el("tbody", {}, rows.map(([first, ...others]) => el("tr", {}, el("th", { scope: "row" }, first), others.map((t) => el("td", {}, t)))))), tall);
 }
 
