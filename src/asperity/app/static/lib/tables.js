@@ -28,7 +28,7 @@ export function table(head, rows, label, tall = false) {
 /** The sections of a report, which the server words for everyone who shows it; `of` names its tables. */
 export function sections(report, of = "") {
   return report.flatMap(({ title, sentences, head, rows, warnings }) => [
-    title && el("h4", {}, capital(title)),
+    title && el("h4", {}, typeset(capital(title))),
     ...sentences.map((sentence) => el("p", {}, ended(sentence))),
     rows.length && table(head, rows.map((row) => row.map(typeset)), `${title || (head.includes("estimate") ? "Parameters" : head[0] === "law" ? "Comparison" : "Numbers")}${of}`),
     ...warnings.map((warning) => el("p", { class: "message" }, ended(warning))),
