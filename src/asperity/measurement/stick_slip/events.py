@@ -12,11 +12,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import detrend, lfilter
 
 from asperity.measurement.stick_slip.detection import Falls
+from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+#: Of each event peak, trough, and the run around them that is read.
+Bounds = tuple[Index, ...]
+Shape = Callable[[Array, Array], Array]
 
 #: A line long enough that noise moves its end by this share of the drop; longer ones bend.
 _PRECISION = 0.01
@@ -29,6 +34,9 @@ _ZOOMS = 4
 _TOGETHER = 256
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
+#: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
+_TELLING, _MADE = 64, 64
+_RUNS, _LONGEST_RUN = 64, 4096
 #: What sampling adds to the uncertainty of an onset or end (samples).
 _SAMPLING = 0.45
 
@@ -163,7 +171,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
     # The tail of an exponential fall is as long again as its quarters say.
     length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
-    first = np.maximum(edges[:-1], peak - length)
+    first = np.maximum(edges[:-1], peak - length + (trough - peak))
     stop = np.minimum(edges[1:], trough + length)
     # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
     quarter = (peak[1:] - trough[:-1]) // 4
@@ -172,24 +180,21 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
         sticks = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
     rate = np.maximum(np.concatenate([sticks[2][:1] if k > 1 else [0.0], sticks[2]]), 0.0)
     bounds = peak, trough, first, stop
-    large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
-    shape, shift = _shape(
-        sums,
-        large,
-        [b[large] for b in bounds],
-        rate[large],
-        drop[large],
-        lambda samples: _of_mean(falls.scatter, samples) / drop[large],
-    )
+    # Throughout the recording: the largest of equal slips are those that noise makes so.
+    large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
+    large = large[np.linspace(0, large.size - 1, min(large.size, _TELLING)).astype(np.intp)]
+    runs = (trough[:-1] + quarter, peak[1:] - quarter + 2) if k > 1 else (first, peak)
+    of_large = tuple(b[large] for b in bounds)
+    noise = _noise(force, *runs)
+    scatter = falls.scatter
+    timing = _timing(sums, large, of_large, rate[large], drop[large], noise, scatter)
+    shape = timing.shape
     parts = [
         _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
         for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
     ]
-    onset, end, squares, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
-    # The usual residual, as correlated as the noise that detection has seen.
-    scatter = falls.scatter * (np.sqrt(np.median(squares)) / falls.scatter[0] or 1.0)
-    shapes = shape.timing, shift
-    events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, shapes)
+    onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
+    events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing)
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
     away = 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - 2 * length)
@@ -198,11 +203,11 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     short = np.minimum(until - first, stop - since) < away
     (high, rise, *_), (low, other, *_) = sums.line(first, until), sums.line(since, stop)
     farther = high - low + (rise - other) * away / 4
-    u = np.linspace(0, 1, _BINS)
-    fall = events.drop[:, None] * shape.fall(u)
-    if shape.driven:
-        fall += (rate * (end - onset))[:, None] * (u - 1 + shape.fall(u))
-    return events, np.ptp(fall, axis=1), np.where(short, events.drop, farther)
+    u = np.linspace(0, 1, _BINS)[None]
+    fallen = np.maximum(events.drop, np.finfo(float).tiny)
+    loaded = np.repeat((rate * (end - onset) / fallen)[:, None], _BINS, axis=1)
+    visible = events.drop * np.ptp(shape(u, loaded), axis=1)
+    return events, visible, np.where(short, events.drop, farther)
 
 
 def _onset_and_end(
@@ -214,17 +219,15 @@ def _onset_and_end(
     stop: Index,
     *,
     rate: Array,
-    shape: _Shape,
-) -> tuple[Array, Array, Array, Array]:
+    shape: Shape,
+) -> tuple[Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in.
 
     Returns
     -------
     onset, end : array, (k,)
     squares : array, (k,)
-        Mean square of all residuals.
-    excess : array, (k,)
-        Mean square of the residuals of the slip less that of those of the lines.
+        Sum of the squares of all residuals, but for a constant.
     """
     length = (trough - peak).astype(float)
     middle = (peak + trough) / 2
@@ -254,10 +257,9 @@ def _onset_and_end(
         weight = stops - begin
         length_here = np.maximum(off[pair[1]] - on[pair[0]], 0.25)
         u = np.clip(((begin + stops - 1) / 2 - on[pair[0]]) / length_here, 0.0, 1.0)
-        fall = shape.fall(u)
-        model = low[pair[1]] + fall * (high[pair[0]] - low[pair[1]])
-        if shape.driven:
-            model += rate[:, None, None, None] * length_here * (u - 1 + fall)
+        drop = high[pair[0]] - low[pair[1]]
+        loaded = rate[:, None, None, None] * length_here / np.where(drop > 0, drop, np.inf)
+        model = low[pair[1]] + drop * shape(u, loaded)
         misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
@@ -272,110 +274,157 @@ def _onset_and_end(
         for span, here in ((span_on, onset), (span_end, end)):
             reach = (span[1] - span[0]) / (_CANDIDATES - 1)
             span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
-    squares = np.maximum(np.where(np.isfinite(misfit[rows, i, j]), misfit[rows, i, j], 0.0), 0.0)
-    inside = np.maximum(since[rows, j] - until[rows, i], 1)
-    outside = np.maximum(stop - first - inside - 4, 1)
-    lines = straight[rows, i, j]
-    # Within a bin the slip goes on, which its mean leaves over.
-    change = np.gradient(model[rows, i, j], axis=1)
-    binned = (weight[rows, i, j] * change**2).sum(1) / 12
-    # Onset and end take two degrees of freedom.
-    excess = (squares - lines - binned - (inside - 2) * lines / outside) / inside
-    return onset, end, squares / np.maximum(stop - first - 6, 1), excess
+    squares = misfit[rows, i, j]
+    return onset, end, np.where(np.isfinite(squares), squares, 0.0)
 
 
-def _half_cosine(u: Array) -> Array:
-    """(1 + cos(pi u))/2 from 0 to 1 to 1e-4: a polynomial takes a fifth of the time."""
-    x = np.pi * (u - 0.5)
+def _free(u: Array, loaded: Array) -> Array:
+    """A free slider at constant friction: the cosine of a phase from -a to pi + a.
+
+    It goes on with the slope of the loading: what the drive loads during the slip, over the drop,
+    is `loaded` = (pi/2 + a) tan a.
+    """
+    angle = np.interp(loaded, _LOADED, _ANGLES)
+    x = (np.pi + 2 * angle) * (u - 0.5)
     square = x * x
-    return np.asarray(0.5 - 0.5 * x * (1 - square / 6 * (1 - square / 20 * (1 - square / 42))))
+    # A polynomial for sin x, to 1e-4, takes a fifth of the time.
+    sine = 1 - square / 20 * (1 - square / 42 * (1 - square / 72))
+    return np.asarray(0.5 - 0.5 * x * (1 - square / 6 * sine) / np.cos(angle))
 
 
-def _straight(u: Array) -> Array:
-    """1 - u."""
-    return 1.0 - u
+_ANGLES = np.linspace(0.0, 0.75, 64)
+_LOADED = (np.pi / 2 + _ANGLES) * np.tan(_ANGLES)
 
-
-def _relaxing(u: Array) -> Array:
-    """Exponential decay over four time constants."""
-    tail = np.exp(-4.0)
-    return np.asarray((np.exp(-4.0 * u) - tail) / (1 - tail))
+#: How a slider slips on a spring: freely at constant friction, at a constant velocity, damped over
+#: four time constants, with a velocity in proportion to u (1 - u), and freely under a drive that
+#: pauses. The force falls from 1 to 0 as u goes from 0 to 1; the second argument is what the drive
+#: loads in the slip, over the drop.
+_SHAPES: tuple[Shape, ...] = (
+    _free,
+    lambda u, _: 1 - u,
+    lambda u, _: (np.exp(-4 * u) - np.exp(-4)) / (1 - np.exp(-4)),
+    lambda u, _: 1 - u * u * (3 - 2 * u),
+    lambda u, _: _free(u, np.zeros(())),
+)
 
 
 @dataclass(frozen=True)
-class _Shape:
-    """A way to fall from 1 to 0 as u goes from 0 to 1.
+class _Timing:
+    """How the slips of a recording fall, and how well their onsets and ends are known.
 
-    The standard uncertainty of onset or end, the larger of both, of a slip of d samples and drop D
-    in white noise s is `timing` sqrt(d) s/D samples (inverse of Fisher's information of both). Of
-    correlated noise s sqrt(2/d) is the scatter of means over half of the slip. A `driven` shape is
-    that of the slider's displacement, and the spring is loaded during the slip; others are those of
-    the force.
+    Attributes
+    ----------
+    shape : callable
+    factor : float
+        Standard uncertainty of onset or end, the larger of both, of a slip of d samples and drop D
+        in noise of scatter s of the means over half of the slip: factor d s/D.
+    shift : float
+        What is open of the shape: standard uncertainty of onset or end over the duration, which
+        all slips have in common.
     """
 
-    fall: Callable[[Array], Array]
-    timing: float
-    driven: bool = False
+    shape: Shape
+    factor: float
+    shift: float
 
 
-#: How a slider slips on a spring: freely at constant friction, without a drive, at a constant
-#: velocity, and damped.
-#: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
-_SHAPES = (
-    _Shape(_half_cosine, 2.65, driven=True),
-    _Shape(_straight, 2.0),
-    _Shape(_relaxing, 4.97),
-    _Shape(_half_cosine, 2.65),
-)
-_DISTANCE = 0.13
-#: Of 26 made recordings the true shapes stand out by 3.4 to 46 standard errors, others by 2.1.
-_CLEAR = 3.0
-
-
-def _shape(
+def _timing(
     sums: _Sums,
     part: Index,
-    bounds: list[Index],
+    bounds: Bounds,
     rate: Array,
     drop: Array,
-    noise: Callable[[Array], Array],
-) -> tuple[_Shape, float]:
-    """The shape of slips, which all fall alike, and what is open of it.
+    noise: Autoregression,
+    scatter: Array,
+) -> _Timing:
+    """The shape of slips, which all fall alike, from made recordings of each.
 
-    Half a cosine unless the squares of another are smaller by more than `_CLEAR` times the standard
-    error of their mean difference. Where noise moves onsets by more than another shape would,
-    squares only say which shape follows the noise: such events do not count.
-
-    What is open is the standard error of onset or end, over the duration, since slips fall unlike
-    any shape. A fall between two shapes, by a share x from one, has residuals in proportion to x of
-    the one and to 1 - x of the other: x of the distance between their onsets is the error.
+    Slips of every shape are made as they are read with it, with noise of the spectrum of the
+    recording, and read with all shapes. A shape is likely where its made recordings have the
+    squares of residuals of all shapes that the recording has (indirect inference: Gourieroux,
+    Monfort and Renault, J. Appl. Econometrics 8, S85, 1993): correlated noise acts on both alike.
+    Where no shape describes the recording, all are as likely as their distances say in units of
+    the smallest.
     """
-    fits = [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
-    squares = np.array([fit[2] for fit in fits])
-    long = np.maximum(fits[0][1] - fits[0][0], 2.0)
-    certain = _SHAPES[0].timing / np.sqrt(2.0) * noise(long / 2) < _DISTANCE / 2
-    chosen = 0
-    for k in range(1, len(_SHAPES) - 1):
-        better = (squares[chosen] - squares[k])[certain]
-        if better.size > 1 and better.mean() > _CLEAR * better.std(ddof=1) / np.sqrt(better.size):
-            chosen = k
-    onset, end, *_ = fits[chosen]
-    misfit = np.array([_root(fit[3] / drop**2) for fit in fits])
-    misfit = np.maximum(misfit, np.finfo(float).tiny)
-    away = [
-        misfit[chosen]
-        / (misfit[chosen] + misfit[k])
-        * max(abs(float(np.median((fit[n] - fits[chosen][n]) / (end - onset)))) for n in (0, 1))
-        for k, fit in enumerate(fits)
-        if k != chosen
-    ]
-    return _SHAPES[chosen], max(away)
+    first, stop = bounds[2:]
+    k = part.size
+
+    def read(sums: _Sums, part: Index, bounds: Bounds, rate: Array) -> list[tuple[Array, ...]]:
+        return [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
+
+    def contrasts(fits: list[tuple[Array, ...]], drop: Array) -> Array:
+        squares = np.array([fit[2] for fit in fits])
+        return (squares[1:] - squares[0]) / drop**2
+
+    fits = read(sums, part, bounds, rate)
+    seen = contrasts(fits, drop).mean(1)
+    # Windows of the events, one after the other, several times.
+    many = np.repeat(np.arange(k), -(-_MADE // k))
+    size = (stop - first)[many]
+    begin = np.concatenate([[0], np.cumsum(size)])
+    event = np.repeat(np.arange(many.size), size)
+    place = np.arange(begin[-1]) - begin[event] + first[many][event]
+    window = tuple((b[many] - first[many] + begin[:-1]).astype(np.intp) for b in bounds)
+    rng = np.random.default_rng(0)
+    taps = np.concatenate([[1.0], -noise.coefficients[-1]])
+    distance, shifts, factors = [], [], []
+    for shape, (onset, end, *_) in zip(_SHAPES, fits, strict=True):
+        clean = _force_of(sums, part, shape, (onset, end), (first, stop), rate, place, many[event])
+        settling = 10 * taps.size
+        white = rng.standard_normal(settling + place.size)
+        made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
+        again = read(_Sums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many])
+        values = contrasts(again, drop[many])
+        covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
+        off = seen - values.mean(1)
+        distance.append(float(off @ np.linalg.pinv(covariance, hermitian=True) @ off))
+        length = (end - onset)[many]
+        shift = begin[:-1] - first[many]
+        late = np.array(
+            [[f[n] - t[many] - shift for f in again] for n, t in enumerate((onset, end))]
+        )
+        late /= np.maximum(length, 1.0)
+        shifts.append(np.median(late, axis=2))
+        unit = _of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
+        # The standard deviation, of which normal values exceed twice by 5 %.
+        away = np.abs(late - shifts[-1][:, :, None]) / unit
+        factors.append(np.quantile(away, 0.95, axis=2).max(0) / 1.96)
+    best = int(np.argmin(distance))
+    excess = max(min(distance) / (len(_SHAPES) - 1), 1.0)
+    weight = np.exp((min(distance) - np.array(distance)) / (2 * excess))
+    weight /= weight.sum()
+    moved = np.array(shifts)[:, :, best]
+    return _Timing(
+        _SHAPES[best],
+        float(factors[best][best]),
+        float(np.sqrt((weight @ moved**2).max())),
+    )
 
 
-def _root(values: Array) -> float:
-    """Root of a mean of squares, two standard errors above what it is."""
-    error = values.std() / np.sqrt(max(values.size - 1, 1))
-    return float(np.sqrt(max(values.mean() + 2 * error, 0.0)))
+def _force_of(
+    sums: _Sums,
+    part: Index,
+    shape: Shape,
+    slips: tuple[Array, Array],
+    bounds: tuple[Index, Index],
+    rate: Array,
+    place: Index,
+    owner: Index,
+) -> Array:
+    """Force at the samples `place` of the events `owner`: line, slip and line, as fitted."""
+    (onset, end), (first, stop) = slips, bounds
+    until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
+    since = np.minimum(np.ceil(end).astype(np.intp), stop - 2)
+    left, right = sums.line(first, until), sums.line(since, stop)
+    origin = sums.origin[part]
+    high = left[0] + left[1] * (onset - origin)
+    low = right[0] + right[1] * (end - origin)
+    length = np.maximum(end - onset, 0.25)
+    u = np.clip((place - onset[owner]) / length[owner], 0.0, 1.0)
+    drop = np.maximum(high - low, np.finfo(float).tiny)
+    slip = low[owner] + drop[owner] * shape(u, (rate * length / drop)[owner])
+    slip += left[1][owner] * np.minimum(place - onset[owner], 0.0)
+    return np.asarray(slip + right[1][owner] * np.maximum(place - end[owner], 0.0))
 
 
 def _measured(
@@ -386,7 +435,7 @@ def _measured(
     slips: tuple[Array, Array],
     bounds: tuple[Index, Index],
     sticks: tuple[Array, Array, Array, Array],
-    timing_of: tuple[float, float],
+    timing_of: _Timing,
 ) -> SlipEvents:
     """Forces and their uncertainties; of the sticks centre, mean, slope and number of samples."""
     (onset, end), (first, stop) = slips, bounds
@@ -409,11 +458,14 @@ def _measured(
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
-    doubt = np.hypot(doubt, creeps / rise.sum() * rise - rings / drop.sum() * drop)
+    bend = creeps / rise.sum() * rise - rings / drop.sum() * drop
+    doubt = np.hypot(doubt, bend)
     long = np.maximum(end - onset, 2.0)
-    fisher, shift = timing_of
-    timing = fisher / np.sqrt(2.0) * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0])
-    timing = np.hypot(long * np.hypot(timing, shift), _SAMPLING)
+    least = np.maximum(drop, scatter[0])
+    timing = timing_of.factor * _of_mean(scatter, long / 2) / least
+    # A line that ends too low meets the slip later by as large a share of it.
+    timing = np.hypot(timing, np.hypot(timing_of.shift, bend / least))
+    timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
     doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
     centre, mean, slope, count = sticks
@@ -437,6 +489,14 @@ def _measured(
         creep_uncertainty=np.concatenate([none, lag_doubt]),
         fall_rate=steepest_fall(force, onset, end, drop) / step,
     )
+
+
+def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
+    """Noise about straight lines through runs of sticks, of which short ones are left out."""
+    size = np.minimum(stop - first, _LONGEST_RUN)
+    runs = np.flatnonzero(size >= np.median(size))[:: -(-size.size // _RUNS)]
+    parts = [force[first[k] : first[k] + size[k]] for k in runs]
+    return fitted([detrend(part) for part in parts], parameters=2 * len(parts))
 
 
 def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
