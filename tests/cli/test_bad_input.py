@@ -122,6 +122,11 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
             ["got 'Pa' for 'F' and 'N' for 'W'; give the area", 'like --area "25 cm^2"'],
         ),
         (
+            "measure",
+            "time (s),shear force,normal force (N)",
+            ["got no known unit for 'F'", 'like --unit "shear force=N"'],
+        ),
+        (
             "fit",
             "time (s),temperature (degC),friction",
             ['like --column "displacement=x"', "or give --steps and --velocities"],

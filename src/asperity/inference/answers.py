@@ -358,6 +358,12 @@ def compare(
     ------
     InputError
         As of `asperity.inference.compare`, or if a file cannot be read.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> steps = asp.samples.velocity_steps()
+    >>> print(asp.compare(steps, ["rice-ruina", "ruina-slip"]))
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
     names = compared_laws([law.strip() for law in listed])

@@ -84,6 +84,12 @@ def measure_recording(
     ------
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> print(asp.measure(asp.samples.velocity_steps()))
+    >>> asp.measure("steps.csv", window=("100 s", "400 s")).plot()
     """
     # Most arguments are the fields of the question.
     fields = {name: value for name, value in locals().items() if name in Question.model_fields}

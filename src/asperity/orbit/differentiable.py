@@ -291,12 +291,13 @@ def response_function(
         parameters with the coefficients of `modulation` as defaults.
     search : bool, "direct" or "coarse"
         Whether to search for orbits that the fast method does not find. Without it they are not
-        converged, and programs are smaller. "direct" tries collocation from the orbits of
-        `KnownOrbits`, from the averaged limit and, under a harmonic load, from the orbit on which
-        a motion from steady sliding settles, in some milliseconds a point; it leaves out what
-        follows branches, which may take a minute for one point. Within `jax.jit`, and where
-        multipliers are wanted, it is as True. "coarse" is the same on 72 intervals without a check
-        of the mesh and without motions: values good to some 1e-6, to look for minima with.
+        converged, and programs are smaller. "direct" tries series under slow modulation, and
+        collocation from the orbits of `KnownOrbits`, from the averaged limit and, under a harmonic
+        load, from the orbit on which a motion from steady sliding settles, in some milliseconds a
+        point; it leaves out what follows branches, which may take a minute for one point. Within
+        `jax.jit`, and where multipliers are wanted, it is as True. "coarse" is the same on 72
+        intervals without a check of the mesh and without motions: values good to some 1e-6, to
+        look for minima with.
     least_points : int
         Calls with fewer points are padded to this number, so that calls with different numbers of
         points share one compiled program.

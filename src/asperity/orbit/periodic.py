@@ -93,6 +93,13 @@ def periodic_response(
     InputError
         If a value breaks its rule, or shapes do not broadcast.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("elasto-plastic"), spring=pmma.K, mass=pmma.M, load=pmma.W0)
+    >>> asp.periodic_response(slider, velocity="1 um/s", epsilon=0.24, frequency="120 Hz").plot()
+
     Notes
     -----
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). Where converged,

@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.orbit.methods.series import follows_steady_sliding
+from asperity.slider.problem import checked_problem, flatten
 
 MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0
 Kc = (B - A) * W0 / D0
@@ -115,6 +117,17 @@ def test_unstable_for_part_of_the_period():
     by_age = -np.exp(-phi) + B / A * v
     assert ageing * 2 * np.pi * (by_force + by_age).mean() < -1000
     assert (response.multipliers == 0).all()
+
+
+@pytest.mark.parametrize("margin", [0.99, 1.01])
+def test_a_slider_follows_where_steady_sliding_is_stable_under_the_heaviest_load(margin):
+    epsilon = 0.3
+    # K > (B - A) W/D0 at W = (1 + epsilon) W0: Ruina (1983).
+    law = RiceRuina(mu0=MU0, A=A, B=B, D0=D0, V0=V0)
+    slider = asp.Slider(law, spring=margin * (1 + epsilon) * Kc, load=W0)
+    given = checked_problem(slider, velocity=[V], epsilon=epsilon, frequency=1e-3)
+    problem, _ = flatten(given)
+    assert len(follows_steady_sliding(problem, np.arange(1))) == (margin > 1)
 
 
 def test_pulses_are_left_to_other_methods():

@@ -80,6 +80,7 @@ def test_an_index_n_is_no_newton_beside_another_index():
         ("%", "dimensionless", 0.01),
         (".", "dimensionless", 1.0),
         ("kHz", "frequency", 1e3),
+        ("d", "time", 86400.0),
     ],
 )
 def test_units_as_laboratories_write_them(recording, unit, kind, si):

@@ -314,6 +314,7 @@ def test_no_cut_anywhere_gives_a_wrong_number(tmp_path, number):
         "Tiempo (s);fuerza normal (N);fuerza de rozamiento (N)",
         "t (s);\u03c3n (Pa);\u03c4 (Pa)",
         "t (s);Last (N);Tau (N)",
+        "t (s);Pr\u00fcfkraft Fn (N);Kraft Ft (N)",
     ],
 )
 def test_names_in_other_languages_and_letters(tmp_path, planted, head):

@@ -21,9 +21,11 @@ from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
+from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
+from asperity.orbit.methods.series import follows_steady_sliding, series_orbits
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
@@ -65,6 +67,11 @@ class MeshOrbits(NamedTuple):
     mean_friction: Float
     harmonics: Complex
     log_multipliers: Complex
+
+    @classmethod
+    def of(cls, orbit: Orbit, numbers: Complex) -> MeshOrbits:
+        """Orbits without multipliers, with their mean and harmonics, (1 + count, points)."""
+        return cls(orbit, numbers[0].real, numbers[1:], np.zeros((0, numbers.shape[1]), complex))
 
 
 class SearchedOrbits(NamedTuple):
@@ -167,23 +174,22 @@ def followed_orbits(
     size, points = guess.centre.shape
     known, agreements = numbers is not None, _MESH_AGREEMENT if numbers is None else _AGREEMENT
     before = np.full((1 + harmonics, points), np.nan + 0j) if numbers is None else numbers
+    read = partial(_numbers, harmonics=harmonics)
     for intervals in meshes if known else (FIRST_MESH, *meshes):
         agreement = agreements[(intervals,) == meshes[-1:]]
-        solve = partial(refined_orbit, intervals=intervals, harmonics=harmonics)
+        solve = partial(refined_orbit, intervals=intervals, read=read)
         finer = Orbit.empty(guess.scheme, size, intervals, points)
         left = [index[:0]]
-        for part, (fine, reading, error) in run_chunks(
+        for part, (fine, now, error) in run_chunks(
             solve, (problem, guess), index, mesh_chunk(size)
         ):
             put(finer, part, fine)
-            now, solved = reading.numbers, error < ACCEPTED
+            solved = error < ACCEPTED
             served = solved & (response_gap(before[:, part], now, each=1) < agreement)
             served |= solved & (not meshes)
             kept = np.flatnonzero(served)
             if len(kept):
-                none = np.zeros((0, len(kept)), complex)
-                numbers_of = now[0, kept].real, now[1:, kept]
-                yield part[kept], MeshOrbits(take(fine, kept), *numbers_of, none)
+                yield part[kept], MeshOrbits.of(take(fine, kept), now[:, kept])
             left.append(part[~served & (known | solved)])
             if not known:
                 before[:, part] = now
@@ -212,8 +218,8 @@ def search_orbits(
     parameters : dict of str to array, shape (points,)
     wanted : bool array, shape (points,)
     direct : bool
-        Whether only to solve each point independently, without following branches: from the known
-        orbits, from the averaged limit, and from motions.
+        Whether only to solve each point independently, without following branches: by series under
+        slow modulation, from the known orbits, from the averaged limit, and from motions.
     coarse : bool
         Whether a direct search takes orbits on the coarsest mesh, unchecked, and no motions.
     known : KnownOrbits, optional
@@ -247,19 +253,30 @@ def search_orbits(
         done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
         return index[~done]
 
-    def follow(guess: Orbit, rows: Indices) -> None:
-        meshes = () if coarse else MESHES
-        for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
-            result.add(some, orbits)
-            if known is not None:
-                known.keep(problem, some, orbits.orbit)
+    # No method at all still marks the points out of range.
+    result.outcome[index] = searched(index, methods=()).outcome
+    meshes = () if coarse else MESHES
 
+    def keep(some: Indices, orbits: MeshOrbits) -> None:
+        result.add(some, orbits)
+        if known is not None:
+            known.keep(problem, some, orbits.orbit)
+
+    def follow(guess: Orbit, rows: Indices) -> None:
+        for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
+            keep(some, orbits)
+
+    slow = follows_steady_sliding(problem, left())
+    series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0])
+    read = partial(_numbers, harmonics=harmonics)
+    for some, numbers in run_chunks(
+        read, (problem, series), exact, mesh_chunk(problem.system.size)
+    ):
+        keep(some, MeshOrbits.of(take(series, some), numbers))
+    rows = left()
     if known is not None and known.orbit is not None:
-        follow(known.orbit, index[known.known[index]])
+        follow(known.orbit, rows[known.known[rows]])
     if len(rows := left()):
-        # No method at all still marks the points out of range.
-        result.outcome[rows] = searched(rows, methods=()).outcome
-        rows = left()
         follow(*orbits_from_averaged_limit(problem, rows))
     rows = left()
     hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
@@ -268,6 +285,13 @@ def search_orbits(
         if len(periodic) >= (len(rows) if every else 1):
             follow(motions, periodic)
     return result
+
+
+def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
+    """Mean and harmonics of F/W0, shape (1 + harmonics, points)."""
+    with np.errstate(all="ignore"):
+        mean, phasors = mean_and_harmonics(collocated(problem, orbit), orbit, harmonics)
+    return np.concatenate([mean[None], phasors])
 
 
 def _idle(_: int) -> None:

@@ -248,6 +248,17 @@ _SMALL_EXPONENT = 1e-5
 VANISHING_GROWTH = -200.0
 
 
+def mean_and_harmonics(
+    values: PointValues, orbit: Orbit, harmonics: int
+) -> tuple[Float, NDArray[np.complex128]]:
+    """Mean (points,) and harmonics (count, points) of F/W0, peak amplitudes."""
+    weighted = quadrature(orbit) / (2 * np.pi) * values.force_rest
+    turn = np.exp(-1j * orbit.stage_phases)
+    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
+    mean = values.force_mean[0, 0] + weighted.sum((0, 1))
+    return mean, 2 * (turns * weighted).sum((1, 2))
+
+
 def orbit_observables(
     values: PointValues, response: Array, orbit: Orbit, harmonics: int
 ) -> Observables:
@@ -263,10 +274,7 @@ def orbit_observables(
     harmonics : int
     """
     weights = quadrature(orbit) / (2 * np.pi)
-    mean = values.force_mean[0, 0] + (weights * values.force_rest).sum((0, 1))
-    turn = np.exp(-1j * orbit.stage_phases)
-    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
-    phasors = 2 * (turns * (weights * values.force_rest)).sum((1, 2))
+    mean, phasors = mean_and_harmonics(values, orbit, harmonics)
     maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
     monodromy, log_scale = scaled_product(maps)
     trace = sum(values.jacobian[i, i] for i in range(len(orbit.centre)))

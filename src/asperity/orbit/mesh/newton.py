@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -31,16 +31,15 @@ from asperity.orbit.mesh.equations import (
     CondensedEquations,
     collocated,
     condensed,
-    read_orbit,
     transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit, equidistributed
-from asperity.orbit.observables import Observables
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Newton's method ends at this change; the error is then about the square of the change.
 TOLERANCE = 1e-8
@@ -296,9 +295,11 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
 
 
 def refined_orbit(
-    problem: Problem, guess: Orbit, *, intervals: int, harmonics: int
-) -> tuple[Orbit, Observables, Float]:
-    """The orbit on an equidistributed mesh of `intervals`, its observables and last Newton change.
+    problem: Problem, guess: Orbit, *, intervals: int, read: Callable[[Problem, Orbit], T]
+) -> tuple[Orbit, T, Float]:
+    """The orbit on an equidistributed mesh of `intervals`, what is read of it, and its error.
+
+    The error is the last change by Newton's method.
 
     Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
     a finer one than the last iterate.
@@ -316,7 +317,7 @@ def refined_orbit(
         best = _where(done, best, result.orbit)
         error = np.where(done, error, result.error)
     orbit = _where(error < ACCEPTED, best, first)
-    return orbit, read_orbit(problem, orbit, harmonics), error
+    return orbit, read(problem, orbit), error
 
 
 def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:

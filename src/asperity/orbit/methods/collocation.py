@@ -59,7 +59,7 @@ def refine(
         close = intervals == len(orbit.mesh) - 1
         agreement = _CLOSE_AGREEMENT if close else AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, points)
-        solve = partial(refined_orbit, intervals=intervals, harmonics=options.harmonics)
+        solve = partial(refined_orbit, intervals=intervals, read=evaluate)
         resolved = np.zeros(points, dtype=bool)
         for part, (fine, observables, error) in run_chunks(
             solve, (problem, orbit), index, mesh_chunk(size)

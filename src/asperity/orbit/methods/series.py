@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
+from asperity.orbit.batches import FEW, Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import adiabatic_states, even_phases
+from asperity.theory.adiabatic import adiabatic_growth, adiabatic_states, even_phases
 
 Float = NDArray[np.float64]
 
@@ -80,38 +80,46 @@ class FourierSeries(Method):
         rate, sharpness, _ = steady_sliding(problem)
         slow, weak = rate >= _SLOW, (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
         smooth = np.flatnonzero(slow | weak)
-        if not len(smooth):
-            return solution
-        part = take(problem, smooth)
-        orbit, resolved = series_orbits(part, len(smooth))
-        kept = np.flatnonzero(resolved)
-        if len(kept):
-            attempt = Solution.unsolved(problem, len(kept), options)
-            accept(take(part, kept), attempt, take(orbit, kept), options)
-            rows = smooth[kept]
+        orbit, rows = series_orbits(problem, smooth)
+        if len(rows):
+            attempt = Solution.unsolved(problem, len(rows), options)
+            accept(take(problem, rows), attempt, take(orbit, rows), options)
             exact = slow[rows] | (np.abs(attempt.harmonics[:2]) > _LEAST_HARMONIC).all(0)
             options.progress(int(attempt.converged[exact].sum()))
             solution.merge(rows[exact], take(attempt, np.flatnonzero(exact)))
         return solution
 
 
-def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
-    """Orbits of all points of `problem` (NumPy arrays) on `INTERVALS` even intervals.
+def follows_steady_sliding(problem: Problem, index: Indices) -> Indices:
+    """The points of `index` at which a slider follows a modulation slower than its relaxation.
 
-    Also returned is a mask of the points that a series resolves, shape (points,).
+    Steady sliding is stable at all phases there. Where it is not, the slider may leave the orbit of
+    a series for slip events, and the motion decides which orbit is the one that is measured.
     """
-    scheme, size = scheme_for(problem.system), problem.system.size
-    orbit = Orbit.empty(scheme, size, INTERVALS, points)
-    resolved = np.zeros(points, bool)
+    slow = index[steady_sliding(take(problem, index))[0] >= _SLOW] if len(index) else index
+    growths = run_chunks(adiabatic_growth, (problem,), slow, FEW)
+    return np.concatenate([slow[:0], *(part[growth == 0] for part, growth in growths)])
+
+
+def series_orbits(
+    problem: Problem, index: Indices, intervals: int = INTERVALS
+) -> tuple[Orbit, Indices]:
+    """Orbits of the points `index` of a problem (NumPy arrays) on even intervals.
+
+    Also returned are the points that a series resolves.
+    """
+    system, resolved = problem.system, [index[:0]]
+    scheme = scheme_for(system)
+    orbit = Orbit.empty(scheme, system.size, intervals, len(system.V))
 
     def solve(part: Problem) -> tuple[Orbit, NDArray[np.bool_]]:
         harmonics, exact = _solve(part)
-        return _on_even_mesh(harmonics, scheme), exact
+        return _on_even_mesh(harmonics, scheme, intervals), exact
 
-    for rows, (some, exact) in run_chunks(solve, (problem,), np.arange(points), mesh_chunk(size)):
+    for rows, (some, exact) in run_chunks(solve, (problem,), index, mesh_chunk(system.size)):
         put(orbit, rows, some)
-        resolved[rows] = exact
-    return orbit, resolved
+        resolved.append(rows[exact])
+    return orbit, np.concatenate(resolved)
 
 
 def _solve(problem: Problem) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
@@ -211,9 +219,11 @@ def _resampled(Y: Float, nodes: int) -> Float:
     return np.fft.irfft(harmonics * nodes, n=nodes, axis=1)
 
 
-def _on_even_mesh(harmonics: NDArray[np.complex128], scheme: CollocationScheme) -> Orbit:
+def _on_even_mesh(
+    harmonics: NDArray[np.complex128], scheme: CollocationScheme, intervals: int
+) -> Orbit:
     """Series as the piecewise polynomials of collocation."""
-    mesh = np.linspace(0, 2 * np.pi, INTERVALS + 1)
+    mesh = np.linspace(0, 2 * np.pi, intervals + 1)
     order = np.arange(1, harmonics.shape[1])
     weights = 2 * harmonics[:, 1:]
     # Less their value at theta = 0, which keeps small orbits exact.
@@ -221,7 +231,7 @@ def _on_even_mesh(harmonics: NDArray[np.complex128], scheme: CollocationScheme) 
     stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
     slopes = 1j * order * np.exp(1j * order * stages[..., None])
     return Orbit(
-        np.broadcast_to(mesh[:, None], (INTERVALS + 1, harmonics.shape[2])),
+        np.broadcast_to(mesh[:, None], (intervals + 1, harmonics.shape[2])),
         harmonics[:, 0].real + weights.sum(1).real,
         np.einsum("mk,nkb->nmb", nodes, weights, optimize=True).real,
         np.einsum("smk,nkb->nsmb", slopes, weights, optimize=True).real,

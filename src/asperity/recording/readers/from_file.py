@@ -85,6 +85,12 @@ def read(
     ------
     InputError
         If the file cannot be read, or can be read in more than one way.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> steps = asp.read("run7.csv", {"F": "Shear"}, {"Shear": "kN"}, channels={"load": "50 kN"})
+    >>> asp.measure(steps).plot()
     """
     if recipe is not None and not isinstance(recipe, ReadingRecipe):
         recipe = ReadingRecipe.from_file(recipe)

@@ -21,14 +21,14 @@ export function scrolling(label, children, tall = false) {
 /** A table of texts or elements; the first cell of a row is its head. */
 export function table(head, rows, label, tall = false) {
   return scrolling(label, el("table", {},
-    head.length && el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, worded(t)) : el("td", {}))))),
+    head.length > 0 && el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, worded(t)) : el("td", {}))))),
     el("tbody", {}, rows.map(([first, ...others]) => el("tr", {}, el("th", { scope: "row" }, first), others.map((t) => el("td", {}, t)))))), tall);
 }
 
 /** The sections of a report, which the server words for everyone who shows it; `of` names its tables. */
 export function sections(report, of = "") {
   return report.flatMap(({ title, sentences, head, rows, warnings }) => [
-    title && el("h4", {}, capital(title)),
+    title && el("h4", {}, typeset(capital(title))),
     ...sentences.map((sentence) => el("p", {}, ended(sentence))),
     rows.length && table(head, rows.map((row) => row.map(typeset)), `${title || (head.includes("estimate") ? "Parameters" : head[0] === "law" ? "Comparison" : "Numbers")}${of}`),
     ...warnings.map((warning) => el("p", { class: "message" }, ended(warning))),

@@ -44,10 +44,10 @@ export function worded(label) {
   return LABELS.reduce((text, [from, to]) => text.replace(from, to), label);
 }
 
-/** A sentence with a capital at its beginning, unless it begins with the name of a number or a law. */
+/** A sentence with a capital at its beginning, unless it begins with the name of a number, a law or, before a colon, a recording. */
 export function capital(text) {
   const [first, second] = text.split(" ", 2);
-  const isName = !/^[a-z]{2,}[,:]?$/.test(first) || second === "must" || first in laws;
+  const isName = !/^[a-z]{2,},?$/.test(first) || second === "must" || first in laws;
   return isName ? text : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
