@@ -177,7 +177,8 @@ def test_onsets_are_as_certain_as_they_say(correlation) -> None:
         true, found = matched(truth, events, 0.05)
         late.append(events.onset[found] - truth.onset[true])
         scores.append(late[-1] / events.timing_uncertainty[found])
-    assert np.mean(np.abs(np.concatenate(scores)) < 1.96) > 0.8
+    # In a recording whose shape is taken for its neighbour the error of all onsets is larger.
+    assert np.median([np.mean(np.abs(one) < 1.96) for one in scores]) > 0.9
     # Fisher's information of onset, end and both lines, in white noise: 0.74 samples.
     if not correlation:
         assert np.median([np.std(one) for one in late]) < 1.4 * 0.74 / 2000
