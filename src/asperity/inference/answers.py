@@ -24,6 +24,7 @@ from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.laws import Law, get_law, known_law, registered
+from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
@@ -143,6 +144,15 @@ def _stick_slip(
     if data.steps is not None or data.velocities is not None:
         return None
     name = Path(data.name or data.file).stem
+    drive = trace.has("displacement") or trace.has("velocity")
+    if not drive and (hertz := modulation_of(trace)) is not None:
+        raise InputError(
+            name,
+            "be a recording of velocity steps, holds or stick-slip, or a table of readings",
+            f"a load that is modulated at {hertz:.4g} Hz",
+            "read its harmonics first, as asperity measure FILE --out readings.csv does, and fit "
+            "that table",
+        )
     over_load = False
     try:
         given = {n: MACHINE[n].check(fixed[n]) for n in ("M", "W0") if n in fixed}

@@ -172,7 +172,7 @@ def _either(
     except InputError as error:
         constant = isinstance(error, ConstantLoadError)
         known = question.modulated or question.frequency is not None
-        if known or (not constant and _recorded(trace, question.load)):
+        if known or (not constant and trace.has(question.load)):
             raise
         reason = error
     what = "The normal load is constant" if constant else "No channel is the normal load"
@@ -251,11 +251,3 @@ def _without_motion(events: StickSlipMeasurement | None) -> InputError:
         got,
         advice,
     )
-
-
-def _recorded(trace: Trace, name: str) -> bool:
-    try:
-        trace.channel(name)
-    except InputError:
-        return False
-    return True

@@ -218,6 +218,14 @@ def measure_amplitudes(
     return measurements
 
 
+def modulation_of(trace: Trace) -> float | None:
+    """Frequency (Hz) at which the recorded load is modulated; None of another recording."""
+    try:
+        return _prepared(trace, "W", "F", None, "linear", refine=True).frequency
+    except InputError:
+        return None
+
+
 @dataclass(frozen=True, eq=False)
 class _ModulatedRecording:
     """A recording with its modulation, before any of it is read."""

@@ -128,6 +128,14 @@ class Trace(Displayed):
         except InputError as error:
             raise with_cause(error, self.findings) from None
 
+    def has(self, name: str) -> bool:
+        """Whether `channel` finds a channel of this name, heading or role."""
+        try:
+            self.channel(name)
+        except InputError:
+            return False
+        return True
+
     @property
     def sample_rate(self) -> float | None:
         """Samples per second, Hz; None where the sampling is uneven."""

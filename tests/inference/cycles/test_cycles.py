@@ -79,6 +79,18 @@ def test_files_with_the_drive_bring_their_velocities(tmp_path):
     assert pytest.approx((V, 4 * V), rel=1e-6) == (slow.V, fast.V)
 
 
+def test_a_modulated_recording_is_no_stick_slip(tmp_path):
+    """Of its force alone it is an oscillation about sliding."""
+    time = np.arange(4000) / 2000
+    turn = np.cos(2 * np.pi * 100 * time)
+    noise = 2e-3 * np.random.default_rng(1).normal(size=(2, time.size))
+    columns = np.c_[time, 2.5 + 0.02 * turn + noise[0], 7 * (1 + 0.2 * turn) + noise[1]]
+    head = "time (s),shear force (N),normal force (N)"
+    np.savetxt(tmp_path / "a.csv", columns, "%.8g", ",", header=head, comments="")
+    with pytest.raises(InputError, match="modulated at 100 Hz; read its harmonics first"):
+        read_data(Fit(data=[{"file": tmp_path / "a.csv"}]))
+
+
 def test_derivatives_are_those_of_the_residuals():
     """Of a cycle that the law describes exactly; about noise, those of the sum of squares."""
     noisy = averaged_cycle(measured(2))

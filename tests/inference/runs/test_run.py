@@ -65,6 +65,20 @@ def test_corners_of_the_load_are_found_between_samples(noise):
     )
 
 
+@pytest.mark.parametrize("noise", [5e-4, 3e-3])
+@pytest.mark.parametrize(
+    ("corners", "levels"),
+    [
+        ([0.0, 300.0], [1, 1]),
+        ([0.0, 100.04, 100.06, 200.04, 200.06, 300.0], [1, 1, 1.1, 1.1, 1, 1]),
+    ],
+)
+def test_noise_of_a_load_cell_makes_no_corners(corners, levels, noise):
+    """6,000 samples reach 4 standard deviations on either side, and a chord through one more."""
+    drive = run_under(np.array(corners), np.array(levels), noise=noise, rate=20.0, end=300.0).drive
+    assert drive.edges.size == len(corners)
+
+
 def test_a_load_that_jumps_between_two_samples_stays_there():
     drive = run_under([0.0, 39.92, 39.98, 99.9], [1.0, 1.0, 1.2, 1.2]).drive
     np.testing.assert_allclose(drive.edges, [0.0, 39.9, 40.0, 99.9])

@@ -373,7 +373,8 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
     found within a wider limit, and what is slow between, in means over blocks.
     """
     if t.size <= LONGEST:
-        return _line_knots(t, W, max(_LOAD_NOISE * noise, least))
+        knots = _line_knots(t, W, max(_LOAD_NOISE * noise, least))
+        return _needed(t, W, knots, noise, least)
     chance = -float(ndtri(_LOAD_BY_CHANCE / t.size))
     knots = _line_knots(t, W, max(2 * chance * noise, least))
     result = set(knots)
@@ -385,7 +386,7 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
         means = [x[a : a + whole].reshape(-1, q).mean(1) for x in (t, W)]
         limit = max(_LOAD_NOISE * noise / np.sqrt(q), least)
         result |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
-    return sorted(result)
+    return _needed(t, W, sorted(result), noise, least)
 
 
 def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
@@ -475,13 +476,45 @@ def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
         if apart[k] > tolerance:
             kept.add(a + k)
             parts += [(a, a + k), (a + k, b)]
-    corners = sorted(kept)
-    # Those beside the corners that were found after them are mostly none.
-    needed = corners[:1]
-    for k, after in pairwise(corners[1:]):
-        if away(needed[-1], after).max() > tolerance:
-            needed.append(k)
-    return [*needed, corners[-1]]
+    return sorted(kept)
+
+
+def _needed(t: Float, y: Float, knots: Sequence[int], noise: float, least: float) -> list[int]:
+    """Knots without which the line that is nearest to y would miss more than noise.
+
+    A chord goes through noisy samples: some of the corners that it misses, and their neighbours,
+    are no corners of the load. Without a corner, the line between its neighbours leaves a larger
+    sum of squares; the increase is compared with the penalty of the Bayesian information criterion
+    for a corner's time and value.
+    """
+    at = np.asarray(knots)
+    span = float(t[-1] - t[0])
+    x, v = (t - t[0]) / span, y - y.mean()
+    columns = np.stack([np.ones_like(x), x, x * x, v, x * v])
+    sums = np.pad(np.cumsum(columns, axis=1), ((0, 0), (1, 0)))
+    penalty = 2 * np.log(t.size)
+    while at.size > 2:
+        a, k, b = at[:-2], at[1:-1], at[2:]
+        n, x1, x2, v1, xv = sums[:, b + 1] - sums[:, a]
+        m, h1, h2, hv1, hxv = sums[:, b + 1] - sums[:, k]
+        here = x[k]
+        # The hinge (x - here)+ less the line that is nearest to it.
+        h, hx = h1 - here * m, h2 - here * h1
+        hh, hv = hx - here * h, hxv - here * hv1
+        spread = x2 - x1 * x1 / n
+        slope = (hx - x1 * h / n) / spread
+        size = hh - h * h / n - slope * (hx - x1 * h / n)
+        bend = (hv - h * v1 / n - slope * (xv - x1 * v1 / n)) / np.maximum(size, 1e-300)
+        gain = bend * bend * size
+        high = np.abs(bend) * (here - x[a]) * (x[b] - here) / (x[b] - x[a])
+        worth = np.minimum(gain / (penalty * noise**2), high / least) if noise else high / least
+        # Of neighbours that nothing needs the less needed goes first.
+        lower = np.concatenate([[np.inf], worth, [np.inf]])
+        gone = (worth < 1) & (worth <= lower[:-2]) & (worth < lower[2:])
+        if not gone.any():
+            break
+        at = np.delete(at, 1 + np.flatnonzero(gone))
+    return at.tolist()
 
 
 def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
