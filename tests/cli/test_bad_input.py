@@ -102,8 +102,7 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
             "time (s),displacement (um),shear force (N)",
             [
                 "no column named like a normal load; give a constant one, like",
-                '--channel "load = 1200 N", or name the column of F/W, like --column '
-                '"friction=shear force"',
+                '--channel "load = 1200 N", or name the column of F/W, like --column "friction=mu"',
             ],
         ),
         (

@@ -238,7 +238,8 @@ def _missing(role: str, kinds: Mapping[str, str | None]) -> str:
     if role == "W":
         ways.append(f"give a constant one, like {Argument('channels', 'load', '1200 N')}")
     if role in ("W", "F"):
-        # The last free column; the first stands for the load or the force.
-        of_column = Argument("columns", "friction", (free or [*kinds])[-1])
+        # The last column without a unit; the first stands for the load or the force.
+        plain = [name for name in free or kinds if _may_be("friction", kinds[name])]
+        of_column = Argument("columns", "friction", (plain or ["mu"])[-1])
         ways.append(f"name the column of F/W, like {of_column}")
     return ", or ".join(ways) or closest(role, kinds)

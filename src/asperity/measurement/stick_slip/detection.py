@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.measurement.stick_slip.lines import lines
 from asperity.measurement.stick_slip.noise import Noise
 
 Array = NDArray[np.float64]
@@ -239,17 +241,17 @@ def _steep_part(
     """Falls from where they leave their upper quarter to where they reach their lower, and around.
 
     The highest mean of a stick that loads slowly may be far before the fall. Means are the
-    shortest that show it: between the quarters lies half of their threshold.
+    shortest between whose quarters noise does not go, or else the shortest that show the fall.
     """
     peak, trough = peak.copy(), trough.copy()
     octave = np.full(peak.size, -1)
-    for k in range(thresholds.size):
+    for clear, k in product((2.0, 1.0), range(thresholds.size)):
         means, hop = averages.means(k)
         half = ((1 << k) - 1) // 2
         last = means.size - 1
         high, low = (np.clip((at - half) // hop, 0, last) for at in (peak, trough))
         drop = means[high] - means[low]
-        new = np.flatnonzero((octave < 0) & (drop > thresholds[k]) & (low > high))
+        new = np.flatnonzero((octave < 0) & (drop > clear * thresholds[k]) & (low > high))
         if not new.size:
             continue
         octave[new] = k
@@ -283,7 +285,11 @@ def _tilt(force: Array, peak: Index, trough: Index) -> float:
 
 
 def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
-    """Of overlapping falls, those of the set that has most of them."""
+    """Of overlapping falls, those of the set that has most of them.
+
+    Falls that overlap, one the next, may be so many that no width shows all of them: if more of
+    them follow each other without overlap, whatever their widths, these are taken.
+    """
     peak = np.concatenate([p for p, _ in sets])
     trough = np.concatenate([t for _, t in sets])
     origin = np.repeat(np.arange(len(sets)), [p.size for p, _ in sets])
@@ -293,8 +299,7 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
     cluster = np.cumsum(np.concatenate([[True], peak[1:] >= latest[:-1]])) - 1
     counts = np.zeros((cluster[-1] + 1, len(sets)), int)
     np.add.at(counts, (cluster, origin), 1)
-    best = counts.argmax(1)
-    kept = origin == best[cluster]
+    kept = origin == counts.argmax(1)[cluster]
     return peak[kept], trough[kept]
 
 
@@ -309,7 +314,8 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     if peak.size < 3:
         return peak, trough
     length = np.maximum(peak[1:] - trough[:-1], 1).astype(float)
-    rate = (force[peak[1:]] - force[trough[:-1]]) / length
+    # Peaks and troughs are where noise has made them so: the slope is that of all samples.
+    rate = lines(force, trough[:-1], peak[1:] + 1)[2]
     near = np.arange(rate.size)[:, None] + np.arange(-_NEAR, _NEAR + 1)
     inside = (near >= 0) & (near < rate.size)
     near = np.clip(near, 0, rate.size - 1)

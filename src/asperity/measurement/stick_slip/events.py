@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, lfilter
 
 from asperity.measurement.stick_slip.detection import Falls
+from asperity.measurement.stick_slip.lines import Sums, lines
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
@@ -99,37 +100,6 @@ class SlipEvents:
         return np.diff(self.onset, prepend=np.nan)
 
 
-class _Sums:
-    """Sums over samples from which a straight line through any run of them follows.
-
-    Times and forces of each event's cell are counted from its middle, so that squares of long
-    recordings lose no digits.
-    """
-
-    def __init__(self, force: Array, edges: Index, origin: Index) -> None:
-        cell = np.clip(np.searchsorted(edges, np.arange(force.size), side="right") - 1, 0, None)
-        cell = np.minimum(cell, origin.size - 1)
-        t = np.arange(force.size) - origin[cell].astype(float)
-        y = force - force[origin][cell]
-        self.origin, self.level = origin.astype(float), force[origin]
-        self.t, self.tt, self.y, self.ty, self.yy = (
-            np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)
-        )
-
-    def line(self, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
-        """Level and slope at the origin of the cell, sum of squared residuals, mean of t.
-
-        `first` and `stop` bound runs inside one cell each.
-        """
-        n = (stop - first).astype(float)
-        t, tt, y, ty, yy = (s[stop] - s[first] for s in (self.t, self.tt, self.y, self.ty, self.yy))
-        n = np.maximum(n, 1.0)
-        power = np.maximum(tt - t * t / n, 1e-9)
-        slope = (ty - t * y / n) / power
-        rest = yy - y * y / n - slope * (ty - t * y / n)
-        return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
-
-
 def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     """Measure every fall.
 
@@ -166,7 +136,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     edges = np.concatenate(
         [[(before[0] + peak[0]) // 2], (trough[:-1] + peak[1:]) // 2, [(trough[-1] + n) // 2]]
     ).astype(np.intp)
-    sums = _Sums(force, edges[:-1], peak)
+    sums = Sums(force, edges[:-1], peak)
     drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
     # The tail of an exponential fall is as long again as its quarters say.
@@ -177,7 +147,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     quarter = (peak[1:] - trough[:-1]) // 4
     sticks = (np.empty(0),) * 4
     if k > 1:
-        sticks = _lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
+        sticks = lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
     rate = np.maximum(np.concatenate([sticks[2][:1] if k > 1 else [0.0], sticks[2]]), 0.0)
     bounds = peak, trough, first, stop
     # Throughout the recording: the largest of equal slips are those that noise makes so.
@@ -211,7 +181,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
 
 
 def _onset_and_end(
-    sums: _Sums,
+    sums: Sums,
     part: Index,
     peak: Index,
     trough: Index,
@@ -329,7 +299,7 @@ class _Timing:
 
 
 def _timing(
-    sums: _Sums,
+    sums: Sums,
     part: Index,
     bounds: Bounds,
     rate: Array,
@@ -349,7 +319,7 @@ def _timing(
     first, stop = bounds[2:]
     k = part.size
 
-    def read(sums: _Sums, part: Index, bounds: Bounds, rate: Array) -> list[tuple[Array, ...]]:
+    def read(sums: Sums, part: Index, bounds: Bounds, rate: Array) -> list[tuple[Array, ...]]:
         return [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
 
     def contrasts(fits: list[tuple[Array, ...]], drop: Array) -> Array:
@@ -373,7 +343,7 @@ def _timing(
         settling = 10 * taps.size
         white = rng.standard_normal(settling + place.size)
         made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
-        again = read(_Sums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many])
+        again = read(Sums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many])
         values = contrasts(again, drop[many])
         covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
         off = seen - values.mean(1)
@@ -404,7 +374,7 @@ def _timing(
 
 
 def _force_of(
-    sums: _Sums,
+    sums: Sums,
     part: Index,
     shape: Shape,
     slips: tuple[Array, Array],
@@ -433,7 +403,7 @@ def _measured(
     time: Array,
     force: Array,
     scatter: Array,
-    sums: _Sums,
+    sums: Sums,
     slips: tuple[Array, Array],
     bounds: tuple[Index, Index],
     sticks: tuple[Array, Array, Array, Array],
@@ -499,14 +469,6 @@ def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
     runs = np.flatnonzero(size >= np.median(size))[:: -(-size.size // _RUNS)]
     parts = [force[first[k] : first[k] + size[k]] for k in runs]
     return fitted([detrend(part) for part in parts], parameters=2 * len(parts))
-
-
-def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
-    """Centre, mean, slope and number of samples of runs that do not overlap, in rising order."""
-    sums = _Sums(force, first, (first + stop) // 2)
-    level, slope, _, away = sums.line(first, stop)
-    mean, count = level + slope * away + sums.level, (stop - first).astype(float)
-    return sums.origin + away, mean, slope, count
 
 
 def _of_mean(scatter: Array, samples: Index | Array) -> Array:

@@ -217,7 +217,15 @@ def measure_stick_slip(
     if machine.mass and machine.stiffness:
         period = 2 * np.pi * np.sqrt(machine.mass / machine.stiffness)
     share = impulses.size / time.size
-    parts = regimes(time, friction, events, smallest, impulses=share, natural_period=period)
+    parts = regimes(
+        time,
+        friction,
+        events,
+        smallest,
+        falls=len(falls),
+        impulses=share,
+        natural_period=period,
+    )
     slip_share = _slip_share(signals, events)
     slip, speed, energy = _spring(events, machine)
     if signals.displacement is not None and slip_share > SLIDER:

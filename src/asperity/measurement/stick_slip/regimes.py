@@ -94,6 +94,7 @@ def regimes(
     events: SlipEvents,
     smallest_drop: float,
     *,
+    falls: int = 0,
     impulses: float = 0.0,
     natural_period: float | None = None,
 ) -> tuple[Regime, ...]:
@@ -105,13 +106,15 @@ def regimes(
     events : SlipEvents
     smallest_drop : float
         That could have been seen.
+    falls : int
+        Of the force, slip events or not.
     impulses : float
         Share of the samples that were taken for impulses.
     natural_period : float, optional
         2 pi sqrt(M/K) (s).
     """
     if not len(events):
-        return (_without_events(time, force, smallest_drop, impulses),)
+        return (_without_events(time, force, smallest_drop, falls, impulses),)
     cycle, slope = _usual(events.recurrence), _usual(events.loading_slope)
     cycle = np.where(np.isfinite(cycle), cycle, float(time[-1] - time[0]) / 2)
     quiet = events.onset[1:] - events.end[:-1]
@@ -181,7 +184,9 @@ def _other_velocity(slope: Array) -> NDArray[np.bool_]:
     return changed
 
 
-def _without_events(time: Array, force: Array, smallest_drop: float, impulses: float) -> Regime:
+def _without_events(
+    time: Array, force: Array, smallest_drop: float, falls: int, impulses: float
+) -> Regime:
     mean = abs(float(np.mean(force)))
     share = smallest_drop / mean if mean else np.inf
     seen = f"no fall of the force is larger than noise makes, {smallest_drop:.2g}"
@@ -195,6 +200,12 @@ def _without_events(time: Array, force: Array, smallest_drop: float, impulses: f
         seen += (
             f", and it {'rises' if change > 0 else 'falls'} by {100 * abs(change) / mean:.2g} % of "
             "its mean throughout: sliding, or a stick longer than the recording"
+        )
+    if falls:
+        kind = "cannot tell"
+        seen = (
+            f"the force falls by more than noise makes {falls} time{'s' * (falls > 1)}, but not "
+            "from one straight line to another: a transient of sliding, or slips unlike any other"
         )
     if impulses > _MANY:
         kind = "cannot tell"

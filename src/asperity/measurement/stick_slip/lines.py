@@ -1,0 +1,48 @@
+"""Straight lines through many runs of samples of a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class Sums:
+    """Sums over samples from which a straight line through any run of them follows.
+
+    Times and forces of each event's cell are counted from its middle, so that squares of long
+    recordings lose no digits.
+    """
+
+    def __init__(self, force: Array, edges: Index, origin: Index) -> None:
+        cell = np.clip(np.searchsorted(edges, np.arange(force.size), side="right") - 1, 0, None)
+        cell = np.minimum(cell, origin.size - 1)
+        t = np.arange(force.size) - origin[cell].astype(float)
+        y = force - force[origin][cell]
+        self.origin, self.level = origin.astype(float), force[origin]
+        self.t, self.tt, self.y, self.ty, self.yy = (
+            np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)
+        )
+
+    def line(self, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+        """Level and slope at the origin of the cell, sum of squared residuals, mean of t.
+
+        `first` and `stop` bound runs inside one cell each.
+        """
+        n = (stop - first).astype(float)
+        t, tt, y, ty, yy = (s[stop] - s[first] for s in (self.t, self.tt, self.y, self.ty, self.yy))
+        n = np.maximum(n, 1.0)
+        power = np.maximum(tt - t * t / n, 1e-9)
+        slope = (ty - t * y / n) / power
+        rest = yy - y * y / n - slope * (ty - t * y / n)
+        return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
+
+
+def lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+    """Centre, mean, slope and number of samples of runs that do not overlap, in rising order."""
+    sums = Sums(force, first, (first + stop) // 2)
+    level, slope, _, away = sums.line(first, stop)
+    mean, count = level + slope * away + sums.level, (stop - first).astype(float)
+    return sums.origin + away, mean, slope, count
