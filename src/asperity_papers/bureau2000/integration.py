@@ -5,7 +5,8 @@ the equations of section III are written out again, so that a formula or a fast 
 with this has been checked by something else. It also carries the inertia of the slider, which the
 quasi-static solver leaves out. One period is integrated by DOP853 and closed by Newton's method.
 
-States, dimensionless: y = F/W0 - mu, phi = ln(V Phi/D0), and with inertia also u = ln(v/V).
+States, dimensionless: y = F/W0 - mu, phi = ln(V Phi/D0), and with inertia also u, the velocity
+(ln(v/V) with rigid asperities, v/V - 1 with elastic ones) and g = F_i/W0 - mu (elastic ones only).
 """
 
 from __future__ import annotations
@@ -26,10 +27,7 @@ _EXPONENT = 200.0
 
 @dataclass(frozen=True)
 class IntegratedPoint:
-    """Numbers of one operating point, SI: lambda_ = 0 are rigid asperities, M = 0 no inertia.
-
-    The mass counts with rigid asperities only.
-    """
+    """Numbers of one operating point, SI; lambda_ = 0 are rigid asperities, M = 0 no inertia."""
 
     mu: float
     A: float
@@ -38,40 +36,77 @@ class IntegratedPoint:
     K: float
     W0: float
     V: float
-    omega: float
+    frequency: float
     M: float = 0.0
     alpha: float = 0.0
     lambda_: float = 0.0
 
     @property
+    def omega(self) -> float:
+        """Angular frequency (rad/s)."""
+        return 2 * np.pi * self.frequency
+
+    @property
     def size(self) -> int:
         """Number of states."""
-        return 3 if self.M else 2
+        return 2 if not self.M else (4 if self.lambda_ else 3)
 
     def rates(self, t: float, flat: Float, epsilon: float) -> Float:
         """Time derivatives of copies of the states, laid out as (size, copies)."""
-        y, phi, *velocity = flat.reshape(self.size, -1)
+        Y = flat.reshape(self.size, -1)
         w = 1 + epsilon * np.cos(self.omega * t)
         log_w_rate = -epsilon * self.omega * np.sin(self.omega * t) / w
-        f = self.mu + y
-        if self.M:
-            (u,) = velocity
-            v = _exp(u)
-            friction = w * (self.mu + self.A * u + self.B * phi)
-            further = [self.W0 * (f - friction) / (self.M * self.V * v)]
-            rate = self.K * self.V / self.W0 * (1 - v)
+        if not self.M:
+            out = self._quasi_static(Y, w, log_w_rate)
+        elif self.lambda_:
+            out = self._elastic(Y, w, log_w_rate)
         else:
-            # Eq. (1) solved for the velocity of its rate term, over V.
-            slip, further = _exp((f / w - self.mu - self.B * phi) / self.A), []
-            # d/dt (x - F lambda/W) = V slip with x = V t - F/K: Eq. (29) differentiated.
-            asperities = self.lambda_ / w
-            rate = (self.V * (1 - slip) + asperities * f * log_w_rate) / (
-                self.W0 / self.K + asperities
-            )
-            v = 1 - rate * self.W0 / (self.K * self.V)
-        # Eq. (6) for phi; Eq. (2) at alpha = 0.
-        ageing = self.V / self.D0 * (_exp(-phi) - v) - self.alpha / self.B * log_w_rate
-        return np.concatenate([rate, ageing, *further])
+            out = self._rigid(Y, w, log_w_rate)
+        return np.concatenate(out)
+
+    def _slip(self, interface: Float, phi: Float, w: float) -> Float:
+        """Eq. (1) solved for the velocity of its rate term, over V; `interface` is F_i/W0."""
+        exponent = (interface / w - self.mu - self.B * phi) / self.A
+        return _exp(exponent)
+
+    def _ageing(self, v: Float, phi: Float, log_w_rate: float) -> Float:
+        """Eq. (6) for phi; Eq. (2) at alpha = 0. `v` over V."""
+        renewal = self.V / self.D0 * (_exp(-phi) - v)
+        return renewal - (self.alpha / self.B * log_w_rate if self.alpha else 0.0)
+
+    def _quasi_static(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
+        y, phi = Y
+        f = self.mu + y
+        # d/dt (x - F lambda/W) = V slip with x = V t - F/K: Eq. (29) differentiated.
+        asperities = self.lambda_ / w
+        rate = (self.V * (1 - self._slip(f, phi, w)) + asperities * f * log_w_rate) / (
+            self.W0 / self.K + asperities
+        )
+        v = 1 - rate * self.W0 / (self.K * self.V)
+        return [rate, self._ageing(v, phi, log_w_rate)]
+
+    def _rigid(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
+        y, phi, u = Y
+        v = _exp(u)
+        friction = w * (self.mu + self.A * u + self.B * phi)
+        u_rate = self.W0 * (self.mu + y - friction) / (self.M * self.V * v)
+        return [
+            self.K * self.V / self.W0 * (1 - v),
+            self._ageing(v, phi, log_w_rate),
+            u_rate,
+        ]
+
+    def _elastic(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
+        y, phi, u, g = Y
+        interface = self.mu + g
+        v = 1 + u
+        slip = self._slip(interface, phi, w)
+        return [
+            self.K * self.V / self.W0 * (1 - v),
+            self._ageing(v, phi, log_w_rate),
+            self.W0 * (y - g) / (self.M * self.V),
+            w / self.lambda_ * self.V * (v - slip) + interface * log_w_rate,
+        ]
 
 
 @dataclass(frozen=True)
@@ -118,7 +153,7 @@ def periodic_orbit(p: IntegratedPoint, epsilon: float, drop: float = 0.0) -> Int
         If Newton's method does not close the orbit.
     """
     start = np.zeros(p.size)
-    start[0] = drop
+    start[0] = start[-1 if p.size == 4 else 0] = drop
     nudge = 1e-7 * np.ones(p.size)
     for _ in range(_NEWTON_STEPS):
         copies = np.column_stack([start, start[:, None] + np.diag(nudge)])
@@ -141,7 +176,7 @@ def _advance(p: IntegratedPoint, states: Float, epsilon: float) -> Float:
     """Copies of the states at _SAMPLES + 1 instants of one period, (size, copies, instants)."""
     from scipy.integrate import solve_ivp
 
-    period = 2 * np.pi / p.omega
+    period = 1 / p.frequency
     run = solve_ivp(
         p.rates,
         (0.0, period),

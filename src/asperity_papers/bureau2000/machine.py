@@ -298,7 +298,8 @@ class Machine:
 
     def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
         """What the reference integration takes; rigid asperities, no inertia."""
-        return IntegratedPoint(**self._point(V, **overrides))
+        numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
+        return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
 
     def orbit(self, point: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
         """A periodic orbit of the reference integration, integrated once."""
