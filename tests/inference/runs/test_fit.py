@@ -17,6 +17,7 @@ from asperity.inference.fitting.plausibility import (
     contradicted_stiffness,
     unusual_numbers,
 )
+from asperity.inference.fitting.result import Optimum
 from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, without_spikes
@@ -410,6 +411,14 @@ def test_a_transient_longer_than_its_recording_leaves_its_length_open(monkeypatc
     assert {"B", "D0"} <= {*fitted.undetermined}
     assert not any("A - B" in sentence for sentence in fit_in_words(fitted))
     assert coverage.TRUTH["A"] == pytest.approx(fitted.values["A"], rel=0.1)
+
+
+@pytest.mark.parametrize(("above", "known"), [(1.0, False), (20.0, True)])
+def test_no_sign_is_claimed_that_another_allowed_minimum_denies(found, above, known):
+    mirrored = found.values | {"A": found.values["B"], "B": found.values["A"]}
+    rivalled = replace(found, optima=(Optimum(found.chi2 + above, mirrored),))
+    (said,) = (s for s in fit_in_words(rivalled) if "A - B" in s)
+    assert ("velocity weakening" in said) == known
 
 
 def test_a_gain_with_a_prior_widens_the_intervals(found):

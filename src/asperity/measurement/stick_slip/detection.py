@@ -285,11 +285,7 @@ def _tilt(force: Array, peak: Index, trough: Index) -> float:
 
 
 def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
-    """Of overlapping falls, those of the set that has most of them.
-
-    Falls that overlap, one the next, may be so many that no width shows all of them: if more of
-    them follow each other without overlap, whatever their widths, these are taken.
-    """
+    """Of overlapping falls, those of the set that has most of them."""
     peak = np.concatenate([p for p, _ in sets])
     trough = np.concatenate([t for _, t in sets])
     origin = np.repeat(np.arange(len(sets)), [p.size for p, _ in sets])

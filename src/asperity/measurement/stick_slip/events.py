@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend, lfilter
 
 from asperity.measurement.stick_slip.detection import Falls
 from asperity.measurement.stick_slip.lines import Sums, lines
@@ -316,6 +315,9 @@ def _timing(
     Where no shape describes the recording, all are as likely as their distances say in units of
     the smallest.
     """
+    # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
+    from scipy.signal import lfilter
+
     first, stop = bounds[2:]
     k = part.size
 
@@ -465,6 +467,8 @@ def _measured(
 
 def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
     """Noise about straight lines through runs of sticks, of which short ones are left out."""
+    from scipy.signal import detrend
+
     size = np.minimum(stop - first, _LONGEST_RUN)
     runs = np.flatnonzero(size >= np.median(size))[:: -(-size.size // _RUNS)]
     parts = [force[first[k] : first[k] + size[k]] for k in runs]

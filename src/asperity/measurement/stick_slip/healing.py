@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def of_campaign(stick_durations: Array, drops: Array, uncertainties: Array) -> S
         excess = float(weight @ squares) - (n - 2)
         extra = max(extra + excess / float((weight**2) @ squares), 0.0)
     spread = 1 / np.sqrt(power)
-    half = float(student.ppf(0.975, n - 2)) * spread
+    half = float(stdtrit(n - 2, 0.975)) * spread
     interval = float(slope - half), float(slope + half)
     reason = ""
     if np.ptp(x) < 1:

@@ -13,7 +13,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.stats import kendalltau
 
 from asperity.measurement.stick_slip.events import SlipEvents
 
@@ -279,6 +278,9 @@ def _train(
         return Regime("cannot tell", *span, first, stop, text)
     kind: Kind = "irregular stick-slip"
     if number >= _FEWEST_OF_TREND:
+        # scipy.stats takes half a second to load, which a fit without events need not wait for.
+        from scipy.stats import kendalltau
+
         tau = kendalltau(np.arange(number), drop)
         line = np.polynomial.polynomial.polyfit(np.linspace(0, 1, number), drop, 1)
         growth = float((line[0] + line[1]) / line[0]) if line[0] > 0 else np.inf
