@@ -266,6 +266,9 @@ def search_orbits(
         for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
             keep(some, orbits)
 
+    rows = left()
+    if known is not None and known.orbit is not None:
+        follow(known.orbit, rows[known.known[rows]])
     slow = follows_steady_sliding(problem, left())
     series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0])
     read = partial(_numbers, harmonics=harmonics)
@@ -273,9 +276,6 @@ def search_orbits(
         read, (problem, series), exact, mesh_chunk(problem.system.size)
     ):
         keep(some, MeshOrbits.of(take(series, some), numbers))
-    rows = left()
-    if known is not None and known.orbit is not None:
-        follow(known.orbit, rows[known.known[rows]])
     if len(rows := left()):
         follow(*orbits_from_averaged_limit(problem, rows))
     rows = left()
