@@ -121,16 +121,15 @@ class KnownOrbits:
         self.known = np.zeros(self.points, bool)
 
     def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
-        """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
+        """Keep the orbits of the points `index` of a problem, on `FIRST_MESH` intervals."""
         size = problem.system.size
         if self.orbit is None:
-            intervals = min(MESHES[0], len(orbit.mesh) - 1)
-            self.orbit = Orbit.empty(orbit.scheme, size, intervals, self.points)
+            self.orbit = Orbit.empty(orbit.scheme, size, FIRST_MESH, self.points)
         self.known[index] = True
         if len(orbit.mesh) == len(self.orbit.mesh):
             put(self.orbit, index, orbit)
             return
-        remesh = partial(remeshed, intervals=len(self.orbit.mesh) - 1)
+        remesh = partial(remeshed, intervals=FIRST_MESH)
         inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
