@@ -26,6 +26,10 @@ from asperity.laws import Law
 
 Float = NDArray[np.float64]
 T = TypeVar("T")
+
+#: Absolute or relative difference between chi-squared of a model and of its coarser one with which
+#: a minimum of the latter is near one of the former.
+_CLOSE = 1e-2
 #: Residuals of parameters by name, and of arrays.
 CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
@@ -187,6 +191,10 @@ class DataTerm(ABC):
             None for data other than tables of lock-in readings.
         """
         return None
+
+    def coarser(self) -> DataTerm:
+        """The same data with a coarser model, to go near a minimum with; itself without one."""
+        return self
 
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
@@ -383,6 +391,13 @@ class Objective:
             Largest number of evaluations of the residuals.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
+        terms = tuple(term.coarser() for term in self.terms)
+        if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
+            ahead = replace(self, terms=terms)
+            near = ahead.minimise(u, kept, tolerance=tolerance, evaluations=evaluations)
+            self.unsolved += ahead.unsolved
+            if math.isclose(self.chi2(near.u), near.chi2, rel_tol=_CLOSE, abs_tol=_CLOSE):
+                u = near.u
         kept = dict(kept or {})
         moving = [i for i in range(len(u)) if i not in kept]
         point = np.array(u, float)

@@ -87,21 +87,18 @@ def _values(structure: Any) -> Callable[..., PointValues]:
     return jit_large(values)
 
 
-def _slopes_along(
-    problem: Problem, direction: Problem, theta: Array, states: Array, change: Array
-) -> tuple[Array, Array]:
+@jit_large
+def _slopes(
+    problem: Problem, directions: Problem, theta: Array, states: Array
+) -> tuple[Array, Array, Array]:
     def rates_and_force(problem: Problem, Y: Array) -> tuple[Array, Array]:
         at = problem.load.at(theta)
         return problem.system.rates(Y, at), problem.system.force(Y, at)
 
-    return jax.jvp(rates_and_force, (problem, states), (direction, change))[1]
-
-
-@jit_large
-def _slopes(
-    problem: Problem, direction: Problem, theta: Array, states: Array, change: Array
-) -> tuple[Array, Array]:
-    return _slopes_along(problem, direction, theta, states, change)
+    _, push = jax.linearize(lambda problem: rates_and_force(problem, states), problem)
+    # Phases and points do not depend on each other: the sum's gradient is each one's own.
+    gradient = jax.grad(lambda Y: rates_and_force(problem, Y)[1].sum())(states)
+    return *jax.vmap(push)(directions), gradient
 
 
 @jit_large
@@ -113,10 +110,9 @@ def _curvature(
     change: Array,
     vector: Array,
 ) -> Array:
-    none = jax.tree.map(jnp.zeros_like, problem)
-
     def jacobian_times_vector(problem: Problem, Y: Array) -> Array:
-        return _slopes_along(problem, none, theta, Y, vector)[0]
+        at = problem.load.at(theta)
+        return jax.jvp(lambda Y: problem.system.rates(Y, at), (Y,), (vector,))[1]
 
     return jax.jvp(jacobian_times_vector, (problem, states), (direction, change))[1]
 
@@ -149,19 +145,28 @@ def values_at(system: Motion, at: Excitation, centre: Any, deviations: Float) ->
 
 
 def slopes_along(
-    problem: Problem, direction: Problem, theta: Float, states: Float, change: Float
-) -> tuple[Float, Float]:
-    """Derivatives of rates (size, ..., points) and of F/W0 (..., points).
+    problem: Problem, directions: Problem, theta: Float, states: Float
+) -> tuple[Float, Float, Float]:
+    """Derivatives along directions of the parameters, and those of the force to the states.
 
     Parameters
     ----------
-    problem, direction : Problem
-        Parameters of shape (points,), and how they change.
+    problem : Problem
+        Parameters of shape (points,).
+    directions : Problem
+        How they change, arrays (directions, points).
     theta : array, shape (..., points)
-    states, change : array, shape (size, ..., points)
-        States, and how they change.
+    states : array, shape (size, ..., points)
+
+    Returns
+    -------
+    rates : array, shape (directions, size, ..., points)
+    force : array, shape (directions, ..., points)
+        Of F/W0.
+    gradient : array, shape (size, ..., points)
+        Of F/W0 to the states.
     """
-    return _by_rows(partial(_slopes, problem, direction), theta, states, change)
+    return _by_rows(partial(_slopes, problem, directions), theta, states)
 
 
 def curvature_along(
@@ -176,9 +181,11 @@ def curvature_along(
 
     Parameters
     ----------
-    problem, direction, theta, states, change
-        As of `slopes_along`.
-    vector : array, shape (size, ..., points)
+    problem, direction : Problem
+        Parameters of shape (points,), and how they change.
+    theta : array, shape (..., points)
+    states, change, vector : array, shape (size, ..., points)
+        States, how they change, and the vector.
     """
     return _by_rows(partial(_curvature, problem, direction), theta, states, change, vector)
 

@@ -169,6 +169,14 @@ class LockInTerm(DataTerm):
         """Search for the orbits that the fast method does not find at every call, or no more."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
 
+    def coarser(self) -> LockInTerm:
+        """As in `DataTerm`; both go on from the orbits of each other."""
+        if not self.searches or self.coarse:
+            return self
+        result = copy(self)
+        result.coarse = True
+        return result
+
     @property
     def _count(self) -> int:
         """Number of readings."""

@@ -94,6 +94,8 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     # Points out of range are left to the search, which reports the reason.
     good = valid & (rate >= SMALLEST_RATE) & (rate < LARGEST_CONTRACTING_RATE)
     good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
+    # Points that the method is not for take no steps.
+    problem = problem._replace(load=jax.tree.map(lambda a: jnp.where(good, a, 0.0), problem.load))
     solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
     return solve(problem, program, valid, good)
 
@@ -127,7 +129,8 @@ def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Arra
     steady = system.steady()
     mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
     zero_mean = tuple(jnp.where(good, a, 0.0) for a in orbit.zero_mean)
-    return FastOrbits(FourierUnknowns(mean, zero_mean), (orbit.steps,), valid, good)
+    steps = jnp.where(good.any(), orbit.steps, 0)
+    return FastOrbits(FourierUnknowns(mean, zero_mean), (steps,), valid, good)
 
 
 def _fourier_values(
@@ -161,7 +164,8 @@ def _balanced_orbits(problem: Problem, program: Program, valid: Array, good: Arr
     steady = equations.steady(problem)
     unknowns = jax.tree.map(lambda a, s: jnp.where(good, a, s), orbit.unknowns, steady)
     prepared = jax.tree.map(lambda a: jnp.where(good, a, 0.0), orbit.prepared)
-    return FastOrbits(unknowns, (prepared, orbit.steps), valid, good)
+    steps = jnp.where(good.any(), orbit.steps, 0)
+    return FastOrbits(unknowns, (prepared, steps), valid, good)
 
 
 def _balanced_values(

@@ -11,7 +11,7 @@ maps T_i.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from functools import partial
 from typing import Any
 
@@ -78,53 +78,36 @@ def orbit_derivatives(
         logarithms of the multipliers.
     """
     with np.errstate(all="ignore"):
-        directions = {
-            name: direction
-            for name, direction in equations.directions(problem).items()
-            if names is None or name in names
-        }
-        table = np.zeros(
-            (
-                len(equations.names),
-                len(problem.system.V),
-                1 + 2 * harmonics + (0 if logs is None else 2 * len(logs)),
-            )
-        )
-        if not directions:
+        given, points = equations.influential(names), len(problem.system.V)
+        outputs = 1 + 2 * harmonics + (0 if logs is None else 2 * len(logs))
+        table = np.zeros((len(equations.names), points, outputs))
+        if not given:
             return table
+        directions = equations.directions(given, points)
         values = collocated(problem, orbit)
-        sides, forces = _slopes(problem, orbit, directions.values())
+        sides, forces, gradient = _slopes(problem, orbit, directions)
         changes = _orbit_changes(orbit, values, sides)
-        forces = forces + _force_of_states(problem, orbit, changes)
+        forces = forces + np.einsum("nkmb,dnkmb->dkmb", gradient, changes)
         columns = [_force_columns(orbit, forces, harmonics)]
         if logs is not None:
             columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
         part = np.concatenate(columns, axis=-1)
-    table[[name in directions for name in equations.names]] = part
+    table[[name in given for name in equations.names]] = part
     return table
 
 
-def _slopes(problem: Problem, orbit: Orbit, directions: Iterable[Problem]) -> tuple[Float, Float]:
+def _slopes(problem: Problem, orbit: Orbit, directions: Problem) -> tuple[Float, Float, Float]:
     """Changes of rates (size, STAGES, directions, ...) and F/W0 (directions, STAGES, ...).
 
-    With the parameters, at fixed states.
+    With the parameters, at fixed states; then those of F/W0 with each state, (size, STAGES, ...).
     """
-    theta, states = orbit.stage_phases, orbit.stage_states
-    still = np.zeros_like(states)
-    rates, forces = zip(
-        *(slopes_along(problem, d, theta, states, still) for d in directions), strict=True
-    )
-    return np.stack(rates, axis=2), np.stack(forces)
-
-
-def _force_of_states(problem: Problem, orbit: Orbit, changes: Float) -> Float:
-    """Changes of F/W0 with those of the states, (directions, STAGES, ...)."""
-    theta, states = orbit.stage_phases, orbit.stage_states
-    none = jax.tree.map(np.zeros_like, problem)
-    return sum(
-        slopes_along(problem, none, theta, states, _unit(i, states))[1] * changes[:, i]
-        for i in range(len(states))
-    )
+    count, parts = len(directions.system.V), []
+    for start in range(0, count, _SIDES):
+        some = np.minimum(np.arange(start, start + _SIDES), count - 1)
+        part = jax.tree.map(lambda a, some=some: a[some], directions)
+        parts.append(slopes_along(problem, part, orbit.stage_phases, orbit.stage_states))
+    rates, forces = (np.concatenate([p[i] for p in parts])[:count] for i in range(2))
+    return np.moveaxis(rates, 0, 2), forces, parts[0][2]
 
 
 @jit_large
@@ -183,7 +166,7 @@ def _multiplier_columns(
     problem: Problem,
     orbit: Orbit,
     values: Any,
-    directions: dict[str, Problem],
+    directions: Problem,
     changes: Float,
     logs: Complex,
 ) -> list[Float]:
@@ -197,18 +180,15 @@ def _multiplier_columns(
     maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
     right, left, gap = _eigenvectors(maps, logs)
 
-    def along(direction: Problem, change: Float, vector: Float) -> Float:
-        return curvature_along(problem, direction, theta, states, change, vector)
+    def along(k: int, vector: Float) -> Float:
+        direction = jax.tree.map(lambda a: a[k], directions)
+        return curvature_along(problem, direction, theta, states, changes[k], vector)
 
     result = np.zeros((len(changes), size, points), complex)
     for j in range(size - pair):
         bent = np.einsum("nkcmb,cmb->nkmb", response, right[j])
         inner = right[j][:, None] + orbit.widths * orbit.stage_sums(bent)
-        sides = [
-            along(d, change, part)
-            for d, change in zip(directions.values(), changes, strict=True)
-            for part in (inner.real, inner.imag)
-        ]
+        sides = [along(k, part) for k in range(len(changes)) for part in (inner.real, inner.imag)]
         _, constant = _condensed(values.jacobian, np.stack(sides, axis=2), orbit)
         moved = orbit.widths * np.einsum("k,nkcmb->cnmb", orbit.scheme.b, constant)
         moved = moved[0::2] + 1j * moved[1::2]
@@ -217,12 +197,7 @@ def _multiplier_columns(
         result[:, j] = share.sum(1)
     if pair:
         trace = sum(
-            np.stack(
-                [
-                    along(d, change, _unit(i, states))[i]
-                    for d, change in zip(directions.values(), changes, strict=True)
-                ]
-            )
+            np.stack([along(k, _unit(i, states))[i] for k in range(len(changes))])
             for i in range(size)
         )
         whole = (quadrature(orbit) * trace).sum((1, 2))

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import jax
@@ -137,20 +138,27 @@ class ParametrisedProblem:
             values["eta"] = system.eta
         return values | load_values(load)
 
-    def directions(self, problem: Problem) -> dict[str, Problem]:
-        """Derivatives of a problem, NumPy arrays, by each parameter that has an influence."""
-        none = jax.tree.map(np.zeros_like, problem)
-        one = np.ones(np.shape(problem.system.V))
-        known = equation_parameters(*problem)
-        directions = {}
-        for name in self.names:
+    def influential(self, wanted: Collection[str] | None = None) -> tuple[str, ...]:
+        """Those of `wanted`, or of all, that have an influence, in the order of `names`."""
+        unit = dict.fromkeys(self.names, np.ones(1))
+        known = {*equation_parameters(*self.problem(unit)), *self.load_names}
+        return tuple(n for n in self.names if n in known and (wanted is None or n in wanted))
+
+    @lru_cache(maxsize=64)  # noqa: B019 - a handful of equations
+    def directions(self, names: tuple[str, ...], points: int) -> Problem:
+        """Derivatives of a problem by each of `names`, NumPy arrays (names, points)."""
+        one = np.ones(points)
+        whole = jax.tree.map(np.asarray, self.problem(dict.fromkeys(self.names, one)))
+        none, known = jax.tree.map(np.zeros_like, whole), equation_parameters(*whole)
+        directions = []
+        for name in names:
             if name in self.load_names:
                 unit = {n: one * (n == name) for n in self.load_names}
                 load = jax.tree.map(np.asarray, self._load(unit))
-                directions[name] = none._replace(load=load)
-            elif name in known:
-                directions[name] = with_value(none, known[name], one)
-        return directions
+                directions.append(none._replace(load=load))
+            else:
+                directions.append(with_value(none, known[name], one))
+        return jax.tree.map(lambda *parts: np.stack(parts), *directions)
 
     def valid(self, parameters: Mapping[str, Array]) -> Array:
         """Mask of the points whose parameters all obey their rules, shape (points,)."""

@@ -25,7 +25,7 @@ from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
-from asperity.orbit.methods.series import follows_steady_sliding, series_orbits
+from asperity.orbit.methods.series import NODES, follows_steady_sliding, series_orbits
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
@@ -48,6 +48,11 @@ _AGREEMENT = (1e-10, 1e-8)
 #: The same between two meshes: the error of the finer one is smaller by 3^8, for a stiff orbit by
 #: 3^4.
 _MESH_AGREEMENT = (1e-8, AGREEMENT)
+
+
+#: Nodes of series in a direct search; a mesh goes on from what they do not resolve, in less time
+#: than the dense equations of more nodes take.
+_FEW_NODES = NODES[:2]
 
 
 class MeshOrbits(NamedTuple):
@@ -121,16 +126,15 @@ class KnownOrbits:
         self.known = np.zeros(self.points, bool)
 
     def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
-        """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
+        """Keep the orbits of the points `index` of a problem, on `FIRST_MESH` intervals."""
         size = problem.system.size
         if self.orbit is None:
-            intervals = min(MESHES[0], len(orbit.mesh) - 1)
-            self.orbit = Orbit.empty(orbit.scheme, size, intervals, self.points)
+            self.orbit = Orbit.empty(orbit.scheme, size, FIRST_MESH, self.points)
         self.known[index] = True
         if len(orbit.mesh) == len(self.orbit.mesh):
             put(self.orbit, index, orbit)
             return
-        remesh = partial(remeshed, intervals=len(self.orbit.mesh) - 1)
+        remesh = partial(remeshed, intervals=FIRST_MESH)
         inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
@@ -266,16 +270,17 @@ def search_orbits(
         for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
             keep(some, orbits)
 
+    rows = left()
+    if known is not None and known.orbit is not None:
+        follow(known.orbit, rows[known.known[rows]])
     slow = follows_steady_sliding(problem, left())
-    series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0])
+    series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0], _FEW_NODES)
     read = partial(_numbers, harmonics=harmonics)
     for some, numbers in run_chunks(
         read, (problem, series), exact, mesh_chunk(problem.system.size)
     ):
         keep(some, MeshOrbits.of(take(series, some), numbers))
-    rows = left()
-    if known is not None and known.orbit is not None:
-        follow(known.orbit, rows[known.known[rows]])
+    follow(series, np.setdiff1d(slow, exact))
     if len(rows := left()):
         follow(*orbits_from_averaged_limit(problem, rows))
     rows = left()

@@ -175,8 +175,8 @@ def collocated(problem: Problem, orbit: Orbit, at: Excitation | None = None) -> 
 
 def parameter_slopes(problem: Problem, direction: Problem, orbit: Orbit) -> Float:
     """Derivative of the rates at the collocation points along a direction of the parameters."""
-    states = orbit.stage_states
-    return slopes_along(problem, direction, orbit.stage_phases, states, np.zeros_like(states))[0]
+    one = jax.tree.map(lambda a: np.asarray(a)[None], direction)
+    return slopes_along(problem, one, orbit.stage_phases, orbit.stage_states)[0][0]
 
 
 def condensed(

@@ -102,18 +102,22 @@ def follows_steady_sliding(problem: Problem, index: Indices) -> Indices:
 
 
 def series_orbits(
-    problem: Problem, index: Indices, intervals: int = INTERVALS
+    problem: Problem,
+    index: Indices,
+    intervals: int = INTERVALS,
+    numbers: tuple[int, ...] = NODES,
 ) -> tuple[Orbit, Indices]:
     """Orbits of the points `index` of a problem (NumPy arrays) on even intervals.
 
-    Also returned are the points that a series resolves.
+    Also returned are the points that a series of one of the `numbers` of nodes resolves. Orbits of
+    the others are the last series, an initial guess.
     """
     system, resolved = problem.system, [index[:0]]
     scheme = scheme_for(system)
     orbit = Orbit.empty(scheme, system.size, intervals, len(system.V))
 
     def solve(part: Problem) -> tuple[Orbit, NDArray[np.bool_]]:
-        harmonics, exact = _solve(part)
+        harmonics, exact = _solve(part, numbers)
         return _on_even_mesh(harmonics, scheme, intervals), exact
 
     for rows, (some, exact) in run_chunks(solve, (problem,), index, mesh_chunk(system.size)):
@@ -122,15 +126,17 @@ def series_orbits(
     return orbit, np.concatenate(resolved)
 
 
-def _solve(problem: Problem) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+def _solve(
+    problem: Problem, numbers: tuple[int, ...]
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Harmonics (size, count, points), and which points are exact."""
-    Y = np.array(adiabatic_states(problem, nodes=NODES[0]))
+    Y = np.array(adiabatic_states(problem, nodes=numbers[0]))
     points = Y.shape[2]
     at, exact = np.arange(points), np.zeros(points, bool)
-    harmonics = np.zeros((len(Y), NODES[-1] // 2 + 1, points), complex)
+    harmonics = np.zeros((len(Y), numbers[-1] // 2 + 1, points), complex)
     at = _newton(problem, Y, at, _FIRST_STEPS)
     error = _last_harmonics(Y)
-    for before, nodes in pairwise(NODES):
+    for before, nodes in pairwise(numbers):
         # Errors fall by equal factors for equal numbers of nodes.
         at = at[error[at] ** (NODES[-2] / before) < _HOPEFUL]
         guess = _resampled(Y, nodes)
@@ -138,10 +144,10 @@ def _solve(problem: Problem) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]
         at = _newton(problem, Y, at, _NEXT_STEPS)
         gap = np.abs(Y - guess).max((0, 1))
         error = gap ** (nodes / before)
+        harmonics[:, : nodes // 2 + 1, ~exact] = np.fft.rfft(Y[..., ~exact], axis=1) / nodes
         agreed = gap[at] < _AGREED
-        kept, at = at[agreed], at[~agreed]
-        exact[kept] = True
-        harmonics[:, : nodes // 2 + 1, kept] = np.fft.rfft(Y[..., kept], axis=1) / nodes
+        exact[at[agreed]] = True
+        at = at[~agreed]
         if not len(at):
             break
     return harmonics, exact
