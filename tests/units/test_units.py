@@ -12,8 +12,7 @@ import numpy as np
 import pint
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from asperity.errors import InputError
 from asperity.units import KINDS, format_si, from_si, to_radians, to_si

@@ -13,8 +13,7 @@ from asperity.inference import fit, read_table, table_of
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
-from asperity.questions.recording import Measurement as Question
-from asperity.questions.recording import Source
+from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
 V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
