@@ -216,6 +216,17 @@ class Parameter:
             value = np.asarray(value, dtype=float)
         return obeying(value, label or self.label or self.name, self.kind, self.rule)
 
+    def unit_in_si(self, unit: str, label: str) -> float:
+        """The SI value of a unit, such as that in the heading of a column.
+
+        Raises
+        ------
+        InputError
+            If it is a unit of another kind of quantity.
+        """
+        one = f"1 {unit}"
+        return float(to_radians(one, label) if self.angle else to_si(one, self.kind, label))
+
 
 def plain_text(markdown: str) -> str:
     """A meaning without the marks of formulas, for terminals and files."""
