@@ -181,7 +181,7 @@ class Parameter:
     @property
     def example(self) -> str:
         """A text that the command line accepts."""
-        return KINDS[self.kind].example.split(" or ")[0]
+        return KINDS[self.kind].example
 
     @property
     def attributes(self) -> dict[str, str]:
