@@ -64,7 +64,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"inference", "figures", "operating_point", "ledger", "app", "fit_report"},
     "__main__": {"cli"},
     # The package itself names its rooms as text, and imports them when they are asked for.
-    "__init__": {"_version"},
+    "__init__": {"_lazy"},
 }
 
 #: The papers: users of the library, found by an entry point.

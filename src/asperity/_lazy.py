@@ -1,25 +1,42 @@
-"""Names of a package that are imported when they are first used."""
+"""Names of a package that are imported when they are first used.
+
+The package lists them once, in its stub ``__init__.pyi``, which type checkers and editors read too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import ast
+from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 
 
-def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], object]:
-    """The ``__getattr__`` of a package.
+def lazy_names(package: str, file: str) -> tuple[Callable[[str], object], list[str]]:
+    """The ``__getattr__`` and the ``__all__`` of a package.
 
     Parameters
     ----------
-    package : str
-        Its ``__name__``.
-    homes : mapping of str to str
-        Public names and the modules within the package that have them.
+    package, file : str
+        Its ``__name__`` and ``__file__``. Next to the file is the stub, which imports each public
+        name as itself, or assigns it.
     """
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+    homes: dict[str, tuple[str, str]] = {}
+    public: list[str] = []
+    for node in stub.body:
+        if isinstance(node, ast.ImportFrom):
+            homes |= {alias.name: (node.module or package, alias.name) for alias in node.names}
+            public += [alias.asname for alias in node.names if alias.asname]
+        elif isinstance(node, ast.Assign):  # a name of its own: ``map = response_map``
+            public.append(ast.unparse(node.targets[0]))
+            homes[public[-1]] = homes[ast.unparse(node.value)]
 
     def get(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
-        return getattr(import_module(f"{package}.{homes[name]}"), name)
+        module, there = homes[name]
+        if module == package:
+            return import_module(f"{package}.{there}")
+        return getattr(import_module(module), there)
 
-    return get
+    return get, public

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from asperity.air import AirLayer, effective_modulation, gap, patch_radius
 from asperity.errors import InputError

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from asperity.air import NormalContact, mindlin_length_ratio, normal_length
 from asperity.errors import InputError

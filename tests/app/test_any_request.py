@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from asperity.app import connection as app_connection
-from asperity.app import security
+from asperity.app import connection as app_connection, security
 from asperity.app.api import TABS
 from asperity.app.api.protocols import checked
 from asperity.app.endpoints import Upload

@@ -13,8 +13,7 @@ from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes
 from asperity.outputs import Interrupted
-from asperity.questions.recording import Measurement as Question
-from asperity.questions.recording import Source
+from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
 AMPLITUDES, STARTS = (0.05, 0.1, 0.2), (5.0, 17.0, 29.0)

@@ -244,7 +244,7 @@ def test_columns_of_the_users_own_are_kept(here) -> None:
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
-        *(("freq", "frequency"), ("Frequency", "frequency"), ("frequency (Hz)", "frequency")),
+        *(("freq", "frequency"), ("Frequency", "frequency"), ("freq (Hz)", "frequency")),
         *(("lamda", "lambda"), ("lambda_", "lambda"), ("eps", "epsilon"), ("velocity", "V")),
         *(("mu", "mu0"), ("d0", "D0"), ("D_c", "D0"), ("alhpa", "alpha"), ("k", "K"), ("W", "W0")),
     ],
@@ -253,6 +253,16 @@ def test_a_misspelt_column_is_refused(tmp_path: Path, name: str, meant: str) -> 
     source = write(tmp_path / "in.csv", [POINT | {"law": "amontons"}], [*COLUMNS, name])
     with pytest.raises(InputError, match=rf"did you mean '{meant}'\?"):
         run_table(source, tmp_path / "out.csv")
+
+
+def test_units_stand_in_headings(here) -> None:
+    row = POINT | {"law": "rice-ruina", "V": 2e-6, "epsilon": 0.24}
+    (plain,), _ = here([row])
+    other = {n: v for n, v in row.items() if n not in ("V", "epsilon")}
+    other |= {"V (um/s)": 2, "epsilon [%]": 24, "note (a)": 1, "note (b)": 2}
+    (found,), _ = here([other], list(other))
+    for name in NUMBERS:
+        assert float(found[name]) == pytest.approx(float(plain[name]), rel=1e-12)
 
 
 class Stop:

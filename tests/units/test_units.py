@@ -12,8 +12,7 @@ import numpy as np
 import pint
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from asperity.errors import InputError
 from asperity.units import KINDS, format_si, from_si, to_radians, to_si
@@ -98,8 +97,7 @@ def test_the_units_known_without_pint_are_pints(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_accepts_its_own_example(kind: str) -> None:
-    for example in KINDS[kind].example.split(" or "):
-        assert to_si(example, kind, "slider.x", require_unit=True) > 0
+    assert to_si(KINDS[kind].example, kind, "slider.x", require_unit=True) > 0
 
 
 @given(number=finite, rung=st.sampled_from(RUNGS))
@@ -168,8 +166,8 @@ def test_hertz_is_refused_where_an_angular_frequency_is_meant() -> None:
         ("1 um", "velocity", "a velocity (m/s)", "1 um/s"),
         ("7 kg", "force", "a force (N)", "7 N"),
         ("0.2 N m", "stiffness", "a stiffness (N/m)", "0.2 N/um"),
-        ("24 deg", "dimensionless", "a pure number", "0.24 or 24 %"),
-        ("1 N", "dimensionless", "a pure number", "0.24 or 24 %"),
+        ("24 deg", "dimensionless", "a pure number", "0.24"),
+        ("1 N", "dimensionless", "a pure number", "0.24"),
         ("2 Hz*Hz", "frequency", "a frequency (Hz)", "120 Hz"),
         ("20 degC", "temperature", "a temperature (K)", "300 K"),
     ],

@@ -40,13 +40,13 @@ Examples:
       --free lambda,eps_ratio --posterior --out posterior.nc
 
 \b
-Table: one operating point a row, in SI without units: V, epsilon (as applied),
-frequency, other parameters that differ between rows, and observables
-mean_friction, delta_mu, mu1, mu2, phase1, phase2 with the standard uncertainty
-of each in NAME_err, covariances in NAME_NAME_cov. Tables and JSON by
-'asperity measure' go in as they are; give the velocity by --fix "V=1 um/s".
-Harmonics are compared as complex numbers where phases are given. eps_ratio is
-the share of epsilon that the contacts carry.
+Table: one operating point a row, in SI or with units in the heading, as
+"V (um/s)": V, epsilon (as applied), frequency, other parameters that differ
+between rows, and observables mean_friction, delta_mu, mu1, mu2, phase1, phase2
+with the standard uncertainty of each in NAME_err, covariances in NAME_NAME_cov.
+Tables and JSON by 'asperity measure' go in as they are; give the velocity by
+--fix "V=1 um/s". Harmonics are compared as complex numbers where phases are
+given. eps_ratio is the share of epsilon that the contacts carry.
 
 \b
 Holds: one slide-hold-slide test a row: hold_time, healing (static friction less

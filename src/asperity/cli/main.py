@@ -58,7 +58,8 @@ def main(context: click.Context) -> None:
     Laws, periodic responses with their stability, the squeezed air layer, and the paper they come
     from (Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810, 2000).
 
-    A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI numbers.
+    A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI
+    numbers, or have units in their headings.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())

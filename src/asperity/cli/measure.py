@@ -27,8 +27,7 @@ from asperity.errors import InputError, naming, require
 
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
-    from asperity.questions.recording import Measurement as Question
-    from asperity.questions.recording import Source
+    from asperity.questions.recording import Measurement as Question, Source
 
 
 Rows = list[dict[str, Any]]
@@ -402,8 +401,10 @@ def _campaign(
     from asperity.measurement.campaign import run_campaign
     from asperity.measurement.report import healing_section
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
-    from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
-    from asperity.measurement.stick_slip.threshold import write_thresholds
+    from asperity.measurement.stick_slip.threshold import (
+        thresholds as ends_of_stick_slip,
+        write_thresholds,
+    )
     from asperity.outputs import output_files, written_file
 
     question = rows_of.question

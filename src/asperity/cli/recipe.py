@@ -26,9 +26,9 @@ at two velocities or more, give B - A; rows with epsilon above 0 and delta_mu
 give eps_ratio and bound alpha; mu1 gives lambda. Cells may be empty.
 
 \b
-Thresholds: bifurcations between steady sliding and stick-slip, one a row, in SI
-without units: V, K_over_W0 (1/m), K_over_W0_err, frequency (Hz) of the first
-oscillations, frequency_err. They give A, B and D0.
+Thresholds: bifurcations between steady sliding and stick-slip, one a row, in SI or
+with units in the heading: V, K_over_W0 (1/m), K_over_W0_err, frequency (Hz) of
+the first oscillations, frequency_err. They give A, B and D0.
 """
 
 

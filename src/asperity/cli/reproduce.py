@@ -27,8 +27,7 @@ def reproduce(paper: str | None, out: Path, data: Path | None) -> int:
     as entry points of the group asperity.papers.
     """
     from asperity.cli.progress import bar
-    from asperity.ledger import find_paper
-    from asperity.ledger import reproduce as reproduce_paper
+    from asperity.ledger import find_paper, reproduce as reproduce_paper
 
     try:
         with bar("step") as update:

@@ -11,8 +11,7 @@ from typing import Any
 
 from asperity import materials
 from asperity.errors import Argument, InputError, require
-from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.compare import compare as compare_loaded
+from asperity.inference.comparison.compare import Comparison, compare as compare_loaded
 from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit as fit_loaded
 from asperity.inference.fitting.inputs import priors_of

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from asperity.errors import Argument, InputError, require
 from asperity.parameters.toml_file import file_content
 
+_DELIMITERS = (",", ";", "\t")
 #: A name and its unit.
 _HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 
@@ -28,7 +30,7 @@ def read_headed_columns(
     Parameters
     ----------
     path : Path
-        Separated by commas or semicolons; lines that begin with ``#`` are skipped.
+        As of `csv_rows`.
     numbers, texts : collection of str
         Columns that are read; others are left out.
     label : str
@@ -47,25 +49,65 @@ def read_headed_columns(
         If the file cannot be read, has no rows, a column twice, or a cell that is no number.
     """
     with readable(path, label):
-        text = file_content(path).decode("utf-8-sig")
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    separator = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
-    rows = [[cell.strip() for cell in cells] for cells in csv.reader(lines, delimiter=separator)]
+        _, rows = csv_rows(file_content(path).decode("utf-8-sig").splitlines(keepends=True))
+        heading, *cells = [[cell.strip() for cell in cells] for cells in rows] or [[]]
     rule = f"have a heading and {row} a row"
-    require(len(rows) >= 2, path.name, rule, f"{len(rows)} lines", "add them")
+    require(cells, path.name, rule, "no rows", "add them")
     columns: dict[str, list[float | str]] = {}
-    for place, heading in enumerate(rows[0]):
-        match = _HEADING.fullmatch(heading)
-        if match is None or match[1] not in {*numbers, *texts}:
-            continue
-        name, unit = match[1], match[2] or ""
-        rule = f"have one column for {name}"
-        require(name not in columns, path.name, rule, "two", "remove one of them")
-        cells = [cells[place] if place < len(cells) else "" for cells in rows[1:]]
+    for name, (place, unit) in headings(
+        heading, path.name, {*numbers, *texts}.__contains__
+    ).items():
+        column = [row[place] if place < len(row) else "" for row in cells]
         columns[name] = [
             cell if name in texts else _number(cell, name, unit, f"{path.name}, row {n}")
-            for n, cell in enumerate(cells, 1)
+            for n, cell in enumerate(column, 1)
         ]
+    return columns
+
+
+def csv_rows(lines: Iterable[str]) -> tuple[str, Iterator[list[str]]]:
+    """Delimiter and rows of a CSV, the heading first.
+
+    Blank lines and lines that begin with ``#`` are skipped. The delimiter is the one of ``,``,
+    ``;`` and tab that gives the heading the most cells. A missing quotation mark, which would merge
+    the rows after it into one cell, is a `csv.Error`.
+    """
+    lines = iter(lines)
+    heading = next((x for x in lines if x.strip() and not x.lstrip().startswith("#")), "")
+    delimiter = max(_DELIMITERS, key=lambda d: len(next(csv.reader([heading], delimiter=d), [])))
+    rows = csv.reader(itertools.chain([heading], lines), delimiter=delimiter, strict=True)
+    return delimiter, (
+        row for row in rows if row and row != [""] and not row[0].lstrip().startswith("#")
+    )
+
+
+def headings(
+    cells: Iterable[str], label: str, known: Callable[[str], object]
+) -> dict[str, tuple[int, str]]:
+    """Place and unit of each column by its name; the unit is empty where the heading has none.
+
+    Parameters
+    ----------
+    cells : iterable of str
+        Of the heading.
+    label : str
+        What messages call the table.
+    known : callable
+        Whether a column of this name is read; the others are left out.
+
+    Raises
+    ------
+    InputError
+        If one of these columns occurs twice.
+    """
+    columns: dict[str, tuple[int, str]] = {}
+    for place, cell in enumerate(cells):
+        match = _HEADING.fullmatch(cell)
+        name, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
+        if name and known(name):
+            once, got = name not in columns, f"'{name}' twice"
+            require(once, label, "have each column once", got, "remove or rename one of them")
+            columns[name] = place, unit
     return columns
 
 

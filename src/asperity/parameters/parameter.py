@@ -181,7 +181,7 @@ class Parameter:
     @property
     def example(self) -> str:
         """A text that the command line accepts."""
-        return KINDS[self.kind].example.split(" or ")[0]
+        return KINDS[self.kind].example
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -215,6 +215,17 @@ class Parameter:
         elif self.rule == "switch" and np.asarray(value).dtype == bool:
             value = np.asarray(value, dtype=float)
         return obeying(value, label or self.label or self.name, self.kind, self.rule)
+
+    def unit_in_si(self, unit: str, label: str) -> float:
+        """The SI value of a unit, such as that in the heading of a column.
+
+        Raises
+        ------
+        InputError
+            If it is a unit of another kind of quantity.
+        """
+        one = f"1 {unit}"
+        return float(to_radians(one, label) if self.angle else to_si(one, self.kind, label))
 
 
 def plain_text(markdown: str) -> str:

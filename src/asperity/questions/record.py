@@ -23,8 +23,7 @@ from pydantic import (
 )
 
 from asperity.errors import InputError, MistakesError, closest, require
-from asperity.parameters.arguments import number
-from asperity.parameters.arguments import shown as shown_value
+from asperity.parameters.arguments import number, shown as shown_value
 from asperity.parameters.toml_file import toml_content
 from asperity.units import KINDS, to_si
 

@@ -205,7 +205,9 @@ def _numbers(
         wanted |= set(point_parameters(get_law(law)))
     for name in targets.values():
         wanted |= set(RATIOS[name].needs)
-    for name in sorted(explicit - wanted, key=str):
+    # Where the plan names an unknown law, nothing is known of the parameters that it has.
+    all_known = laws and len(laws) == len(dict.fromkeys(plan.laws))
+    for name in sorted(explicit - wanted, key=str) if all_known else ():
         rule = "belong to the laws of the plan"
         raise InputError(f"parameters.{name}", rule, ", ".join(laws), "leave it out")
     kept = {

@@ -1,15 +1,15 @@
 """Tables of operating points: each row of the input is a point; the output adds its response.
 
-Input columns are SI numbers without units, named ``law, A, B, D0, mu0, V0, K, M, W0, alpha,
-lambda, V, epsilon, frequency``, and the further parameters of registered laws. The output has the
-input columns unchanged, followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be
-solved ``result`` gives the reason; the other rows are solved. Rows are read, solved and written in
-chunks, so that memory does not grow with the table.
+Input columns are SI numbers, or have their unit in the heading, as ``V (um/s)``. They are named
+``law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon, frequency``, and as the further
+parameters of registered laws. The output has the input columns unchanged, followed by
+`asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives the reason;
+the other rows are solved. Rows are read, solved and written in chunks, so that memory does not grow
+with the table.
 """
 
 from __future__ import annotations
 
-import csv
 import difflib
 import hashlib
 import math
@@ -31,7 +31,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
-from asperity.parameters.columns import readable
+from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.study.engine import solve_here
 from asperity.study.outcome import Answers
 from asperity.study.points import Points
@@ -43,7 +43,6 @@ Row = list[str]
 _CHUNK = 20_000
 #: The result columns that hold numbers, and ``stable``.
 _OUTPUTS = RESULT_COLUMNS[: RESULT_COLUMNS.index("converged")]
-_DELIMITERS = (",", ";", "\t")
 #: An unknown column whose name is more similar to a known one than this counts as misspelt.
 _SIMILAR = 0.75
 
@@ -183,6 +182,8 @@ class TableSource:
         As read.
     columns : mapping of str to int
         Position of every known column.
+    units : mapping of str to float
+        SI values of the units in headings, by column.
     rows : int
         Number of rows of data, without blank lines.
     digest : str
@@ -197,15 +198,13 @@ class TableSource:
     def __init__(self, path: Path, law: str | None, filled: Mapping[str, float]) -> None:
         self.path, self.law, self.filled = path, law or "", filled
         with _opened(path) as stream:
-            self.delimiter = _delimiter(stream.readline())
-            stream.seek(0)
-            rows = _rows(stream, self.delimiter)
+            self.delimiter, rows = csv_rows(stream)
             self.header = next(rows, [])
             rule, advice = "have a line of column names and rows", "give one operating point a row"
             require(
                 any(name.strip() for name in self.header), str(path), rule, "an empty file", advice
             )
-            self.columns = _checked_header(self.header, str(path))
+            self.columns, self.units = _checked_header(self.header, str(path))
             laws: Counter[str] = Counter()
             #: First text, and its row, of the columns in which no row so far has a number.
             texts = {name: ("", 0) for name in self.columns if name != "law"}
@@ -213,7 +212,7 @@ class TableSource:
                 laws[self.law_of(row)] += 1
                 for name in tuple(texts):
                     cell = "".join(row[self.columns[name] :][:1]).strip()
-                    if math.isfinite(_number(cell, known_parameters()[name], math.nan)):
+                    if math.isfinite(_number(cell, known_parameters()[name])):
                         del texts[name]
                     elif cell and not texts[name][0]:
                         texts[name] = cell, count
@@ -227,7 +226,7 @@ class TableSource:
     def blocks(self, size: int, skip: int = 0) -> Iterator[list[Row]]:
         """Rows of data in lists of at most `size`, without the first `skip`."""
         with _opened(self.path) as stream:
-            rows = islice(_rows(stream, self.delimiter), 1 + skip, None)
+            rows = islice(csv_rows(stream)[1], 1 + skip, None)
             while block := list(islice(rows, size)):
                 yield block
 
@@ -264,24 +263,8 @@ def _opened(path: Path) -> Iterator[TextIO]:
         yield stream
 
 
-def _rows(stream: TextIO, delimiter: str) -> Iterator[Row]:
-    # Strict: without it a missing quotation mark would merge the rows after it into one cell.
-    return (row for row in csv.reader(stream, delimiter=delimiter, strict=True) if row)
-
-
-def _delimiter(line: str) -> str:
-    """The delimiter that gives the most known columns in the first line; a comma by default."""
-    known = {"law", *known_parameters()}
-
-    def count(delimiter: str) -> int:
-        names = next(csv.reader([line], delimiter=delimiter), [])
-        return sum(name.strip() in known for name in names)
-
-    return max(_DELIMITERS, key=count)
-
-
-def _checked_header(header: Sequence[str], shown: str) -> dict[str, int]:
-    """Position of every known column.
+def _checked_header(header: Sequence[str], shown: str) -> tuple[dict[str, int], dict[str, float]]:
+    """Position of every known column, and the SI value of the unit in its heading.
 
     Parameters
     ----------
@@ -295,25 +278,30 @@ def _checked_header(header: Sequence[str], shown: str) -> dict[str, int]:
     InputError
         If a column occurs twice, is named like a result, or looks like a misspelt known one.
     """
-    names = [name.strip() for name in header]
-    known = {"law", *known_parameters()}
-    for name in names:
-        if names.count(name) > 1:
-            got = f"'{name}' {names.count(name)} times"
-            raise InputError(shown, "have each column once", got, "remove or rename all but one")
-        rule = "not have a column named like a result"
-        require(name not in RESULT_COLUMNS, shown, rule, f"'{name}'", "rename or remove it")
+    parameters = known_parameters()
+    known = {"law", *parameters}
+    for name in map(str.strip, header):
         meant = None if name in known else _nearest(name, known)
         advice = f"did you mean '{meant}'? If not, rename the column"
         require(not meant, shown, "have columns of known names", f"'{name}'", advice)
-    return {name: place for place, name in enumerate(names) if name in known}
+    columns, units = {}, {}
+    for name, (place, unit) in headings(
+        header, shown, {*known, *RESULT_COLUMNS}.__contains__
+    ).items():
+        rule = "not have a column named like a result"
+        require(name in known, shown, rule, f"'{name}'", "rename or remove it")
+        columns[name] = place
+        if unit and name in parameters:
+            units[name] = parameters[name].unit_in_si(unit, f"{shown}.{name}")
+    return columns, units
 
 
 def _nearest(name: str, known: set[str]) -> str | None:
     """The known column whose name is similar to an unknown name; None without one."""
-    # 'V (m/s)' and 'D0 [m]' carry the name before the unit.
-    bare = re.split(r"[\s(\[]", name.lower(), maxsplit=1)[0].rstrip("_")
-    if not bare:
+    # 'velocity (m/s)' and 'W [N]' carry the name before the unit.
+    plain = re.split(r"[\s(\[]", name, maxsplit=1)[0]
+    bare = plain.lower().rstrip("_")
+    if not bare or plain in known:
         return None
     for parameter in known_parameters().values():
         if bare in parameter.meant or bare in map(str.lower, parameter.aliases):
@@ -362,15 +350,15 @@ def _points(table: TableSource, rows: Sequence[Row]) -> Points:
         except ValueError:
             usual = False
         if not usual:
-            fill = table.filled.get(name, math.nan)
-            numbers = np.array([_number(cell.strip(), parameter, fill) for cell in cells])
-        values[name] = numbers
+            numbers = np.array([_number(cell.strip(), parameter) for cell in cells])
+        numbers = numbers * table.units.get(name, 1.0)
+        values[name] = np.where(np.isnan(numbers), table.filled.get(name, math.nan), numbers)
     return Points(laws, values)
 
 
-def _number(cell: str, parameter: Parameter, fill: float) -> float:
+def _number(cell: str, parameter: Parameter) -> float:
     if not cell:
-        return fill
+        return math.nan
     try:
         number = parameter.words[cell.lower()] if cell.lower() in parameter.words else float(cell)
     except ValueError:

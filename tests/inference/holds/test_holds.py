@@ -114,8 +114,8 @@ def test_units_stand_in_the_heading(tmp_path):
         ("hold_time,healing,V,K\n-1,0.1,1e-6,1e3\n", "hold_time must be positive"),
         ("hold_time,healing,healing_err,V,K\n1,0.1,0,1e-6,1e3\n", "healing_err must be positive"),
         ("hold_time,healing,V (N),K\n1,0.1,1e-6,1e3\n", "V"),
-        ("hold_time,healing,healing,V,K\n", "lines"),
-        ("", "lines"),
+        ("hold_time,healing,healing,V,K\n", "no rows"),
+        ("", "no rows"),
     ],
 )
 def test_what_breaks_a_rule_is_said(tmp_path, text, words):

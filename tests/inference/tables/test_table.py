@@ -13,8 +13,7 @@ from asperity.inference import fit, read_table, table_of
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
-from asperity.questions.recording import Measurement as Question
-from asperity.questions.recording import Source
+from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
 V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
@@ -140,6 +139,20 @@ def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
     assert 0.3 < table.correlations()[0, 0, 1] < 1
     found = fit(table, "elasto-plastic", ("lambda",), material=pmma)
     assert found.converged
+
+
+def test_units_stand_in_headings(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(
+        "V (um/s);epsilon [%];frequency;mu1;mu1_err;phase1 (deg);phase1_err (mrad);T (C);T (K)\n"
+        "2;24;120;0.01;0.001;90;10;20;293\n",
+        encoding="utf-8",
+    )
+    table = read_table(path)
+    assert table.points["V"] == pytest.approx([2e-6], rel=1e-12)
+    assert table.points["epsilon"] == pytest.approx([0.24], rel=1e-12)
+    assert table.values["phase1"] == pytest.approx([np.pi / 2], rel=1e-12)
+    assert table.errors["phase1"] == pytest.approx([0.01], rel=1e-12)
 
 
 def test_a_reading_as_json_is_a_table_of_one_row(recorded, tmp_path):

@@ -78,6 +78,15 @@ def test_a_file_says_its_units(tmp_path: Path) -> None:
         load_plan(plan)
 
 
+def test_an_unknown_law_is_the_one_mistake_of_a_plan() -> None:
+    """The parameters, which the law that was meant may have, are no second mistake."""
+    axes = {"K": {"values": (1e5, 2e5)}}
+    plan = SweepPlan(**{**FIXED, "law": "rice-runia"}, axes=axes)
+    with pytest.raises(InputError, match="did you mean 'rice-ruina'") as caught:
+        SweepGrid.of(plan)
+    assert "belong to the laws" not in str(caught.value)
+
+
 def spans(*counts: int) -> dict[str, object]:
     names = ("K", "epsilon", "A", "B", "W0", "V0")
     return {

@@ -22,9 +22,9 @@ from asperity.protocol import (
     ProtocolError,
     outline,
     record_run,
+    run_protocol as run_to_file,
     write_csv,
 )
-from asperity.protocol import run_protocol as run_to_file
 
 #: Rows of a motion (bytes in its file).
 _LARGEST_MOTION = 256 * 1024**2

@@ -1,10 +1,9 @@
 """The process that runs a job: one line of JSON in a request, lines of JSON as it goes on.
 
 Started as ``python -m asperity.app.jobs.worker MODULE [LAW...]``: it imports the module and
-registers the laws. A request is ``{"job": "module:function", "argument":
-..., "limits": ...}``; the function is called with the argument and with a function that sends a
-message, and its result is the last message. ``{"cancel": true}`` on the input makes the next report
-of progress raise `Cancelled`.
+registers the laws. A request is ``{"job": "module:function", "argument": ..., "limits": ...}``. The
+function is called with the argument and with a function that sends a message; its result is the
+last message. ``{"cancel": true}`` on the input makes the next report of progress raise `Cancelled`.
 
 Memory and processor time of the process are limited.
 """

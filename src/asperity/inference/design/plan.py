@@ -26,13 +26,11 @@ from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.unknowns import EPS_RATIO, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
-from asperity.materials import Material
-from asperity.materials import load as load_material
+from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
 from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Noise, Range
-from asperity.questions.record import require_unit as with_unit
-from asperity.questions.record import units_required
+from asperity.questions.record import require_unit as with_unit, units_required
 from asperity.units import to_radians, to_si
 
 Float = NDArray[np.float64]

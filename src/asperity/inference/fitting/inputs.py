@@ -26,8 +26,7 @@ from asperity.inference.unknowns import (
     require_fittable,
 )
 from asperity.laws import Law, registered
-from asperity.materials import Material
-from asperity.materials import load as load_material
+from asperity.materials import Material, load as load_material
 from asperity.parameters import (
     MACHINE,
     MODULATION,

@@ -6,7 +6,6 @@ recordings, or what ``asperity measure --json`` prints for one.
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,9 +21,9 @@ from asperity.errors import InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
-from asperity.parameters.columns import readable
+from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.parameters.toml_file import file_content
-from asperity.units import to_si
+from asperity.units import to_radians, to_si
 
 Float = NDArray[np.float64]
 
@@ -34,7 +33,6 @@ OBSERVABLES = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
 #: Columns of a table of responses that say nothing about the measurement.
 _OF_RESPONSES = ("floquet_max", "stable", "converged", "result", "law")
 _OPERATING = ("V", "epsilon", "frequency")
-_DELIMITERS = (",", ";", "\t")
 #: Columns of texts: which run a row belongs to, the first of them that is there; what a campaign
 #: says of a row; the unit of its loads.
 _RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
@@ -175,7 +173,8 @@ def read_table(
     ----------
     path : str or Path
         CSV with ``,``, ``;`` or tab. Columns: V (m/s), epsilon, frequency (Hz), any other parameter
-        of an operating point in SI, and observables with their standard uncertainties in
+        of an operating point, in SI or in the unit in its heading, as ``V (um/s)``, and observables
+        with their standard uncertainties in
         ``<name>_err`` or ``<name>_uncertainty``. Cells of observables may be empty. Covariances
         of observables of a row are in ``<name>_<name>_cov``. A column ``run`` or ``file`` says
         which rows were measured together. Or the JSON of ``asperity measure --json``.
@@ -196,9 +195,11 @@ def read_table(
     require_rereadable(path, "data")
     with readable(path, "data"):
         text = file_content(path).decode("utf-8-sig")
-    if path.suffix.lower() == ".json":
-        return table_of(_given(_reading(shown, text), given), name=shown)
-    texts = _cells(shown, text)
+        if path.suffix.lower() == ".json":
+            return table_of(_given(_reading(shown, text), given), name=shown)
+        _, lines = csv_rows(text.splitlines(keepends=True))
+        header, *cells = list(lines) or [[]]
+    texts, units = _columns(shown, header, cells)
     rows = len(next(iter(texts.values())))
     blank = np.full(rows, "")
     kind, failed = texts.get(_KIND, blank), texts.get(_REASON, blank) != ""
@@ -221,29 +222,47 @@ def read_table(
     columns: dict[str, Any] = {
         n: _numbers(shown, n, column) for n, column in texts.items() if n not in _TEXTS
     }
-    if _UNIT in texts and "W0" in columns:
+    for n, unit in units.items():
+        if n in columns:
+            columns[n] = columns[n] * _unit_in_si(shown, n, unit)
+    if _UNIT in texts and "W0" in columns and "W0" not in units:
         columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT].tolist())
     run = next((texts[n].tolist() for n in _RUN if n in texts), None)
     table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
     return replace(table, row_names=np.array([f"row {i + 1}" for i in np.flatnonzero(kept)]))
 
 
-def _cells(shown: str, text: str) -> dict[str, NDArray[np.str_]]:
-    """Columns of a text by name, as texts without space about them."""
-    lines = [x for x in text.splitlines() if x.strip() and not x.lstrip().startswith("#")]
+def _columns(
+    shown: str, header: Sequence[str], rows: Sequence[Sequence[str]]
+) -> tuple[dict[str, NDArray[np.str_]], dict[str, str]]:
+    """Columns by name, as texts without space about them, and the units in their headings."""
     rule = "have a header and rows"
-    require(len(lines) >= 2, shown, rule, f"{len(lines)} lines", "give one operating point a row")
-    names, *rows = csv.reader(lines, delimiter=max(_DELIMITERS, key=lines[0].count))
-    names = [cell.strip() for cell in names]
-    for column in names:
-        if names.count(column) > 1:
-            got = f"'{column}' {names.count(column)} times"
-            raise InputError(shown, "have each column once", got, "remove all but one")
+    require(rows, shown, rule, "no rows", "give one operating point a row")
     for number, row in enumerate(rows, start=1):
-        rule, got = f"have {len(names)} cells in each row", f"{len(row)} in row {number}"
-        require(len(row) == len(names), shown, rule, got, "correct the separators")
-    columns = np.char.strip(np.array(rows, dtype=str).T)
-    return {n: c for n, c in zip(names, columns, strict=True) if n not in _OF_RESPONSES}
+        rule, got = f"have {len(header)} cells in each row", f"{len(row)} in row {number}"
+        require(len(row) == len(header), shown, rule, got, "correct the separators")
+    cells = np.char.strip(np.array(rows, dtype=str).T)
+    columns = headings(header, shown, _is_read)
+    return (
+        {name: cells[place] for name, (place, _) in columns.items()},
+        {name: unit for name, (_, unit) in columns.items() if unit},
+    )
+
+
+def _is_read(name: str) -> bool:
+    """Whether a column says something of the measurement; others are the user's own."""
+    said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
+    return name in _TEXTS or (bool(said) and name not in _OF_RESPONSES)
+
+
+def _unit_in_si(shown: str, name: str, unit: str) -> float:
+    """The SI value of the unit in the heading of a column."""
+    known, label = _known(), f"{shown}.{name}"
+    if (parameter := canonical_name(name, known)) is not None:
+        return known[parameter].unit_in_si(unit, label)
+    one = f"1 {unit}"
+    phase = (_observable_of(name) or "").startswith("phase")
+    return float(to_radians(one, label) if phase else to_si(one, "dimensionless", label))
 
 
 def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
@@ -291,14 +310,12 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
 
 
 def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
-    """Numbers of a column; NaN in empty cells, and where a column of the user's own has texts."""
+    """Numbers of a column; NaN in empty cells."""
     values = np.full(cells.size, math.nan)
     for row, cell in enumerate(cells.tolist()):
         try:
             values[row] = float(cell or math.nan)
         except ValueError:
-            if canonical_name(name, _known()) is None and _observable_of(name) is None:
-                continue
             rule = f"have numbers in SI without unit in column {name}"
             got = f"'{cell}' in row {row + 1}"
             raise InputError(shown, rule, got, "write it with a decimal point") from None

@@ -9,8 +9,7 @@ from scipy.integrate import quad
 
 from asperity.laws import LinkerDieterich
 from asperity.ledger import check
-from asperity.theory import ageing_response
-from asperity.theory import closed_forms as cf
+from asperity.theory import ageing_response, closed_forms as cf
 from asperity_papers.bureau2000.checks.features import at_strongest, met, missed, over_the_range
 from asperity_papers.bureau2000.machine import (
     EXT,

@@ -6,8 +6,7 @@ import numpy as np
 
 from asperity import Slider, perturbation_response
 from asperity.ledger import check
-from asperity.theory import ageing_response
-from asperity.theory import closed_forms as cf
+from asperity.theory import ageing_response, closed_forms as cf
 from asperity_papers.bureau2000.integration import IntegratedOrbit
 from asperity_papers.bureau2000.machine import RR, SPEEDS, Machine
 
