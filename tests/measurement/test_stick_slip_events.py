@@ -216,3 +216,28 @@ def test_random_recordings_are_read_right_or_flagged() -> None:
     assert not any(answer["wrong"] and not answer["flagged"] for answer in answers)
     assert np.mean([answer["recurrence"] for answer in answers]) > 0.88
     assert np.mean([answer["drop"] for answer in answers]) > 0.88
+
+
+def test_onsets_of_damped_slips_lie_within_their_uncertainty():
+    """A slider damped by 0.3 slips between the shapes of a free one and of an exponential fall."""
+    half, damping, loading, slips = 30, 0.3, 1 / 900, 40
+    w = np.pi / half
+    wd = w * np.sqrt(1 - damping**2)
+    u = np.arange(1, 46)
+    # From rest at F = 1 above the kinetic friction, under the drive, until the slider stops.
+    y0 = 1 - 2 * damping * loading / w
+    swing = (loading + damping * w * y0) / wd
+    y = np.exp(-damping * w * u) * (y0 * np.cos(wd * u) + swing * np.sin(wd * u)) - y0
+    slip = y[: y.argmin() + 1]
+    stick = slip[-1] + loading * np.arange(1, round(-slip[-1] / loading) + 1)
+    cycle = np.concatenate([slip, stick])
+    lead = loading * np.arange(-600, 1)
+    force = np.concatenate([lead, *[cycle + n * cycle[-1] for n in range(slips)]])
+    force += 0.01 * np.random.default_rng(8).standard_normal(force.size)
+    onset = 600 + cycle.size * np.arange(slips)
+    falls = find_falls(force, estimate(force))
+    events = read_events(np.arange(force.size, dtype=float), force, falls)
+    assert len(events) == slips
+    off = np.abs(events.onset - onset)
+    assert np.mean(off < 1.96 * events.timing_uncertainty) > 0.9
+    assert np.median(events.timing_uncertainty) < 0.15 * half

@@ -313,9 +313,12 @@ def _timing(
     squares of residuals of all shapes that the recording has (indirect inference: Gourieroux,
     Monfort and Renault, J. Appl. Econometrics 8, S85, 1993): correlated noise acts on both alike.
     Where no shape describes the recording, all are as likely as their distances say in units of
-    the smallest.
+    the smallest. It may lie between them, as the slip of a damped slider lies between that of a
+    free one and an exponential fall: differences of squares are linear in the shape, so that the
+    mixture of shapes that has those of the recording says how late or early the best one reads it.
     """
     # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
+    from scipy.optimize import nnls
     from scipy.signal import lfilter
 
     first, stop = bounds[2:]
@@ -339,7 +342,7 @@ def _timing(
     window = tuple((b[many] - first[many] + begin[:-1]).astype(np.intp) for b in bounds)
     rng = np.random.default_rng(0)
     taps = np.concatenate([[1.0], -noise.coefficients[-1]])
-    distance, shifts, factors = [], [], []
+    distance, shifts, factors, means, covariances = [], [], [], [], []
     for shape, (onset, end, *_) in zip(_SHAPES, fits, strict=True):
         clean = _force_of(sums, part, shape, (onset, end), (first, stop), rate, place, many[event])
         settling = 10 * taps.size
@@ -348,7 +351,9 @@ def _timing(
         again = read(Sums(made, begin[:-1], window[0]), np.arange(many.size), window, rate[many])
         values = contrasts(again, drop[many])
         covariance = np.atleast_2d(np.cov(values)) * (1 / k + 1 / many.size)
-        off = seen - values.mean(1)
+        means.append(values.mean(1))
+        covariances.append(covariance)
+        off = seen - means[-1]
         distance.append(float(off @ np.linalg.pinv(covariance, hermitian=True) @ off))
         length = (end - onset)[many]
         shift = begin[:-1] - first[many]
@@ -368,10 +373,15 @@ def _timing(
     weight = np.exp((min(distance) - np.array(distance)) / (2 * excess))
     weight /= weight.sum()
     moved = np.array(shifts)[:, :, best]
+    # In units of what the noise makes.
+    power, axes = np.linalg.eigh(covariances[best])
+    away = np.array([*means, seen]) - means[best]
+    away = away @ axes / np.sqrt(np.maximum(power, 1e-12 * power[-1]))
+    mixture = nnls(away[:-1].T, away[-1])[0]
     return _Timing(
         _SHAPES[best],
         float(factors[best][best]),
-        float(np.sqrt((weight @ moved**2).max())),
+        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2).max())),
     )
 
 
