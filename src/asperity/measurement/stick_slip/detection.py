@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.lines import lines
-from asperity.measurement.stick_slip.noise import Noise, of_mean
+from asperity.measurement.stick_slip.noise import Noise
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -22,8 +22,6 @@ _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
 _NEAR = 10
 #: Share of the time of rises in which the force rises no faster than by the usual loading.
 _LOADING = 0.75
-#: Standard errors by which a rise is faster than loading.
-_CLEAR = 3.0
 #: Longest swing back of the instrument, in times of a usual fall.
 _SWING = 3.0
 #: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
@@ -233,7 +231,7 @@ def _at_all_widths(
         if not any(p.size for p, _ in sets):
             peak = trough = np.empty(0, dtype=np.intp)
             break
-        peak, trough = _without_ringing(force, *_most_resolved(sets), scatter)
+        peak, trough = _without_ringing(force, *_most_resolved(sets))
     return Falls(*_steep_part(averages, peak, trough, thresholds), scatter, thresholds)
 
 
@@ -302,13 +300,11 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
     return peak[kept], trough[kept]
 
 
-def _without_ringing(
-    force: Array, peak: Index, trough: Index, scatter: Array
-) -> tuple[Index, Index]:
+def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise twice as fast as the loading around it, by three
-    standard errors, is the instrument's. Loading is as fast as the fastest rises but for a quarter
+    The slider does not move backwards: a rise twice as fast as the loading around it is the
+    instrument's. Loading is as fast as the fastest rises but for a quarter
     of the time. The instrument swings back in half its period, which a fall takes too: what rises
     for longer than three usual falls begins in an impulse.
     """
@@ -325,7 +321,5 @@ def _without_ringing(
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
     fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
     usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
-    # The slope of n samples has a variance of 12/n^2 of that of their mean.
-    error = np.sqrt(12.0) * of_mean(scatter, length) / length
-    apart = (rate - 2 * usual <= _CLEAR * error) | (length > _SWING * np.median(trough - peak))
+    apart = (rate <= 2 * usual) | (length > _SWING * np.median(trough - peak))
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]

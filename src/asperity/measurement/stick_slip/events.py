@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.detection import Falls
 from asperity.measurement.stick_slip.lines import Sums, lines
-from asperity.measurement.stick_slip.noise import of_mean
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
@@ -361,7 +360,7 @@ def _timing(
         )
         late /= np.maximum(length, 1.0)
         shifts.append(np.median(late, axis=2))
-        unit = of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
+        unit = _of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
         # The standard deviation, of which normal values exceed twice by 5 %.
         away = np.abs(late - shifts[-1][:, :, None]) / unit
         factors.append(np.quantile(away, 0.95, axis=2).max(0) / 1.96)
@@ -431,8 +430,8 @@ def _measured(
     # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
     # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
     # loaded before, a ringing gauge to the drop.
-    before_doubt = 2 * of_mean(scatter, until - first)
-    doubt = np.hypot(before_doubt, 2 * of_mean(scatter, stop - since))
+    before_doubt = 2 * _of_mean(scatter, until - first)
+    doubt = np.hypot(before_doubt, 2 * _of_mean(scatter, stop - since))
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
@@ -440,14 +439,14 @@ def _measured(
     doubt = np.hypot(doubt, bend)
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
-    timing = timing_of.factor * of_mean(scatter, long / 2) / least
+    timing = timing_of.factor * _of_mean(scatter, long / 2) / least
     # A line that ends too low meets the slip later by as large a share of it.
     timing = np.hypot(timing, np.hypot(timing_of.shift, bend / least))
     timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
     doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
     centre, mean, slope, count = sticks
-    mean_doubt = of_mean(scatter, count)
+    mean_doubt = _of_mean(scatter, count)
     # The slope of n samples has a variance of 12/n^2 of that of their mean.
     slope_doubt = np.sqrt(12.0) * mean_doubt / count
     reach = onset[1:] - centre
@@ -477,6 +476,14 @@ def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
     runs = np.flatnonzero(size >= np.median(size))[:: -(-size.size // _RUNS)]
     parts = [force[first[k] : first[k] + size[k]] for k in runs]
     return fitted([detrend(part) for part in parts], parameters=2 * len(parts))
+
+
+def _of_mean(scatter: Array, samples: Index | Array) -> Array:
+    """Scatter of the mean over so many samples, between and beyond the widths that are known."""
+    known = np.arange(scatter.size)
+    octave = np.log2(np.maximum(samples, 1))
+    inside = np.exp(np.interp(octave, known, np.log(scatter)))
+    return np.asarray(inside * 2.0 ** (-np.maximum(octave - known[-1], 0.0) / 2))
 
 
 def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:

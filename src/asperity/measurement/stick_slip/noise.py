@@ -147,14 +147,6 @@ def _deviation(sizes: Array) -> float:
     return (level + float(above.min())) / 2 / float(ndtri(0.5 + share / 2))
 
 
-def of_mean(scatter: Array, samples: Array | NDArray[np.intp]) -> Array:
-    """Scatter of the mean over so many samples, between and beyond the widths that are known."""
-    known = np.arange(scatter.size)
-    octave = np.log2(np.maximum(samples, 1))
-    inside = np.exp(np.interp(octave, known, np.log(scatter)))
-    return np.asarray(inside * 2.0 ** (-np.maximum(octave - known[-1], 0.0) / 2))
-
-
 def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
     """The force with impulses of one or two samples replaced by the median around them.
 
