@@ -29,7 +29,7 @@ _SHORTEST = 6
 #: Bins of the slip, and candidates of onset and end on each zoom of the search.
 _BINS = 32
 _CANDIDATES = 8
-_ZOOMS = 3
+_ZOOMS = 4
 #: Events that are searched together: their arrays fit the cache.
 _TOGETHER = 64
 #: Readings of the falls, each without those that the one before has not confirmed.
