@@ -35,6 +35,9 @@ class Formula(LockInTerm):
     def searches(self):
         return self.searching
 
+    def coarser(self):
+        return self
+
     def use_search(self, always):
         self.searching = always
 

@@ -222,16 +222,16 @@ def _at_all_widths(
             break
         longest = wider
         scatter = noise.of_means(longest, max(octave, _octave(cycle / _PER_CYCLE_OF_NOISE)))
+        thresholds = _thresholds(noise, scatter)
+        # Means that are long make falls longer than slips.
+        tilt = _tilt(force, *_steep_part(averages, peak, trough, thresholds))
         sets = [
-            averages.falls(k, scatter[k], tilt)
-            for tilt in (0.0, _tilt(force, peak, trough))
-            for k in range(longest + 1)
+            averages.falls(k, scatter[k], tilt) for tilt in (0.0, tilt) for k in range(longest + 1)
         ]
         if not any(p.size for p, _ in sets):
             peak = trough = np.empty(0, dtype=np.intp)
             break
         peak, trough = _without_ringing(force, *_most_resolved(sets))
-    thresholds = _thresholds(noise, scatter)
     return Falls(*_steep_part(averages, peak, trough, thresholds), scatter, thresholds)
 
 
@@ -256,10 +256,11 @@ def _steep_part(
             continue
         octave[new] = k
         high, low, drop = high[new], low[new], drop[new]
-        owner = np.clip(np.searchsorted(high, np.arange(means.size), side="right") - 1, 0, None)
-        below = np.flatnonzero(means <= (means[low] + drop / 4)[owner])
+        # Of each mean the last fall that begins before it.
+        cells = np.diff(high[1:], prepend=0, append=means.size)
+        below = np.flatnonzero(means <= np.repeat(means[low] + drop / 4, cells))
         below = below[np.searchsorted(below, high)]
-        above = np.flatnonzero(means >= (means[high] - drop / 4)[owner])
+        above = np.flatnonzero(means >= np.repeat(means[high] - drop / 4, cells))
         above = above[np.searchsorted(above, below) - 1]
         reach = (below - above) // 2 + 1
         peak[new] = np.maximum((above - reach) * hop + half, peak[new])
@@ -303,9 +304,9 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     """Join falls between which the force rises faster than the spring can load.
 
     The slider does not move backwards: a rise twice as fast as the loading around it is the
-    instrument's. Loading is as fast as the fastest rises but for a quarter of the time. The
-    instrument swings back in half its period, which a fall takes too: what rises for longer
-    than three usual falls begins in an impulse.
+    instrument's. Loading is as fast as the fastest rises but for a quarter
+    of the time. The instrument swings back in half its period, which a fall takes too: what rises
+    for longer than three usual falls begins in an impulse.
     """
     if peak.size < 3:
         return peak, trough

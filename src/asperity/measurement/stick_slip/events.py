@@ -30,8 +30,8 @@ _SHORTEST = 6
 _BINS = 32
 _CANDIDATES = 8
 _ZOOMS = 4
-#: Events that are searched together: their arrays fit the memory.
-_TOGETHER = 256
+#: Events that are searched together: their arrays fit the cache.
+_TOGETHER = 64
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
 #: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.

@@ -27,8 +27,8 @@ _QUANTILE, _MOST = 0.25, 0.99
 #: times the root of their number.
 _FEWEST_BLOCKS, _MANY_BLOCKS = 32, 256
 _QUANTILE_ERROR = 1.8
-#: Second differences that give a scatter to a percent; of more every so many is taken.
-_MOST_BENDS = 1 << 15
+#: Second differences that give a scatter to 1.4 %; of more every so many is taken.
+_MOST_BENDS = 1 << 14
 #: Probability of a false event in a recording of Gaussian noise.
 FALSE_ALARM = 0.01
 
@@ -111,18 +111,20 @@ def estimate(force: Array) -> Noise:
     for j in range(size):
         lag = 1 << j
         stop = n - 3 * lag + 1
-        first = np.arange(0, stop, max(1, min(lag // 4, stop // _MOST_BENDS)))
-        inside = first[saturated[first + 3 * lag] == saturated[first]]
-        first = inside if inside.size >= _FEWEST_BLOCKS else first
+        hop = max(1, min(lag // 4, stop // _MOST_BENDS))
+        inside = saturated[3 * lag :: hop] == saturated[:stop:hop]
+        if np.count_nonzero(inside) < _FEWEST_BLOCKS:
+            inside[:] = True
         # Bends whose first mean is within a lag share samples.
-        count = min(first.size, n / lag)
+        count = min(int(np.count_nonzero(inside)), n / lag)
         for k in range(j + 1):
             width = 1 << k
             before, here, after = (
-                total[first + step + width] - total[first + step] for step in (0, lag, 2 * lag)
+                total[step + width : step + width + stop : hop] - total[step : step + stop : hop]
+                for step in (0, lag, 2 * lag)
             )
             # The variance of the bend of white means is six times theirs.
-            one = _deviation(np.abs(after - 2 * here + before)) / (np.sqrt(6.0) * width)
+            one = _deviation(np.abs(after - 2 * here + before)[inside]) / (np.sqrt(6.0) * width)
             # Two standard errors more: a threshold from a scatter that came out small is none.
             scatter[k, j] = max(one * (1 + 2 * _QUANTILE_ERROR / np.sqrt(count)), floor)
         if j and n / lag < _MANY_BLOCKS:
