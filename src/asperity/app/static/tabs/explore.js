@@ -461,7 +461,7 @@ export function create(page) {
         results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, buttons),
           el("div", { class: "panels" }, figures.period.element, figures.amplitude.element, motion.element, machine.element,
             figures.harmonics.element, figures.multipliers.element, figures.air.element),
-          el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
+          el("section", { class: "law", tabindex: "0", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
       phases.set(view.phases);

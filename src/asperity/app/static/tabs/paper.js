@@ -42,7 +42,7 @@ export function create(page) {
   const figures = el("div", { class: "paper-figures" }, controls,
     el("div", { class: "results" },
       el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), buttons), drawing, figure.element,
-      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "Values at the end of each curve"), ends)), dock.element);
+      el("section", { class: "law", tabindex: "0", "aria-label": "Numbers" }, el("h3", {}, "Values at the end of each curve"), ends)), dock.element);
   const ledgerView = el("div", { class: "ledger" });
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
   const heading = el("h2", {}, title);
