@@ -260,7 +260,7 @@ def test_bad_files_are_told_in_one_sentence(
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'bureau2000'"):
         materials.load("bureau200")
-    with pytest.raises(InputError, match="material must be a file, got .*there is none"):
+    with pytest.raises(InputError, match=r"material must be a file, got .*there is none"):
         materials.load(tmp_path / "none.toml")
     with pytest.raises(InputError, match="must be a readable TOML file"):
         materials.load(tmp_path)
