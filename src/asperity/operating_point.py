@@ -7,7 +7,7 @@ machine, ``V, epsilon, frequency`` of the drive, ``inertia`` (1 includes the mas
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -144,24 +144,31 @@ def numbers_for(
         if name not in numbers and (parameter.default is None or name in needed)
     ]
     if missing:
-        name, example = missing[0], known[missing[0]].example
-        like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
-        advice = f"name a material that has them or give each one, like {like}"
-        got = f"none for {', '.join(missing)}"
-        raise InputError(law_name, "have all its numbers", got, advice)
+        raise without_numbers(law_name, missing, known, place)
     return {name: numbers[name] for name in known if name in numbers}
 
 
-def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:
+def without_numbers(
+    law_name: str, missing: Sequence[str], known: Mapping[str, Parameter], place: str = ""
+) -> InputError:
+    """The mistake of a point whose law lacks numbers; arguments as of `numbers_for`."""
+    name, example = missing[0], known[missing[0]].example
+    like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
+    advice = f"name a material that has them or give each one, like {like}"
+    return InputError(law_name, "have all its numbers", f"none for {', '.join(missing)}", advice)
+
+
+def refuse_foreign(law_name: str, given: Iterable[str]) -> None:
     """Raise `InputError` if a given parameter belongs to other laws only."""
-    own = point_parameters(get_law(law_name))
+    of_law = point_parameters(get_law(law_name))
     for name in given:
         owners = [
             n for n, law in registered().items() if canonical_name(name, point_parameters(law))
         ]
-        foreign, got = bool(owners), f"'{name}', which belongs to {', '.join(owners)}"
-        known, advice = canonical_name(name, own), "leave it out or choose another law"
-        require(known or not foreign, law_name, "be given its own parameters", got, advice)
+        holds = not owners or canonical_name(name, of_law)
+        got = f"'{name}', which belongs to {', '.join(owners)}"
+        advice = "leave it out or choose another law"
+        require(holds, law_name, "be given its own parameters", got, advice)
 
 
 def point_numbers(

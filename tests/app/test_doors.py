@@ -122,6 +122,60 @@ def test_an_unknown_name(ask, tmp_path, field, name):
     assert said[0].startswith(f"{field} must be a ")
 
 
+def plan_with(folder, **changed):
+    """The mistakes of a plan in which some lines are replaced; None leaves a line out."""
+    parts = {
+        "law": "'rice-ruina'", "material": "'bureau2000'", "axes": "{ K = { values = ['1 N/m'] } }",
+        "parameters": "{ V = '1 um/s', epsilon = 0.2 }",
+    }  # fmt: skip
+    lines = [f"{n} = {text}" for n, text in (parts | changed).items() if text is not None]
+    plan = folder / "plan.toml"
+    plan.write_text("\n".join(lines), encoding="utf-8")
+    return sentence(lambda: run_sweep(load_plan(plan), folder / "sweep.zarr", workers=1))
+
+
+def test_missing_numbers(ask, tmp_path):
+    options = ("--law", "rice-ruina", "--material", "bureau2000", "-e", "0.2", "-f", "120 Hz")
+    page = ask("explore", {"law": "rice-ruina", "numbers": {"epsilon": 0.2}, "laws": []})
+    said = {
+        '-V "1 um/s"': command("response", *options),
+        "parameters.V = '1 um/s'": plan_with(tmp_path, parameters="{ epsilon = 0.2 }"),
+        "V: 1 um/s": page.json["error"],
+    }
+    beginnings = {text.removesuffix(like) for like, text in said.items()}
+    assert beginnings == {
+        "rice-ruina must have all its numbers, got none for V; name a material that has them or "
+        "give each one, like "
+    }
+
+
+def test_a_number_of_another_law(tmp_path):
+    options = ("--law", "rice-ruina", "--material", "bureau2000", "--set", "alpha=0.2")
+    said = [
+        command("response", *options, "-V", "1 um/s", "-e", "0.2", "-f", "120 Hz"),
+        plan_with(tmp_path, parameters="{ V = '1 um/s', epsilon = 0.2, alpha = 0.2 }"),
+        plan_with(tmp_path, axes="{ alpha = { values = [0.1, 0.2] } }"),
+    ]
+    assert set(said) == {
+        "rice-ruina must be given its own parameters, got 'alpha', which belongs to "
+        "linker-dieterich; leave it out or choose another law"
+    }
+
+
+@pytest.mark.parametrize(
+    ("changed", "mistake"),
+    [
+        # An unknown law has no parameters, which is no second mistake.
+        ({"law": "'rice'"}, "law must be a registered law, got 'rice'; did you mean 'rice-ruina'?"),
+        ({"axes": "{ Kk = { values = [1] } }"}, "axes.Kk must be a parameter, a ratio or 'law', "),
+        ({"axes": "{ K = { from = '1 N/m', values = [1] } }"}, "axes.K must have one of from-"),
+        ({"axes": "{ law = { from = 1, to = 2, count = 2 } }"}, "axes.law must be listed, "),
+    ],
+)
+def test_an_axis_is_named_once(tmp_path, changed, mistake):
+    assert plan_with(tmp_path, **changed).startswith(mistake)
+
+
 #: By field of a measurement: the option, the label of the page, and values that it may not have.
 MEASURED = {
     "harmonics": ("--harmonics", "Harmonics", [0, 65, -1, "some"]),

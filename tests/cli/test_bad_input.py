@@ -46,7 +46,7 @@ def refused(result, *parts: str) -> None:
         ("-e", "0.2 N", ["-e must be a pure number, got '0.2 N'"]),
         ("--law", "elasto-plastc", ["got 'elasto-plastc'; did you mean 'elasto-plastic'?"]),
         ("--material", "bureau200", ["got 'bureau200'; did you mean 'bureau2000'?"]),
-        ("--material", "none.toml", ["material.file must be a readable TOML file"]),
+        ("--material", "none.toml", ["--material must be a file"]),
         ("--set", "A=0", ["--set A must be positive, got 0;"]),
         ("--set", "A=-0.01", ["--set A must be positive, got -0.01;"]),
         ("--set", "D0=0 um", ["--set D0 must be positive, got 0 m;"]),
@@ -254,7 +254,7 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
         ((*AIR, "--inverse", "0.4", "--for", "gap", "--vacuum"), ["must have an air layer"]),
         ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),
         (("materials", "bureau"), ["did you mean 'bureau2000'?"]),
-        (("materials", "no.toml", "--cite"), ["must be a readable TOML file"]),
+        (("materials", "no.toml", "--cite"), ["must be a file"]),
         (("reproduce",), ["--out must be given, got nothing; add it, like --out DIR"]),
     ],
 )

@@ -123,6 +123,12 @@ def test_all_mistakes_are_told_at_once(write) -> None:
         ('"step load to 9 N"', "9", "step 3 must be a text, or a table"),
         ('repeat = 2, steps = ["hold', 'repet = 2, steps = ["hold', "step 2 must be a text, or"),
         ("rtol = 1e-8", "rtol = 1e-8\nrtol = 1e-9", "must be valid TOML"),
+        ("repeat = 2", "repeat = 0", "step 2.repeat must be a whole number above zero, got 0"),
+        (
+            "[solver]",
+            "[track]\namplitude = -1.0\nlength = '1 um'\n[solver]",
+            "track.amplitude must",
+        ),
     ],
 )
 def test_one_mistake_is_one_sentence(write, old, new, message) -> None:

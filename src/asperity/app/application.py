@@ -9,6 +9,7 @@ import logging
 import os
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -19,6 +20,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
+from starlette.types import Receive, Scope, Send
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, question_in
@@ -123,14 +125,20 @@ def build(
     }
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=handlers)
     app.router.redirect_slashes = False
-    return Guard(app, port, in_notebook, limits)
+
+    async def with_labels(scope: Scope, receive: Receive, send: Send) -> None:
+        with naming(in_labels):
+            await app(scope, receive, send)
+
+    return Guard(with_labels, port, in_notebook, limits)
 
 
 def _answer(endpoint: Answer, threads: ThreadPoolExecutor) -> Callable[[Request], Any]:
     async def handle(request: Request) -> Response:
         question = await question_in(request, endpoint.question)
         run = asyncio.get_running_loop().run_in_executor
-        return _json(await run(threads, lambda: to_json(endpoint.answer(question))))
+        here = copy_context()
+        return _json(await run(threads, here.run, lambda: to_json(endpoint.answer(question))))
 
     return handle
 
@@ -187,8 +195,7 @@ def _json(text: str) -> Response:
 
 
 async def _bad_input(request: Request, error: InputError) -> Response:
-    with naming(in_labels):
-        return sentence(HTTPException(400, str(error)))
+    return sentence(HTTPException(400, str(error)))
 
 
 async def _http_error(request: Request, error: HTTPException) -> Response:

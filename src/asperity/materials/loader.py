@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -27,21 +26,14 @@ def packaged() -> Mapping[str, Any]:
 def _packaged_content(name: str) -> dict[str, Any]:
     """The parsed file of a material that comes with the package; parsing takes milliseconds."""
     text = packaged()[name].read_text(encoding="utf-8")
-    return parsed_toml(text, "material.file", f"'{name}'")
+    return parsed_toml(text, "material", f"'{name}'")
 
 
 def load_material(name: str | PathLike[str]) -> Material:
     """See `asperity.materials.load`."""
     text = fspath(file_path(name, "material"))
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
-        if not os.path.isfile(text):
-            raise InputError(
-                "material.file",
-                "be a readable TOML file",
-                f"'{text}', which is none",
-                "give the path of a material file",
-            )
-        file, content = toml_content(text, "material.file")
+        file, content = toml_content(text, "material")
         return Material.of_content({"name": file.stem, **content}, text)
     if text not in packaged():
         rule = "be a known material or the path of a .toml file"

@@ -90,7 +90,10 @@ class Protocol(Experiment):
         """Load and drive over time."""
         level = self._level()
         steps = (one.step for one in self._planned)
-        return Programme(*steps, load=level.load, velocity=level.velocity, name="start")
+        try:
+            return Programme(*steps, load=level.load, velocity=level.velocity, name="start")
+        except InputError as error:
+            raise error.about(error.field.name.replace("start.steps", "steps")) from None
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -103,7 +106,10 @@ class Protocol(Experiment):
         even = slider_from(get_law(self.law), {name: n.value for name, n in self._numbers.items()})
         if self.track is None:
             return even
-        law = on_uneven_track(even.law, **self.track.model_dump())
+        try:
+            law = on_uneven_track(even.law, **self.track.model_dump())
+        except InputError as error:
+            raise error.about(error.field.name.replace("law.track_", "track.")) from None
         return Slider(law, spring=even.K, load=even.W0, mass=even.M)
 
     @cached_property
@@ -126,7 +132,7 @@ class Protocol(Experiment):
             "radiation_damping": eta.value if eta is not None and eta.value > 0 else None,
             "rtol": self.solver.rtol,
             "method": self.solver.method,
-            **({"most_steps": self.solver.most_steps} if self.solver.most_steps else {}),
+            **({} if self.solver.most_steps is None else {"most_steps": self.solver.most_steps}),
         }
 
     @property

@@ -24,7 +24,9 @@ def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
     try:
         return fill(steps)
     except ValidationError as error:
-        wrong = {m["loc"][0]: m for m in reversed(error.errors()) if m["loc"]}
+        # Of a table, what is wrong in the table rather than that it is no text.
+        ranked = sorted(error.errors(), key=lambda m: "Repeat" not in m["loc"])
+        wrong = {m["loc"][0]: m for m in reversed(ranked) if m["loc"]}
         if not wrong:
             raise
         raise ProtocolError(
@@ -36,6 +38,9 @@ def _wrong_step(number: Any, reported: Any) -> InputError:
     raised = reported.get("ctx", {}).get("error")
     if isinstance(raised, InputError):
         return raised
+    if isinstance(reported["input"], int) and "repeat" in reported["loc"]:
+        rule, got = "be a whole number above zero", shown(reported["input"])
+        return InputError(f"step {number + 1}.repeat", rule, got, "correct it")
     return InputError(
         f"step {number + 1}",
         "be a text, or a table of repeat and steps",

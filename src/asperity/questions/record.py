@@ -297,11 +297,11 @@ def _mistakes(
     if reported["type"] == "literal_error":
         expected = reported["ctx"]["expected"].replace("'", "")
         return (InputError(field, f"be {expected}", value, "choose one"),)
-    if reported["type"] in ("too_short", "too_long"):
-        edge = reported["ctx"]
+    if reported["type"].endswith(("too_short", "too_long")):
+        edge, what = reported["ctx"], "characters" if "string" in reported["type"] else "parts"
         rule = f"have {'at least' if 'min_length' in edge else 'at most'} "
-        rule += f"{edge.get('min_length', edge.get('max_length'))} parts"
-        return (InputError(field, rule, edge["actual_length"], "correct it"),)
+        rule += f"{edge.get('min_length', edge.get('max_length'))} {what}"
+        return (InputError(field, rule, edge.get("actual_length", value), "correct it"),)
     limits = {"greater_than_equal": "at least", "less_than_equal": "at most"}
     if reported["type"] in limits:
         (limit,) = reported["ctx"].values()

@@ -63,14 +63,14 @@ class AxisTable(Record):
         one = len(forms) == 1 and not fields - allowed[forms[0]]
         rule = "have one of from-to-count, values, zip, cases or draw"
         like = "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
-        require(one, "axis", rule, shown, like)
+        require(one, "", rule, shown, like)
         needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
         missing = [name for name in needed if getattr(self, name) is None]
         rule, got = (
             f"have {' and '.join(needed)} together with {forms[0]}",
             " and no ".join(missing),
         )
-        require(not missing, "axis", rule, f"no {got}", "add it")
+        require(not missing, "", rule, f"no {got}", "add it")
         return self
 
 

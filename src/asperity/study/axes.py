@@ -159,11 +159,8 @@ def axis_record(
         columns = {_name(n, known): _column(n, v, known, plan.folder) for n, v in table.zip.items()}
         lengths = {n: len(v) for n, v in columns.items()}
         if len(set(lengths.values())) != 1:
-            raise InputError(
-                "zip must have lists of one length, got "
-                + (", ".join(f"{k} of {v}" for k, v in lengths.items()) or "nothing")
-                + "; make them equal"
-            )
+            got = ", ".join(f"{k} of {v}" for k, v in lengths.items()) or "nothing"
+            raise InputError("zip", "have lists of one length", got, "make them equal")
         return name, _listed(columns)
     if table.cases is not None:
         return name, _listed(_cases(table.cases, known, plan.folder))
@@ -191,10 +188,8 @@ def _name(name: str, known: Mapping[str, Parameter]) -> str:
         return name
     column = canonical_name(name, known)
     if column is None:
-        raise InputError(
-            f"axis must be a parameter, a ratio or 'law', got {shown(name)}; "
-            + suggestion(name, {**known, "law": Parameter("law", "dimensionless", "finite")})
-        )
+        advice = suggestion(name, {**known, "law": Parameter("law", "dimensionless", "finite")})
+        raise InputError("axis", "be a parameter, a ratio or 'law'", shown(name), advice)
     return column
 
 
@@ -242,7 +237,9 @@ def _ends(
     known : mapping of str to Parameter
     """
     column, fields = _name(name, known), {"from", "to", *others}
-    holds = column not in TEXTS and fields <= set(table) <= {*fields, "spacing"}
+    rule, advice = "be listed", "write it like { values = ['...'] }"
+    require(column not in TEXTS, name, rule, "a range", advice)
+    holds = fields <= set(table) <= {*fields, "spacing"}
     rule = f"have {', '.join(sorted(fields))}"
     advice = "write it like { from = 0.01, to = 0.5, count = 20 }, or draw it with mean and std"
     require(holds, name, rule, ", ".join(sorted(table)) or "nothing", advice)

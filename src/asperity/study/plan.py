@@ -17,7 +17,13 @@ from pydantic import model_validator
 
 from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
-from asperity.operating_point import known_parameters, material_of, sourced_numbers
+from asperity.operating_point import (
+    known_parameters,
+    material_of,
+    refuse_foreign,
+    sourced_numbers,
+    without_numbers,
+)
 from asperity.parameters import Parameter, canonical_name, point_parameters
 from asperity.questions.record import without_unit
 from asperity.questions.sweep import PlanError, Sweep
@@ -205,11 +211,8 @@ def _numbers(
         wanted |= set(point_parameters(get_law(law)))
     for name in targets.values():
         wanted |= set(RATIOS[name].needs)
-    # Where the plan names an unknown law, nothing is known of the parameters that it has.
-    all_known = laws and len(laws) == len(dict.fromkeys(plan.laws))
-    for name in sorted(explicit - wanted, key=str) if all_known else ():
-        rule = "belong to the laws of the plan"
-        raise InputError(f"parameters.{name}", rule, ", ".join(laws), "leave it out")
+    for law in laws:
+        refuse_foreign(law, sorted(map(str, (explicit | varied) - wanted - set(TEXTS))))
     kept = {
         n: s for n, s in offered.items() if n in wanted and n not in varied and n not in targets
     }
@@ -240,11 +243,7 @@ def _missing(
         known = point_parameters(get_law(law))
         missing = [n for n, p in known.items() if p.default is None and n not in present]
         if missing:
-            example = known[missing[0]].example
-            yield (
-                f"parameters must have all numbers of {law}, got none for {', '.join(missing)}; "
-                f"name a material that has them or give each one, like {missing[0]} = '{example}'"
-            )
+            yield str(without_numbers(law, missing, known, "parameters"))
 
 
 def _present(axis: Mapping[str, Any], law: str) -> set[str]:

@@ -13,6 +13,7 @@ from latex2mathml.converter import convert
 
 from asperity import materials
 from asperity._version import __version__
+from asperity.errors import closest, require
 from asperity.laws import registered
 from asperity.materials import Material
 from asperity.materials.loader import packaged
@@ -27,7 +28,6 @@ from asperity.parameters import (
     required,
     symbol_of,
 )
-from asperity.parameters.arguments import one_of
 from asperity.parameters.parameter import plain_text
 from asperity.units import KINDS, to_si
 
@@ -78,7 +78,9 @@ def as_json() -> str:
 @cache
 def package_material(name: str, field: str = "material") -> Material:
     """A material that comes with the package: no other file is read for a request."""
-    return materials.load(one_of(name, packaged(), field))
+    rule, advice = "be a known material", closest(name, packaged())
+    require(name in packaged(), field, rule, f"'{name}'", advice)
+    return materials.load(name)
 
 
 def mathml(latex: str, *, display: bool = False) -> str:
