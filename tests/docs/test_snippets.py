@@ -7,6 +7,7 @@ import math
 import re
 import runpy
 import sys
+import tomllib
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,7 +15,10 @@ import pytest
 from click.testing import CliRunner
 
 from asperity.cli.main import main
+from asperity.inference.design.plan import plan_of
 from asperity.laws import registry
+from asperity.questions.recording import ReadingRecipe
+from asperity.study.plan import SweepPlan, plan_record
 
 _spec = importlib.util.spec_from_file_location("snippets", Path(__file__).with_name("snippets.py"))
 pages = importlib.util.module_from_spec(_spec)
@@ -118,6 +122,39 @@ def test_page_runs_as_it_says(page, workplace, capsys) -> None:
             script = (page.parent / snippet.name).resolve()
             included[script] = runpy.run_path(str(script))
             namespace |= {k: v for k, v in included[script].items() if not k.startswith("__")}
+
+
+def plans(page: str):
+    """Contents of the `toml` blocks of a page."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return [tomllib.loads(b) for b in re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)]
+
+
+def test_plans_of_designs_and_recipes_on_pages_are_read() -> None:
+    (plan,) = plans("docs/design.md")
+    assert plan_of(plan, require_unit=True).budget == plan["points"]
+    (recipe,) = plans("docs/reading_recordings.md")
+    assert ReadingRecipe(**recipe).title == recipe["title"]
+
+
+def test_parts_of_sweeps_on_pages_belong_to_plans(workplace) -> None:
+    table = "V,epsilon,frequency,mu1,mu1_err\n1e-6,0.1,120,1e-3,1e-5\n1e-6,0.2,120,2e-3,1e-5\n"
+    for name in ("readings", "monday", "tuesday"):
+        (workplace / f"{name}.csv").write_text(table)
+    numbers = {"V": "1 um/s", "frequency": "120 Hz", "epsilon": 0.2}
+    base = {"law": "elasto-plastic", "material": "bureau2000", "axes": {"mu0": {"values": [0.3]}}}
+    fits = {}
+    for part in plans("docs/sweeps.md"):
+        if part.get("solve") == "fit":  # parts after it are of its plan
+            fits = part
+        whole = base | fits | part
+        if "data" in whole["axes"]:
+            whole["fit"] = {n: v for n, v in whole["fit"].items() if n != "data"}
+        taken = set(whole["axes"])
+        for axis in whole["axes"].values():
+            taken |= {*axis.get("zip", {}), *axis.get("over", {})}
+        plan = whole | {"parameters": {n: v for n, v in numbers.items() if n not in taken}}
+        assert set(plan_record(SweepPlan(**plan))["axes"]) == set(whole["axes"])
 
 
 def documented(page: str, head: str) -> set[str]:

@@ -189,6 +189,15 @@ def continuation(
         If a value breaks its rule, the parameter does not exist, the slider has arrays, or no
         periodic orbit is found at the start of the span.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> at = {"velocity": "1 um/s", "frequency": "2 Hz"}
+    >>> branch = asp.continuation(slider, parameter="epsilon", span=(0, 0.2), **at)
+    >>> branch.result
+
     Notes
     -----
     Collocation with the arclength condition of Keller (1977), see

@@ -433,6 +433,15 @@ def stability_boundary(
     InputError
         As `continuation`; if x and y are the same; if `lines` is below 2.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> at = {"velocity": "1 um/s", "frequency": "2 Hz"}
+    >>> plane = {"x": "epsilon", "y": "K", "x_span": (0.05, 0.2), "y_span": (5e4, 2e5)}
+    >>> asp.stability_boundary(slider, **plane, lines=2, **at)
+
     Notes
     -----
     Without modulation the curves end at the closed forms of linear stability: K = Kc for a

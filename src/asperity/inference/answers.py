@@ -338,7 +338,7 @@ def fit(
     >>> import asperity as asp
     >>> steps = asp.samples.velocity_steps(seed=1)
     >>> print(asp.fit(steps, "rice-ruina"))
-    >>> print(asp.fit("steps.csv", free=["A", "B"], fixed={"D0": "5 um"}))
+    >>> print(asp.fit(steps, free=["A", "B"], fixed={"D0": "5 um"}))
     """
     loaded = _loaded(data, options.get("fixed"))
     return fit_loaded(loaded, default_law(loaded) if law is None else law, free, **options)

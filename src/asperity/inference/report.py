@@ -185,9 +185,15 @@ def posterior_sections(posterior: Posterior) -> list[Section]:
 
 
 def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[Section]:
-    """The verdict, the laws with what decides, and the warnings of each."""
+    """The verdict, the laws with what decides, and the warnings of each.
+
+    What is not determined stands in the table, without the sentence that a fit has for each.
+    """
     head, rows = laws_table(comparison, reasons=reasons)
     warned = tuple(
-        f"{name}: {warning}" for name, j in comparison.laws.items() for warning in j.fit.warnings
+        f"{name}: {warning}"
+        for name, j in comparison.laws.items()
+        for warning in j.fit.warnings
+        if not warning.startswith(tuple(f"{n} is not determined" for n in j.fit.undetermined))
     )
     return [Section("", (comparison.verdict,), head, tuple(rows), warned)]

@@ -55,8 +55,8 @@ _REACH = 10.0
 REFERENCES = ("V0",)
 
 
-class MissingNumberError(InputError):
-    """A law without one of its numbers: a comparison goes on without that law."""
+class UnfittableLawError(InputError):
+    """A law with too few numbers or samples for it: a comparison goes on without that law."""
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ def unknown_of(
     elif middle:
         low, high = middle / 3, middle * 3
     else:
-        raise MissingNumberError(
+        raise UnfittableLawError(
             f"start must hold a value for the free parameter {name}, got none; give one, or fix it"
         )
     if middle:

@@ -89,7 +89,7 @@ def measure_recording(
     --------
     >>> import asperity as asp
     >>> print(asp.measure(asp.samples.velocity_steps()))
-    >>> asp.measure("steps.csv", window=("100 s", "400 s")).plot()
+    >>> asp.measure(asp.samples.velocity_steps(), window=("100 s", "400 s")).plot()
     """
     # Most arguments are the fields of the question.
     fields = {name: value for name, value in locals().items() if name in Question.model_fields}

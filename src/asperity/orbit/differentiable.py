@@ -313,6 +313,13 @@ def response_function(
     InputError
         If the law is unknown or does not depend on the velocity.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> model = asp.response_function("rice-ruina")
+    >>> numbers = {"mu0": 0.37, "A": 0.013, "B": 0.019, "D0": 0.4e-6, "V0": 1e-6, "K": 2e5}
+    >>> model(numbers | {"W0": 7.0, "V": 1e-6, "epsilon": 0.2, "frequency": 120.0})
+
     Notes
     -----
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). With D the equations of an orbit
@@ -594,6 +601,14 @@ def sensitivities(
     ------
     InputError
         As `periodic_response`; if the law does not depend on the velocity.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> d = asp.sensitivities(slider, velocity="1 um/s", epsilon=0.24, frequency="120 Hz")
+    >>> dict(zip(d.parameters, d.mean_friction))
 
     Notes
     -----

@@ -204,6 +204,13 @@ def averaged_response(
     ------
     InputError
         As `periodic_response`.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> print(asp.averaged_response(slider, velocity="1 um/s", epsilon=[0.1, 0.2]).delta_mu)
     """
     V = DRIVE["V"].check(velocity)
     problem, shape = flatten(

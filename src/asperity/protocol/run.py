@@ -421,6 +421,17 @@ def run_experiment(
     ------
     InputError
         If the protocol has a mistake, or `out` cannot be written.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> protocol = asp.protocol.Protocol(
+    ...     law="rice-ruina",
+    ...     material="bureau2000",
+    ...     start={"velocity": "1 um/s"},
+    ...     steps=["slide for 2 s", "hold 10 s", "slide at 10 um/s for 2 s"],
+    ... )
+    >>> print(asp.run(protocol, "run.nc"))
     """
     chosen = protocol if isinstance(protocol, Protocol) else load_protocol(protocol)
     return run_protocol(chosen, Path(out), resume=resume, progress=progress)

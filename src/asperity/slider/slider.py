@@ -26,6 +26,12 @@ class Slider(Displayed, eqx.Module):
         Mean normal load (N).
     M : array
         Slider mass (kg); the quasi-static equations do not use it.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load="7 N")
     """
 
     law: Law

@@ -122,6 +122,13 @@ def stiffness_threshold(
     ------
     InputError
         If a number breaks its rule, or the law has no K_c and `between` is not given.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> asp.stiffness_threshold(slider, velocity="1 um/s", epsilon=0.1, frequency="120 Hz")
     """
     eps, f = DRIVE["epsilon"].check(epsilon), DRIVE["frequency"].check(frequency)
     try:

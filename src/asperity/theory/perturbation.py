@@ -154,6 +154,13 @@ def perturbation_response(
     InputError
         If the velocity or the frequency is not positive, or has a wrong unit; as
         `asperity.slider.equation_of_motion`.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
+    >>> asp.perturbation_response(slider, velocity="1 um/s", frequency="120 Hz").transfer
     """
     V = jnp.asarray(DRIVE["V"].check(velocity))
     f = jnp.asarray(DRIVE["frequency"].check(frequency))

@@ -228,6 +228,15 @@ def transient(
     InputError
         If a value breaks its rule.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.5 N/um", load=pmma.W0)
+    >>> steps = asp.loads.Hold("10 s"), asp.loads.Slide("2 s", velocity="10 um/s")
+    >>> programme = asp.loads.Programme(*steps, load=pmma.W0, velocity="1 um/s")
+    >>> asp.transient(slider, programme).plot()
+
     Notes
     -----
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29), in the states that the

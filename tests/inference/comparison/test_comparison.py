@@ -12,16 +12,17 @@ from benchmarks.coverage import CASES, runs_of
 from click.testing import CliRunner
 from scipy.integrate import quad
 
-from asperity import Slider, periodic_response
+from asperity import Slider, periodic_response, samples
 from asperity.cli.main import main
 from asperity.errors import InputError
-from asperity.inference import compare, fit, table_of
+from asperity.inference import answers, compare, fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out
 from asperity.inference.comparison.record import laws_table
 from asperity.inference.comparison.support import support
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.recording.defects.autoregression import Autoregression
+from asperity.recording.writers import write
 from references.populations import draws, population
 
 V = np.repeat([1e-6, 1e-5], 8)
@@ -76,6 +77,17 @@ def test_laws_are_compared_without_naming_what_is_free(made, pmma):
     # Nothing says where to look for its cut-off velocities.
     assert list(found.not_compared) == ["cut-off"]
     assert "Not compared: cut-off, for want of numbers" in found.verdict
+
+
+@pytest.mark.long
+def test_a_law_with_more_parameters_than_samples_allow_leaves_the_others(tmp_path):
+    whole = write(samples.velocity_steps(), tmp_path / "whole.csv").read_text().splitlines()
+    # The rule is eight samples for each free parameter, step and two more.
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join([whole[0], *whole[4001:10801:110]]) + "\n")
+    found = answers.compare(few, ["rice-ruina", "ruina-slip", "two-state"], evidence=False)
+    assert set(found.laws) == {"rice-ruina", "ruina-slip"}
+    assert "at least 72 samples" in found.not_compared["two-state"]
 
 
 @pytest.mark.parametrize("law", population(["linker-dieterich", "elasto-plastic"]))

@@ -38,7 +38,7 @@ from asperity.inference.tables.term import (
     LockInTerm,
     all_converged,
 )
-from asperity.inference.unknowns import MissingNumberError
+from asperity.inference.unknowns import UnfittableLawError
 from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.parameters import law_parameters
@@ -246,7 +246,7 @@ def compare(
                     **mine,
                     **chosen,
                 )
-            except MissingNumberError as error:
+            except UnfittableLawError as error:
                 not_compared[name] = str(error)
             report(k + 1)
         return done
@@ -254,7 +254,7 @@ def compare(
     fits = fits_to(several, report)
     if len(fits) < 2:
         raise InputError(
-            f"laws must have numbers of two or more, got them of {len(fits)}; "
+            f"laws must be two or more that can be fitted to these data, got {len(fits)}; "
             + "; ".join(not_compared.values())
         )
     result = judge(fits)
@@ -287,11 +287,13 @@ def _support(comparison: Comparison) -> tuple[str, str]:
 
 
 def _without_numbers(not_compared: Mapping[str, str]) -> str:
-    """A sentence on laws that were not compared."""
+    """A sentence on laws that were not compared; the table has the reason of each."""
     if not not_compared:
         return ""
-    names = list(not_compared)
-    return f" Not compared: {_listed(names)}, for want of numbers that are neither free nor given."
+    return (
+        f" Not compared: {_listed(list(not_compared))}, for want of numbers that are neither free "
+        "nor given, or of samples."
+    )
 
 
 def _within_law(report: Report, laws: int, done: int, total: int) -> None:

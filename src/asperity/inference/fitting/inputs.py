@@ -19,8 +19,8 @@ from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.unknowns import (
     EPS_RATIO,
     REFERENCES,
-    MissingNumberError,
     Prior,
+    UnfittableLawError,
     Unknown,
     material_priors,
     require_fittable,
@@ -196,7 +196,7 @@ def fixed_values(
         else:
             missing.append(name)
     if missing:
-        raise MissingNumberError(
+        raise UnfittableLawError(
             law.name,
             "have all its numbers",
             f"none for {', '.join(missing)}",

@@ -20,7 +20,7 @@ from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
-from asperity.inference.unknowns import Prior, Unknown, unknown_of
+from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
 from asperity.parameters.arguments import typed
@@ -128,8 +128,9 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
     for run in runs:
         needed = _SAMPLES_PER_PARAMETER * (len(free) + len(run.cuts) + 2)
         rule = f"have at least {needed} samples for {len(free)} free parameters"
-        advice = "free fewer or give a longer window"
-        require(not run.time.size < needed, run.name, rule, run.time.size, advice)
+        if run.time.size < needed:
+            advice = "free fewer or give a longer window"
+            raise UnfittableLawError(run.name, rule, run.time.size, advice)
 
 
 def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:

@@ -316,8 +316,9 @@ class RunTerm(DataTerm):
         effective = float(self.noise["effective_samples"])
         if effective < 3 * (len(self.linear) + 4):
             said.append(
-                f"{self.name} has {effective:.3g} independent samples only, its noise is so slow; "
-                "a longer window would help, or a drift (--drift) if friction drifts with time"
+                f"the noise of {self.name} is so slow that its {self.run.time.size} samples say as "
+                f"much as {max(effective, 1):.2g} with white noise: the intervals are rough; a "
+                "longer window would help, or a drift (--drift) if friction drifts with time"
             )
         if self.run.spikes:
             said.append(self._said_of_spikes())

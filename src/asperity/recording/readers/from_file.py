@@ -43,7 +43,7 @@ def read(
     decimal: str | None = None,
     format: str | None = None,
 ) -> Trace:
-    """Read a recording of a laboratory into a checked `Trace`.
+    r"""Read a recording of a laboratory into a checked `Trace`.
 
     Parameters
     ----------
@@ -89,8 +89,13 @@ def read(
     Examples
     --------
     >>> import asperity as asp
-    >>> steps = asp.read("run7.csv", {"F": "Shear"}, {"Shear": "kN"}, channels={"load": "50 kN"})
-    >>> asp.measure(steps).plot()
+    >>> from asperity.recording.writers import write
+    >>> path = write(asp.samples.velocity_steps(), "steps.csv")
+    >>> print(asp.read(path))
+    >>> text = "Time (s),Shear\n0,30.1\n0.01,30.2\n0.02,30.4\n0.03,30.3\n"
+    >>> with open("run7.csv", "w") as file:
+    ...     _ = file.write(text)
+    >>> print(asp.read("run7.csv", {"F": "Shear"}, {"Shear": "kN"}, channels={"load": "50 kN"}))
     """
     if recipe is not None and not isinstance(recipe, ReadingRecipe):
         recipe = ReadingRecipe.from_file(recipe)

@@ -81,6 +81,16 @@ def response_map(
     InputError
         If a number is missing, unknown, given twice, or breaks its rule.
 
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> from asperity.study.map import Axis
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> numbers = {n: pmma[n].si for n in ("mu0", "A", "B", "D0", "V0", "W0")}
+    >>> numbers |= {"V": "1 um/s", "epsilon": 0.2}
+    >>> x, y = Axis("frequency", "1 Hz", "50 Hz", 12), Axis("K", "0.1 N/um", "0.6 N/um", 10)
+    >>> print(asp.map("rice-ruina", numbers, x=x, y=y).stable)
+
     Notes
     -----
     The position of a boundary point, ln|m| = 0, is accurate to 1e-6 of the axes. Between
