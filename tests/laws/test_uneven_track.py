@@ -100,7 +100,7 @@ def test_a_protocol_has_a_track() -> None:
     ("track", "message"),
     [
         ({"amplitude": 0.02}, "track.length must"),
-        ({"amplitude": -0.02, "length": "20 um"}, "track_amplitude must not be negative"),
+        ({"amplitude": -0.02, "length": "20 um"}, "track.amplitude must not be negative"),
         ({"amplitude": 0.02, "length": "20 N"}, "track.length must"),
         ({"amplitude": 0.02, "length": "20 um", "exponent": 1.0}, "track.exponent must be above 1"),
     ],

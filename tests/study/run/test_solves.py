@@ -122,7 +122,7 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
     ("fields", "message"),
     [
         ({"axes": {"epsilom": {"values": (0.1,)}}}, "did you mean 'epsilon'"),
-        ({"axes": {"epsilon": {"values": (0.1,), "count": 3}}}, "axis must have one of"),
+        ({"axes": {"epsilon": {"values": (0.1,), "count": 3}}}, "axes.epsilon must have one of"),
         ({"axes": {"epsilon": {"from": 0.1}}}, "got no to and no count"),
         ({"axes": {"epsilon": {"values": (1.2,)}}}, "at least 0 and below 1"),
         ({"axes": {"a": {"zip": {"epsilon": (0.1, 0.2), "V": (1e-6,)}}}}, "epsilon of 2, V of 1"),
