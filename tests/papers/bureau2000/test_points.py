@@ -174,8 +174,8 @@ def test_points_that_no_curve_has(figures, tmp_path, changes, sentence):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("# only a comment\n", "points.csv must have a heading and a point a row, got no rows; add them"),
-        (",".join(HEADING) + "\n", "points.csv must have a heading and a point a row, got no rows; add them"),
+        ("# only a comment\n", "points.csv must have a heading and a point a row, got no rows"),
+        (",".join(HEADING) + "\n", "points.csv must have a heading and a point a row, got no rows"),
         ("figure,x,y\n1,2,3\n", "points.csv must have the columns .* none for y_err, observable"),
     ],
 )
