@@ -32,12 +32,14 @@ LONGEST = (
 #: Rooms that go to the processes file by file: the longest, and those that compile nothing.
 BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 
-#: Rooms and files whose programs take longer to be optimised than they run, in processes that their
-#: tests start too. Others run what users run.
+#: Beginnings of the names of files whose programs take longer to be optimised than they run, in
+#: processes that their tests start too. Others run what users run.
 BRIEF = (
-    *("orbit", "docs", "theory", "transients", "laws", "app"),
+    *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "papers/bureau2000/"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
     *(f"cli/test_{name}.py" for name in ("design", "map", "other_commands", "response", "run")),
+    *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
+    *("inference/fitting/test_fit.py", "inference/runs/test_motion.py"),
 )
 _SWITCH = "jax_disable_most_optimizations"
 
@@ -90,16 +92,14 @@ def pytest_xdist_make_scheduler(config, log):
     return ByRoom(config, log)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled_for_few_calls(request):
+@pytest.hookimpl(tryfirst=True)  # before fixtures are made
+def pytest_runtest_setup(item):
     """Programs are compiled in half the time, and run several times as long, in some rooms."""
     import jax
 
-    file = request.node.nodeid.split("::")[0].partition("/")[2]
-    brief = file in BRIEF or room(request.node.nodeid) in BRIEF
+    brief = item.nodeid.partition("/")[2].startswith(BRIEF)
     jax.config.update(_SWITCH, brief)
-    with pytest.MonkeyPatch.context() as patch:
-        if brief:
-            patch.setenv(_SWITCH.upper(), "1")
-        yield
-    jax.config.update(_SWITCH, False)
+    if brief:
+        os.environ[_SWITCH.upper()] = "1"
+    else:
+        os.environ.pop(_SWITCH.upper(), None)

@@ -22,6 +22,7 @@ from asperity.inference.runs.assembly import Linear, RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
+from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law, known_law, registered
 from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
@@ -121,6 +122,8 @@ def read_data(
     held: dict[str, Any] = {n: question.fixed[n] for n in ("V", "K", "W0") if n in question.fixed}
     result: list[AnyData] = []
     for data, table in zip(question.data, tables, strict=True):
+        rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
+        require(not table or data.window is None, "window", rule, "a table", advice)
         if table and _has_holds(data):
             result.append(read_healing(data.file, held))
         elif table:
@@ -307,6 +310,21 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
     return loaded
 
 
+def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, Any]:
+    """Options in which texts stand for materials and priors, as they do on the command line."""
+    if isinstance(options.get("material"), str):
+        options["material"] = materials.load(options["material"])
+    prior = options.get("prior")
+    if isinstance(prior, str | list | tuple | Mapping):
+        ready, texts = {}, prior
+        if isinstance(prior, Mapping):
+            ready = {name: p for name, p in prior.items() if isinstance(p, Prior)}
+            texts = {name: p for name, p in prior.items() if name not in ready}
+        question = questions.Estimation(prior=texts)  # type: ignore[arg-type]
+        options["prior"] = ready | priors_of(question.prior, free)
+    return options
+
+
 @typed
 def fit(
     data: Data | Sequence[Data],
@@ -325,8 +343,9 @@ def fit(
     free : sequence of str, optional
         Free parameters; by default all that the data may show.
     **options
-        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``material``,
-        ``prior``, ``start``, ``inertia`` and ``profile``.
+        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``start``, ``inertia`` and
+        ``profile``; a ``material`` by its name, ``prior`` also as on the command line:
+        ``"bureau2000"``, ``["K=0.2+-0.01 N/um"]``.
 
     Raises
     ------
@@ -340,6 +359,7 @@ def fit(
     >>> print(asp.fit(steps, "rice-ruina"))
     >>> print(asp.fit(steps, free=["A", "B"], fixed={"D0": "5 um"}))
     """
+    options = _by_names(free, options)
     loaded = _loaded(data, options.get("fixed"))
     return fit_loaded(loaded, default_law(loaded) if law is None else law, free, **options)
 
@@ -361,7 +381,7 @@ def compare(
     free : sequence of str, optional
         Free parameters of all laws.
     **options
-        Of `asperity.inference.compare`.
+        Of `asperity.inference.compare`, materials and priors as of `fit`.
 
     Raises
     ------
@@ -376,6 +396,7 @@ def compare(
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
     names = compared_laws([law.strip() for law in listed])
+    options = _by_names(free, options)
     return compare_loaded(_loaded(data, options.get("fixed")), names, free, **options)
 
 

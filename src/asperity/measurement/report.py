@@ -96,12 +96,12 @@ def amplitude_sections(rows: list[dict[str, Any]], name: str) -> list[Section]:
         if not row["reason"]:
             values = [(row.get(n), row.get(f"{n}_uncertainty", math.nan)) for n in shown]
             cells = ["-" if v is None or not math.isfinite(v) else _number(v, d) for v, d in values]
-            times = f"{row['start']:.6g}", f"{row['end']:.6g}"
+            times = _duration(row["start"]), _duration(row["end"])
             table.append((str(row["part"]), *times, *cells, row["verdict"]))
     notes = [f"part {row['part']}: {row['reason']}" for row in rows if row["reason"]]
     notes += [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
     count = f"{name}: {len(rows)} modulated {'part' if len(rows) == 1 else 'parts'}"
-    head = ("part", "from (s)", "to (s)", *shown, "verdict")
+    head = ("part", "from", "to", *shown, "verdict")
     return [Section(count, head=head, rows=tuple(table)), Section("", tuple(notes))]
 
 

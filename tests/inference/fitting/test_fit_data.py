@@ -5,6 +5,8 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.inference.answers import answer_fit
+from asperity.questions.fit import Fit
 from asperity.recording.writers import write
 
 
@@ -28,3 +30,29 @@ def test_a_file_that_is_not_there_is_named(tmp_path) -> None:
         asp.fit(tmp_path / "no.csv")
     with pytest.raises(InputError, match="law"):
         asp.compare(tmp_path / "no.csv", laws=["no-such-law"])
+
+
+READINGS = """V (um/s),epsilon,frequency (Hz),mu1,mu1_uncertainty
+1,0.1,120,0.01,1e-4
+1,0.3,120,0.03,1e-4
+"""
+
+
+def test_materials_and_priors_go_by_their_names(tmp_path) -> None:
+    file = tmp_path / "readings.csv"
+    file.write_text(READINGS)
+    pmma = asp.materials.load("bureau2000")
+    options = {"free": ["D0"], "starts": 0}
+    named = asp.fit(file, material="bureau2000", prior="bureau2000", **options)
+    loaded = asp.fit(file, material=pmma, prior=pmma, **options)
+    assert named.values == loaded.values
+    own = asp.fit(file, material=pmma, prior=["D0=0.5+-1e-6 um"], **options)
+    assert abs(own.values["D0"] - 0.5e-6) < 1e-9
+
+
+def test_a_window_of_a_table_is_refused(tmp_path) -> None:
+    file = tmp_path / "readings.csv"
+    file.write_text(READINGS)
+    question = Fit(data=({"file": file, "window": (0, 1)},), material="bureau2000")
+    with pytest.raises(InputError, match="window must go with a recording, got a table"):
+        answer_fit(question)

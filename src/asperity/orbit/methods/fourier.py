@@ -434,7 +434,8 @@ class Fourier(Method):
             size = chunk_of(chosen, _CHUNK)
             for part, (observables, error, orbit) in run_chunks(solve, (problem,), chosen, size):
                 good = np.flatnonzero(error < _ERROR)
-                solution.store(part[good], take(observables, good))
+                every = len(good) == len(part)
+                solution.store(part[good], observables if every else take(observables, good))
                 solution.iterations[part] += orbit.steps
                 if options.phases:
                     sample = partial(_sample, grading=grading, phases=options.phases)
