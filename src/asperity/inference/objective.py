@@ -131,9 +131,7 @@ class DataTerm(ABC):
             Whether a slower method is tried where the fast one finds no solution.
         """
 
-    def chi2_of_many(
-        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
-    ) -> Float:
+    def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
         """Sums of the squared residuals at many sets of parameters, without derivatives.
 
         Parameters
@@ -142,9 +140,11 @@ class DataTerm(ABC):
         near : bool
             Whether solutions are like those of the last call of `residuals`, and begun there. The
             sums may then be those of a coarser model: differences between them count.
-        least : float
-            Share of a table's rows that must have a periodic orbit; with some, the sum is that of
-            these rows, scaled to all. Infinite with fewer, and where there is no motion.
+
+        Returns
+        -------
+        array, shape (sets,)
+            Infinite without a solution.
         """
         several = [self.residuals(numbers) for numbers in values]
         return np.array([np.inf if r is None else np.sum(r.values**2) for r in several])
@@ -179,6 +179,8 @@ class DataTerm(ABC):
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
         """The same data with fewer rows and a coarser model, to look for minima with.
+
+        Some of these rows may have no solution: chi-squared is that of the others, scaled to all.
 
         Parameters
         ----------
@@ -484,18 +486,16 @@ class Objective:
         term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
         return None if term is None else replace(self, terms=(term,))
 
-    def chi2_of_many(self, u: Float, *, least: float = 1.0) -> Float:
+    def chi2_of_many(self, u: Float) -> Float:
         """chi-squared of data and priors at many coordinates, shapes (samples, n) to (samples,).
 
         Parameters
         ----------
         u : array, shape (samples, n)
-        least : float
-            As of `DataTerm.chi2_of_many`.
         """
         priors = np.array([np.sum(self.prior_residuals(x)[0] ** 2) for x in u])
         values = [self.named(x) for x in u]
-        return sum((term.chi2_of_many(values, least=least) for term in self.terms), priors)
+        return sum((term.chi2_of_many(values) for term in self.terms), priors)
 
 
 def compressed(columns: Float) -> Float:

@@ -35,8 +35,8 @@ _SAME, _SAME_COARSE = 1e-3, 0.02
 #: modulation slower than sliding over the memory length, and would see only wrong minima; starts
 #: that are evaluated then.
 _RARE, _WITH_SEARCH = 1 / 16, 32
-#: Rows on which starts are compared, and the share of them that must have an orbit.
-_SCREENED_ROWS, _LEAST = 8, 0.5
+#: Rows on which starts are compared.
+_SCREENED_ROWS = 8
 #: Rows of the coarse objective, which are one chunk of the search for orbits, and data for each
 #: free parameter that they hold at least.
 _ROWS, _DATA_EACH = 24, 3
@@ -177,7 +177,7 @@ def _by_few_rows(
     drawn = drawn[:_WITH_SEARCH]
     coarse = _coarse(objective) or objective
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
-    chi2 = screened.chi2_of_many(np.array(drawn), least=_LEAST)
+    chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
     ends = _followed(coarse, starts, progress, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
     apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]

@@ -41,6 +41,9 @@ Float = NDArray[np.float64]
 
 #: Rows whose orbits are remembered, of some ten kilobytes each.
 _REMEMBERED = 2048
+#: Share of the rows of the coarse model that must have an orbit: slip events, which it does not
+#: find, are the orbits of some rows at the minimum itself.
+_LEAST = 0.5
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
 #: Evaluations of an integral, and where searched orbits take a hundred times as long.
@@ -65,6 +68,9 @@ class LockInTerm(DataTerm):
         Whether every call searches for the orbits that the fast method does not find.
     coarse : bool
         Whether orbits are of the coarse model of `response_function`, to look for minima with.
+    least : float
+        Share of the rows that must have a periodic orbit; with some, chi-squared is that of these
+        rows, scaled to all.
     """
 
     searches: bool = False
@@ -95,7 +101,7 @@ class LockInTerm(DataTerm):
             way: function(search=way) for way in (False, "direct", "coarse")
         }
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
-        self.coarse = False
+        self.coarse, self.least = False, 1.0
         self._weights: Weights | None = None
 
     @property
@@ -114,11 +120,20 @@ class LockInTerm(DataTerm):
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
-        """Residuals in standard uncertainties; None if a row has no periodic orbit."""
-        predicted, derivatives, outcome = self.predicted(values, search=search, every=True)
-        if not all_converged(outcome):
+        """Residuals in standard uncertainties; None if too few rows have a periodic orbit."""
+        every = self.least == 1
+        predicted, derivatives, outcome = self.predicted(values, search=search, every=every)
+        solved = outcome == Outcome.CONVERGED
+        share = solved.mean()
+        if share < self.least:
             return None
         result = residuals_of(self.weights, predicted, derivatives)
+        if share < 1:
+            there, scale = solved[result.row], 1 / math.sqrt(share)
+            result = result._replace(
+                values=scale * np.where(there, result.values, 0.0),
+                jacobian=scale * np.where(there[:, None], result.jacobian, 0.0),
+            )
         # Derivatives may overflow far from all data, where an orbit still converges.
         finite = np.isfinite(result.values).all() and np.isfinite(result.jacobian).all()
         return result if finite else None
@@ -135,7 +150,7 @@ class LockInTerm(DataTerm):
         part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
         part.fixed = {n: v[kept] for n, v in self.fixed.items()}
         part._visited = [(free, known.picked(rows)) for free, known in self._visited]
-        part.coarse = coarse
+        part.coarse, part.least = coarse, _LEAST if coarse else self.least
         return part
 
     def with_table(self, table: LockInTable) -> LockInTerm:
@@ -152,9 +167,7 @@ class LockInTerm(DataTerm):
         )
         return result
 
-    def chi2_of_many(
-        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
-    ) -> Float:
+    def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
         """chi-squared at many sets of parameters, by one call; see `DataTerm`."""
         weights, rows, sets = self.weights, self.table.rows, len(values)
         free = {n: np.repeat([v[n] for v in values], rows) for n in values[0]}
@@ -163,7 +176,7 @@ class LockInTerm(DataTerm):
         solved = (outcome == Outcome.CONVERGED).reshape(sets, rows)
         share = np.maximum(solved.mean(1), 1 / rows)
         total = np.sum(np.where(solved[..., None], residuals, 0.0) ** 2, (1, 2)) / share
-        return np.where(share >= least, np.nan_to_num(total, nan=np.inf), np.inf)
+        return np.where(share >= self.least, np.nan_to_num(total, nan=np.inf), np.inf)
 
     def use_search(self, always: bool) -> None:
         """Search for the orbits that the fast method does not find at every call, or no more."""
@@ -257,7 +270,7 @@ class LockInTerm(DataTerm):
         known = self._nearest(free) if search else None
         wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
         values, slopes = function.value_and_jacobian(given, known, every=every, names=wanted)
-        if known is not None and all_converged(np.asarray(values.outcome)):
+        if known is not None and np.mean(values.outcome == Outcome.CONVERGED) >= self.least:
             self._visited.append((dict(free), known))
             del self._visited[: -self._most_visited]
         mu_ss, mu_slopes = _steady(self.law, given, function.compiled_points(self.table.rows))

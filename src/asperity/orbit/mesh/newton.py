@@ -16,7 +16,7 @@ until no exponent and no logarithmic state changes by more than a few units.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple, TypeVar
 
 import jax
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
+from asperity.orbit.batches import FEW, put, run_chunks
 from asperity.orbit.mesh.equations import (
     CondensedEquations,
     collocated,
@@ -217,6 +218,7 @@ def solve_in_plane(
     *,
     max_steps: int,
     tolerance: float = TOLERANCE,
+    few: int = 0,
 ) -> NewtonResult:
     """Newton's method on the plane through a guess.
 
@@ -231,6 +233,8 @@ def solve_in_plane(
     tolerance : float
         On the last change: of the slip exponent and the logarithmic states absolutely, of forces
         relative to their swing.
+    few : int
+        Number of points that may be left unfinished.
     """
     orbit, t = guess, np.array(t, float)
     problem, direction = line(t)
@@ -238,7 +242,7 @@ def solve_in_plane(
     error, steps = np.full(t.shape, np.inf), np.zeros(t.shape, int)
     for _ in range(max_steps):
         going = error > tolerance
-        if not going.any():
+        if going.sum() <= few:
             break
         equations = condensed(problem, orbit, direction, at=at)
         # The guess lies in the plane, and every change keeps it there.
@@ -259,8 +263,22 @@ def solve_in_plane(
 def solve(problem: Problem, guess: Orbit, max_steps: int) -> NewtonResult:
     """Newton's method at fixed parameters, NumPy arrays (points,)."""
     t = np.zeros(guess.nodes.shape[-1])
+    few = FEW if len(t) > FEW else 0
     plane = Plane.of_fixed_parameters(guess)
-    return solve_in_plane(lambda _: (problem, None), guess, t, plane, max_steps=max_steps)
+    line = partial(_fixed, problem)
+    result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few)
+    # The last points of a chunk go on in a smaller one: a step takes as long as its points.
+    left = np.flatnonzero(result.error > TOLERANCE)
+    taken = int(result.steps.max())
+    if 0 < len(left) <= few and taken < max_steps:
+        again = partial(solve, max_steps=max_steps - taken)
+        for part, rest in run_chunks(again, (problem, result.orbit), left, FEW):
+            put(result, part, rest._replace(steps=rest.steps + taken))
+    return result
+
+
+def _fixed(problem: Problem, _: Float) -> tuple[Problem, None]:
+    return problem, None
 
 
 #: Numbers of intervals.
@@ -304,20 +322,23 @@ def refined_orbit(
     Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
     a finer one than the last iterate.
     """
-    first = mesh = remeshed(problem, guess, intervals)
-    result = solve(problem, mesh, _NEWTON_STEPS)
-    best, error = result.orbit, result.error
+    first, result = _attempt(problem, guess, intervals)
+    mesh, points = jax.tree.map(np.copy, first), len(result.error)
+    again = partial(_attempt, intervals=intervals)
     for _ in range(_ROUNDS - 1):
-        if (error < ACCEPTED).all():
-            break
+        left = np.flatnonzero(result.error >= ACCEPTED)
         # A failed attempt still improves the mesh where the orbit is steep.
-        mesh = remeshed(problem, _where(np.isfinite(error), best, mesh), intervals)
-        result = solve(problem, mesh, _NEWTON_STEPS)
-        done = error < ACCEPTED
-        best = _where(done, best, result.orbit)
-        error = np.where(done, error, result.error)
-    orbit = _where(error < ACCEPTED, best, first)
-    return orbit, read(problem, orbit), error
+        latest = _where(np.isfinite(result.error), result.orbit, mesh)
+        for part, attempt in run_chunks(again, (problem, latest), left, (points, FEW)):
+            put((mesh, result), part, attempt)
+    orbit = _where(result.error < ACCEPTED, result.orbit, first)
+    return orbit, read(problem, orbit), result.error
+
+
+def _attempt(problem: Problem, guess: Orbit, intervals: int) -> tuple[Orbit, NewtonResult]:
+    """The guess on a new mesh, and what Newton's method makes of it there."""
+    mesh = remeshed(problem, guess, intervals)
+    return mesh, solve(problem, mesh, _NEWTON_STEPS)
 
 
 def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:
