@@ -27,9 +27,6 @@ from asperity.laws import Law
 Float = NDArray[np.float64]
 T = TypeVar("T")
 
-#: Absolute or relative difference between chi-squared of a model and of its coarser one with which
-#: a minimum of the latter is near one of the former.
-_CLOSE = 1e-2
 #: Residuals of parameters by name, and of arrays.
 CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
@@ -393,18 +390,18 @@ class Objective:
             Largest number of evaluations of the residuals.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
-        terms = tuple(term.coarser() for term in self.terms)
-        if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
-            ahead = replace(self, terms=terms)
-            near = ahead.minimise(u, kept, tolerance=tolerance, evaluations=evaluations)
-            self.unsolved += ahead.unsolved
-            if math.isclose(self.chi2(near.u), near.chi2, rel_tol=_CLOSE, abs_tol=_CLOSE):
-                u = near.u
         kept = dict(kept or {})
         moving = [i for i in range(len(u)) if i not in kept]
         point = np.array(u, float)
         for i, value in kept.items():
             point[i] = value
+        terms = tuple(term.coarser() for term in self.terms)
+        if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
+            ahead = replace(self, terms=terms)
+            near = ahead.minimise(point, kept, tolerance=tolerance, evaluations=evaluations)
+            self.unsolved += ahead.unsolved
+            if self.chi2(near.u) <= self.chi2(point):
+                point = near.u
         low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
         # So far inside that SciPy does not move the first point.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)

@@ -187,7 +187,7 @@ class LockInTerm(DataTerm):
         if not self.searches or self.coarse:
             return self
         result = copy(self)
-        result.coarse = True
+        result.coarse, result.least = True, _LEAST
         return result
 
     @property

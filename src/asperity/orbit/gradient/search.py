@@ -55,6 +55,11 @@ _MESH_AGREEMENT = (1e-8, AGREEMENT)
 _FEW_NODES = NODES[:2]
 
 
+#: Attempts of Newton's method, each on a new mesh: of 9,100 orbits of fits under slow modulation
+#: the first found 7,500, the second 98, a third 21 and a fourth 10, for a third of the time.
+_ROUNDS = 2
+
+
 class MeshOrbits(NamedTuple):
     """Converged orbits on one mesh, NumPy arrays with the points along the last axis.
 
@@ -181,7 +186,7 @@ def followed_orbits(
     read = partial(_numbers, harmonics=harmonics)
     for intervals in meshes if known else (FIRST_MESH, *meshes):
         agreement = agreements[(intervals,) == meshes[-1:]]
-        solve = partial(refined_orbit, intervals=intervals, read=read)
+        solve = partial(refined_orbit, intervals=intervals, read=read, rounds=_ROUNDS)
         finer = Orbit.empty(guess.scheme, size, intervals, points)
         left = [index[:0]]
         for part, (fine, now, error) in run_chunks(

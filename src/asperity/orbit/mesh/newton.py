@@ -313,7 +313,12 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
 
 
 def refined_orbit(
-    problem: Problem, guess: Orbit, *, intervals: int, read: Callable[[Problem, Orbit], T]
+    problem: Problem,
+    guess: Orbit,
+    *,
+    intervals: int,
+    read: Callable[[Problem, Orbit], T],
+    rounds: int = _ROUNDS,
 ) -> tuple[Orbit, T, Float]:
     """The orbit on an equidistributed mesh of `intervals`, what is read of it, and its error.
 
@@ -325,7 +330,7 @@ def refined_orbit(
     first, result = _attempt(problem, guess, intervals)
     mesh, points = jax.tree.map(np.copy, first), len(result.error)
     again = partial(_attempt, intervals=intervals)
-    for _ in range(_ROUNDS - 1):
+    for _ in range(rounds - 1):
         left = np.flatnonzero(result.error >= ACCEPTED)
         # A failed attempt still improves the mesh where the orbit is steep.
         latest = _where(np.isfinite(result.error), result.orbit, mesh)
