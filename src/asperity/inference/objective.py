@@ -395,6 +395,10 @@ class Objective:
         point = np.array(u, float)
         for i, value in kept.items():
             point[i] = value
+        low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
+        # So far inside that SciPy does not move the first point.
+        inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
+        point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
         terms = tuple(term.coarser() for term in self.terms)
         if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
             ahead = replace(self, terms=terms)
@@ -402,10 +406,7 @@ class Objective:
             self.unsolved += ahead.unsolved
             if self.chi2(near.u) <= self.chi2(point):
                 point = near.u
-        low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
-        # So far inside that SciPy does not move the first point.
-        inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
-        point[moving] = inside = np.clip(point[moving], low + inset[0], high - inset[1])
+        inside = point[moving]
         if not moving or not math.isfinite(self.chi2(point)):
             return Minimum(point, self.chi2(point))
 
