@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -17,8 +16,6 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from asperity.inference.objective import Minimum, Objective
-from asperity.inference.tables.outliers import row_distances
-from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
@@ -94,7 +91,7 @@ def minima_of(
         minima = _by_few_rows(objective, drawn_starts, special, progress)
         return _with_other_lengths(objective, minima)
     starts = [*special, *_best(objective, drawn_starts, chi2)]
-    minima = _with_reweighted(objective, _followed(objective, starts, progress))
+    minima = _followed(objective, starts, progress)
     if minima and _blocked(objective, minima[0]):
         ends = [end.u for end in distinct(minima)[: _FOLLOWED + 1]]
         objective.use_search(True)
@@ -182,34 +179,13 @@ def _by_few_rows(
     ends = _followed(coarse, starts, progress, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
     apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]
     ends = _followed(coarse, apart, None, tolerance=_NEARBY, evaluations=_EVALUATIONS)
-    minima = _on_all_rows(objective, _with_reweighted(coarse, ends))
+    minima = _on_all_rows(objective, ends)
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
     if not minima:
         # Another row may have no orbit there, or none that the coarse search reaches.
         again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
     return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
-
-
-def _with_reweighted(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
-    """Minima with the one that is reached by way of the sum of the distances of a table's rows.
-
-    Where the best is far off, few rows of large residuals hold it: along the edge of the orbits
-    every step that lowers them ends where some row has none. In the sum of the distances they
-    count no more than others.
-    """
-    tables = objective.terms_of(LockInTerm)
-    if not tables or len(objective.terms) > 1 or not minima or not _far_off(objective, minima[0]):
-        return minima
-    (term,), best = tables, minima[0]
-    data = objective.data_residuals(best.u)
-    if data is None:
-        return minima
-    weights = np.maximum(row_distances(data[0]), 1.0) ** -0.5
-    reweighted = replace(objective, terms=(term.weighted(weights),))
-    u = reweighted.minimise(best.u, tolerance=_NEARBY, evaluations=_EVALUATIONS).u
-    other = objective.minimise(u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
-    return sorted([*minima, other], key=_CHI2)
 
 
 def _coarse(objective: Objective) -> Objective | None:
