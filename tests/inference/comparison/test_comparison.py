@@ -107,6 +107,29 @@ def test_a_special_case_is_never_excluded_by_its_generalisation(judged):
     assert "cannot tell" in found.verdict
 
 
+def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judged, monkeypatch):
+    called = []
+
+    def missing_once(data, law, *args, **options):
+        found = fit(data, law, *args, **options)
+        called.append(law)
+        if called.count("rice-ruina") > 1 or law != "rice-ruina":
+            return found
+        A = found.parameters["A"]
+        wrong = found.parameters | {"A": replace(A, value=0.5 * A.value)}
+        missed = replace(found, parameters=wrong)
+        chi2 = found.objective.chi2(found.objective.coordinates(missed.values))
+        assert chi2 > found.chi2 + 1000
+        return replace(missed, chi2=chi2)
+
+    exact = judged("rice-ruina", 2, laws=("rice-ruina", "elasto-plastic"))
+    monkeypatch.setattr("asperity.inference.comparison.compare.fit", missing_once)
+    found = judged("rice-ruina", 2, laws=("rice-ruina", "elasto-plastic"))
+    assert called == ["rice-ruina", "elasto-plastic", "rice-ruina"]
+    fits = [result.laws["rice-ruina"].fit for result in (found, exact)]
+    assert fits[0].chi2 == pytest.approx(fits[1].chi2, rel=1e-9)
+
+
 def test_errors_too_small_exclude_no_law_by_their_size(judged):
     found = judged("rice-ruina", 3, claimed=1 / 3)
     assert not found.decided

@@ -28,7 +28,7 @@ from asperity.inference.comparison.scale import (
 from asperity.inference.comparison.support import support
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.inputs import free_by_default
-from asperity.inference.fitting.minima import FAR_OFF
+from asperity.inference.fitting.minima import FAR_OFF, GAIN, extends
 from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
@@ -224,13 +224,14 @@ def compare(
         done: dict[str, Fit] = {}
         # Special cases come before the laws that have them, which begin there.
         ordered = sorted(own.items(), key=lambda pair: len(_parameters(pair[0])))
+        ordered = [pair for pair in ordered if before is None or pair[0] in before]
         for k, (name, names) in enumerate(ordered):
             mine: dict[str, Any] = {
                 key: {n: values[n] for n in _own(name, list(values), laws)}
                 for key, values in given.items()
             }
             chosen = dict(options)
-            if before and name in before and before[name].converged:
+            if before and before[name].converged:
                 # Nearly the same data.
                 mine["start"] = {n: before[name].values[n] for n in names}
                 chosen["starts"] = min(_STARTS_AGAIN, options.get("starts", _STARTS_AGAIN))
@@ -252,6 +253,8 @@ def compare(
         return done
 
     fits = fits_to(several, report)
+    if missed := _missed(fits):
+        fits |= fits_to(several, lambda _: None, missed)
     if len(fits) < 2:
         raise InputError(
             f"laws must be two or more that can be fitted to these data, got {len(fits)}; "
@@ -275,6 +278,27 @@ def compare(
         + _without_numbers(not_compared),
     )
     return _examined(result, lambda laws: report(len(own) + laws)) if evidence else result
+
+
+def _missed(fits: Mapping[str, Fit]) -> dict[str, Fit]:
+    """Laws that describe a table better elsewhere: at the minimum of a law that extends them.
+
+    By name, with the fit of that law. Where the extension is needed, they describe it worse there.
+    """
+    missed = {}
+    for name, own in fits.items():
+        objective = own.objective
+        for other in fits.values():
+            if not (own.converged and other.converged and objective.has_table):
+                continue
+            extended = extends(other.objective.law, objective.law)
+            extended &= set(objective.names) <= set(other.values)
+            if not extended or other.chi2 > own.chi2 - GAIN:
+                continue
+            here, there = (objective.chi2(objective.coordinates(f.values)) for f in (own, other))
+            if there < here - GAIN:
+                missed[name] = other
+    return missed
 
 
 def _support(comparison: Comparison) -> tuple[str, str]:

@@ -47,7 +47,7 @@ FAR_OFF = 1e-12
 DOUBTFUL = 0.05
 #: Decrease of chi-squared that is worth the slower method: a tenth of a standard error, or this
 #: share of the chi-squared of a law that is far off.
-_GAIN, _LARGE_GAIN = 0.01, 0.1
+GAIN, _LARGE_GAIN = 0.01, 0.1
 #: Minima within this of the lowest chi-squared are followed to their end.
 _WORTH = 50.0
 #: Factors of a memory length at which other minima are looked for, the factor between two lengths
@@ -96,7 +96,7 @@ def minima_of(
         ends = [end.u for end in distinct(minima)[: _FOLLOWED + 1]]
         objective.use_search(True)
         beyond = _by_few_rows(objective, drawn_starts, ends, None)
-        if beyond and beyond[0].chi2 < minima[0].chi2 - _GAIN:
+        if beyond and beyond[0].chi2 < minima[0].chi2 - GAIN:
             minima = beyond
         else:
             objective.use_search(False)
@@ -278,7 +278,7 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
     """
     if not objective.has_table or not math.isfinite(end.chi2):
         return False
-    least = _LARGE_GAIN * end.chi2 if _far_off(objective, end) else _GAIN
+    least = _LARGE_GAIN * end.chi2 if _far_off(objective, end) else GAIN
     return objective.expected_decrease(end.u) > least
 
 
