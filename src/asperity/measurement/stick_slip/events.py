@@ -377,11 +377,17 @@ def _timing(
     power, axes = np.linalg.eigh(covariances[best])
     away = np.array([*means, seen]) - means[best]
     away = away @ axes / np.sqrt(np.maximum(power, 1e-12 * power[-1]))
-    mixture = nnls(away[:-1].T, away[-1])[0]
+    mixture, left = nnls(away[:-1].T, away[-1])
+    # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of its
+    # own: it moves onset or end at most as the shape that moves it the most for its distance.
+    far = (away[:-1] ** 2).sum(1)
+    others = np.arange(len(_SHAPES)) != best
+    lever = (moved[others] ** 2 / far[others, None]).max(0)
+    beyond = max(left**2 - power.size, 0.0) * lever
     return _Timing(
         _SHAPES[best],
         float(factors[best][best]),
-        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2).max())),
+        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2 + beyond).max())),
     )
 
 
