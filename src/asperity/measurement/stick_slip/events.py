@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.detection import Falls
-from asperity.measurement.stick_slip.lines import Sums, lines
+from asperity.measurement.stick_slip.lines import Sums
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
@@ -57,6 +57,8 @@ class SlipEvents:
         Of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
         Of the middle half of the stick before the event (1/s times the unit); NaN of the first.
+    slope_bend : array, (k,)
+        What of that uncertainty all sticks have in common.
     creep, creep_uncertainty : array, (k,)
         What the force at onset lacks to the line of that slope; NaN of the first.
     fall_rate : array, (k,)
@@ -71,6 +73,7 @@ class SlipEvents:
     drop_uncertainty: Array
     loading_slope: Array
     slope_uncertainty: Array
+    slope_bend: Array
     creep: Array
     creep_uncertainty: Array
     fall_rate: Array
@@ -144,10 +147,8 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     stop = np.minimum(edges[1:], trough + length)
     # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
     quarter = (peak[1:] - trough[:-1]) // 4
-    sticks = (np.empty(0),) * 4
-    if k > 1:
-        sticks = lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
-    rate = np.maximum(np.concatenate([sticks[2][:1] if k > 1 else [0.0], sticks[2]]), 0.0)
+    sticks = _sticks(force, trough[:-1] + quarter, peak[1:] - quarter + 2, falls.scatter)
+    rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
     bounds = peak, trough, first, stop
     # Throughout the recording: the largest of equal slips are those that noise makes so.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
@@ -163,7 +164,10 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
         for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
     ]
     onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
-    events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing)
+    empty = _empty_falls(sums, edges[1:-1], (onset, end), (first, stop), sticks.slope, scatter)
+    events = _measured(
+        time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty
+    )
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
     away = 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - 2 * length)
@@ -424,10 +428,11 @@ def _measured(
     sums: Sums,
     slips: tuple[Array, Array],
     bounds: tuple[Index, Index],
-    sticks: tuple[Array, Array, Array, Array],
+    sticks: _Sticks,
     timing_of: _Timing,
+    slow: float,
 ) -> SlipEvents:
-    """Forces and their uncertainties; of the sticks centre, mean, slope and number of samples."""
+    """Forces and their uncertainties, which slow noise makes `slow` times as large."""
     (onset, end), (first, stop) = slips, bounds
     step = float(time[-1] - time[0]) / (force.size - 1)
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
@@ -443,8 +448,8 @@ def _measured(
     # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
     # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
     # loaded before, a ringing gauge to the drop.
-    before_doubt = 2 * _of_mean(scatter, until - first)
-    doubt = np.hypot(before_doubt, 2 * _of_mean(scatter, stop - since))
+    before_doubt = slow * 2 * _of_mean(scatter, until - first)
+    doubt = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
@@ -458,12 +463,8 @@ def _measured(
     timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
     doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
-    centre, mean, slope, count = sticks
-    mean_doubt = _of_mean(scatter, count)
-    # The slope of n samples has a variance of 12/n^2 of that of their mean.
-    slope_doubt = np.sqrt(12.0) * mean_doubt / count
-    reach = onset[1:] - centre
-    lag_doubt = np.sqrt(mean_doubt**2 + (slope_doubt * reach) ** 2 + before_doubt[1:] ** 2)
+    reach = onset[1:] - sticks.centre
+    lag_doubt = np.hypot(np.hypot(sticks.mean_doubt, sticks.doubt * reach), before_doubt[1:])
     samples = np.arange(force.size, dtype=float)
     none = [np.nan]
     return SlipEvents(
@@ -473,12 +474,93 @@ def _measured(
         force_before=high,
         force_after=low,
         drop_uncertainty=doubt,
-        loading_slope=np.concatenate([none, slope / step]),
-        slope_uncertainty=np.concatenate([none, slope_doubt / step]),
-        creep=np.concatenate([none, mean + slope * reach - high[1:]]),
+        loading_slope=np.concatenate([none, sticks.slope / step]),
+        slope_uncertainty=np.concatenate([none, np.hypot(sticks.doubt, sticks.bend) / step]),
+        slope_bend=np.concatenate([none, sticks.bend / step]),
+        creep=np.concatenate([none, sticks.mean + sticks.slope * reach - high[1:]]),
         creep_uncertainty=np.concatenate([none, lag_doubt]),
         fall_rate=steepest_fall(force, onset, end, drop) / step,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sticks:
+    """Lines through the middle halves of sticks, an entry each.
+
+    Attributes
+    ----------
+    centre, mean, slope : array, (k - 1,)
+        In samples.
+    mean_doubt, doubt : array, (k - 1,)
+        Standard uncertainty of mean and slope in noise.
+    bend : array, (k - 1,)
+        What of the slope is open in all sticks, as they bend.
+    """
+
+    centre: Array
+    mean: Array
+    slope: Array
+    mean_doubt: Array
+    doubt: Array
+    bend: Array
+
+
+def _sticks(force: Array, first: Index, stop: Index, scatter: Array) -> _Sticks:
+    """Lines through runs of samples, and what lines through the halves of each say otherwise."""
+    if not first.size:
+        return _Sticks(*(np.empty(0),) * 6)
+    middle = (first + stop) // 2
+    sums = Sums(force, first, middle)
+    level, slope, _, away = sums.line(first, stop)
+    count = (stop - first).astype(float)
+    mean_doubt = _of_mean(scatter, count)
+    # The slope of n samples has a variance of 12/n^2 of that of their mean.
+    doubt = np.sqrt(12.0) * mean_doubt / count
+    # Slopes of halves, in white noise, differ by four times as much as the slope scatters.
+    change = (sums.line(first, middle)[1] - sums.line(middle, stop)[1]) / (4 * doubt)
+    usual = np.median(change)
+    doubt = doubt * max(1.0, float(np.median(np.abs(change - usual))) / 0.6745)
+    # Creep bends the second half: what it does to the whole is of the size of the difference.
+    error = np.sqrt(np.pi / 2 / first.size)
+    bend = 4 * doubt * np.sqrt(max(usual**2 - error**2, 0.0))
+    mean = level + slope * away + sums.level
+    return _Sticks(sums.origin + away, mean, slope, mean_doubt, doubt, bend)
+
+
+def _empty_falls(
+    sums: Sums,
+    edges: Index,
+    slips: tuple[Array, Array],
+    bounds: tuple[Index, Index],
+    slope: Array,
+    scatter: Array,
+) -> float:
+    """Uncertainty of drops by the noise as it is, over that by the scatter of means.
+
+    Where there is no slip, in the middle of a stick, lines on both sides of it should meet: hum and
+    other noise slower than a thirty-second of a cycle says otherwise.
+    """
+    (begin, end), (first, stop) = slips, bounds
+    half = (end - begin)[:-1] / 2
+    # Behind a slip the gauge may ring, and before the next one the slider creeps.
+    margin = (begin[1:] - end[:-1]) / 8
+    until, since = np.floor(edges - half).astype(np.intp), np.ceil(edges + half).astype(np.intp)
+    lead = np.minimum(until - end[:-1] - margin, (begin - first)[1:]).astype(np.intp)
+    tail = np.minimum(begin[1:] - margin - since, (stop - end)[:-1]).astype(np.intp)
+    long = (lead >= _SHORTEST) & (tail >= _SHORTEST)
+    if not long.any():
+        return 1.0
+    until, since, lead, tail = until[long], since[long], lead[long], tail[long]
+    before, left = sums.line(until - lead, until)[:2]
+    after, right = sums.line(since, since + tail)[:2]
+    cells = np.flatnonzero(long)
+    high = before + left * (until - sums.origin[cells]) + sums.level[cells]
+    low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
+    drop = high - low + slope[long] * (since - until)
+    doubt = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
+    # The standard deviation, of which normal values exceed twice by 5 %.
+    return max(1.0, float(np.quantile(np.abs(drop) / doubt, 0.95)) / 1.96)
+
 
 
 def _noise(force: Array, first: Index, stop: Index) -> Autoregression:

@@ -347,7 +347,8 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     slope = slope - share * rate
     # The median of n normal values scatters by sqrt(pi/2 n).
     one = scatter(slope) * np.sqrt(np.pi / 2 / slope.size)
-    return float(np.median(slope)), float(np.hypot(one, error * rate.mean()))
+    bend = float(np.median(events.slope_bend[1:][clear]))
+    return float(np.median(slope)), float(np.linalg.norm([one, error * rate.mean(), bend]))
 
 
 def _smallest_drop(falls: Falls, slope: float) -> float:
