@@ -449,17 +449,21 @@ def _measured(
     # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
     # loaded before, a ringing gauge to the drop.
     before_doubt = slow * 2 * _of_mean(scatter, until - first)
-    doubt = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
+    doubt_of_noise = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
     bend = creeps / rise.sum() * rise - rings / drop.sum() * drop
-    doubt = np.hypot(doubt, bend)
+    doubt = np.hypot(doubt_of_noise, bend)
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
     timing = timing_of.factor * _of_mean(scatter, long / 2) / least
-    # A line that ends too low meets the slip later by as large a share of it.
-    timing = np.hypot(timing, np.hypot(timing_of.shift, bend / least))
+    # A line that ends too low meets the slip later by as large a share of it; what noise of the
+    # spectrum of the sticks does to lines is in the factor.
+    slowly = doubt_of_noise * np.sqrt(1 - slow**-2) / least
+    timing = np.linalg.norm(
+        [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
+    )
     timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
     doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
