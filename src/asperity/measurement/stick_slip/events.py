@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.detection import Falls
 from asperity.measurement.stick_slip.lines import Sums
+from asperity.measurement.stick_slip.noise import resolution
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
@@ -118,10 +119,12 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         if not len(falls):
             break
         events, visible, farther = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading. Where lines
-        # from farther off are nearer to no drop at all, impulses have tilted those next to the
-        # fall. The others are read again without it.
-        real = (visible > least) & (farther > events.drop / 2)
+        # What a line before and a line after do not confirm is a bend in the loading, or a swing of
+        # a ringing gauge, next to which lines bend so that the drop may be zero. Where lines from
+        # farther off are nearer to no drop at all, impulses have tilted those next to the fall. The
+        # others are read again without it.
+        clear = events.drop > 1.96 * events.drop_uncertainty
+        real = (visible > least) & clear & (farther > events.drop / 2)
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
@@ -379,15 +382,19 @@ def _timing(
     moved = np.array(shifts)[:, :, best]
     # In units of what the noise makes.
     power, axes = np.linalg.eigh(covariances[best])
+    known = power > 1e-12 * power[-1]
     away = np.array([*means, seen]) - means[best]
-    away = away @ axes / np.sqrt(np.maximum(power, 1e-12 * power[-1]))
-    mixture, left = nnls(away[:-1].T, away[-1])
+    away = away @ axes[:, known] / np.sqrt(power[known])
+    # The shares of a mixture add up to one, which a row of large weight says.
+    unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
+    columns = np.hstack([away, unit])
+    mixture, left = nnls(columns[:-1].T, columns[-1])
     # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of its
     # own: it moves onset or end at most as the shape that moves it the most for its distance.
     far = (away[:-1] ** 2).sum(1)
     others = np.arange(len(_SHAPES)) != best
     lever = (moved[others] ** 2 / far[others, None]).max(0)
-    beyond = max(left**2 - power.size, 0.0) * lever
+    beyond = max(left**2 - known.sum(), 0.0) * lever
     return _Timing(
         _SHAPES[best],
         float(factors[best][best]),
@@ -450,6 +457,9 @@ def _measured(
     # loaded before, a ringing gauge to the drop.
     before_doubt = slow * 2 * _of_mean(scatter, until - first)
     doubt_of_noise = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
+    # The level of a line may lie anywhere within a step of the recorder.
+    rounding = resolution(force) / np.sqrt(6.0)
+    doubt_of_noise = np.hypot(doubt_of_noise, rounding)
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
@@ -460,7 +470,7 @@ def _measured(
     timing = timing_of.factor * _of_mean(scatter, long / 2) / least
     # A line that ends too low meets the slip later by as large a share of it; what noise of the
     # spectrum of the sticks does to lines is in the factor.
-    slowly = doubt_of_noise * np.sqrt(1 - slow**-2) / least
+    slowly = np.hypot(doubt_of_noise * np.sqrt(1 - slow**-2), rounding) / least
     timing = np.linalg.norm(
         [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
     )
