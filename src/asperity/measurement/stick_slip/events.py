@@ -35,6 +35,8 @@ _ZOOMS = 4
 _TOGETHER = 64
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
+#: A stick shorter than this many slips may be the rise of an oscillation about sliding.
+STICKING = 2.0
 #: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
 _TELLING, _MADE = 64, 64
 _RUNS, _LONGEST_RUN = 64, 4096
@@ -119,12 +121,14 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         if not len(falls):
             break
         events, visible, farther = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading, or a swing of
-        # a ringing gauge, next to which lines bend so that the drop may be zero. Where lines from
-        # farther off are nearer to no drop at all, impulses have tilted those next to the fall. The
-        # others are read again without it.
+        # What a line before and a line after do not confirm is a bend in the loading. Where lines
+        # from farther off are nearer to no drop at all, impulses have tilted those next to the
+        # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
+        # zero; in an oscillation about sliding they all do. The others are read again without it.
         clear = events.drop > 1.96 * events.drop_uncertainty
-        real = (visible > least) & clear & (farther > events.drop / 2)
+        cycles = events.stick_duration[1:] / events.slip_duration[1:]
+        sticks = cycles.size > 0 and np.median(cycles) >= STICKING
+        real = (visible > least) & (farther > events.drop / 2) & (clear | (not sticks))
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
@@ -389,8 +393,8 @@ def _timing(
     unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
     columns = np.hstack([away, unit])
     mixture, left = nnls(columns[:-1].T, columns[-1])
-    # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of its
-    # own: it moves onset or end at most as the shape that moves it the most for its distance.
+    # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of
+    # its own: it moves onset or end at most as the shape that moves it the most for its distance.
     far = (away[:-1] ** 2).sum(1)
     others = np.arange(len(_SHAPES)) != best
     lever = (moved[others] ** 2 / far[others, None]).max(0)
@@ -572,9 +576,8 @@ def _empty_falls(
     low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
     drop = high - low + slope[long] * (since - until)
     doubt = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
-    # The standard deviation, of which normal values exceed twice by 5 %.
-    return max(1.0, float(np.quantile(np.abs(drop) / doubt, 0.95)) / 1.96)
-
+    # By the median, as some sticks hold slips that were not seen.
+    return max(1.0, float(np.median(np.abs(drop) / doubt)) / 0.6745)
 
 
 def _noise(force: Array, first: Index, stop: Index) -> Autoregression:

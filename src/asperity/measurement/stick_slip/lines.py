@@ -18,7 +18,8 @@ class Sums:
 
     def __init__(self, force: Array, edges: Index, origin: Index) -> None:
         # What lies before the first edge belongs to the first cell.
-        cells = np.diff(np.clip(edges[1:], 0, force.size), prepend=0, append=force.size)
+        inner = np.minimum(edges[1:], force.size)
+        cells = np.append(inner, force.size) - np.append(0, inner)
         t = np.arange(force.size) - np.repeat(origin.astype(float), cells)
         y = force - np.repeat(force[origin], cells)
         self.origin, self.level = origin.astype(float), force[origin]
