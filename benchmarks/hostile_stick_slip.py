@@ -11,8 +11,9 @@ more than 2 % (and one) of those above the stated threshold are missed, the 95 %
 onset, end or drop hold less than 95 % by three standard errors of that share, the loading slope is
 off by more than three standard uncertainties and 1 %, or the regime is another. The truth of an
 onset is anywhere from the peak of the force to where its fall reaches a tenth of the steepest,
-later by the gauge's time constant; ends are not judged where the gauge has a tail, and hum slower
-than a quarter of a cycle is part of the force.
+later by the gauge's time constant and by the inverse of the angular frequency with which it rings;
+ends are not judged where the gauge has a tail, and hum slower than a quarter of a cycle is part of
+the force.
 """
 
 import argparse
@@ -207,12 +208,13 @@ def judged(seed):
     onset, fast, end = (at / every for at in (motion.onset, motion.fast, motion.end))
     time, slip = np.arange(force.size, dtype=float), float(np.median(end - onset))
     result = measure_stick_slip(Trace(time, {"mu": Channel(force, "dimensionless", "", "mu", "1")}))
-    events, lag = result.events, options.get("tail", 0.0) * slip
+    events, tail = result.events, options.get("tail", 0.0) * slip
+    lag = tail + options.get("ringing", 0.0) * slip / (2 * np.pi)
     flags = [check.name for check in result.checks if check.verdict != "ok"]
     answer = {"seed": seed, "options": options, "flags": flags, "events": drop.size, "faults": []}
     if not len(events):
         return answer | {"faults": ["no event"]}
-    reach = np.maximum(end - onset, slip) + 2 + 2 * lag + 0.3 * options.get("ringing", 0.0) * slip
+    reach = np.maximum(end - onset, slip) + 2 + 2 * lag
     away = np.abs((events.onset + events.end)[:, None] - (onset + end)) / 2
     read = away.argmin(0)
     true = np.flatnonzero(away.min(0) < reach)
@@ -227,7 +229,7 @@ def judged(seed):
         "end": (events.end[read] - end[true]) / events.timing_uncertainty[read],
         "drop": (events.drop[read] - drop[true]) / events.drop_uncertainty[read],
     }
-    if lag:
+    if tail:
         del scores["end"]
     held = {name: float(np.mean(np.abs(z) < 1.96)) for name, z in scores.items()}
     least = 0.95 - 3 * np.sqrt(0.95 * 0.05 / max(true.size, 1))

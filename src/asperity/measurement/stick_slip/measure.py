@@ -35,8 +35,6 @@ Array = NDArray[np.float64]
 _FEW = 2
 #: Share of the displacement in the slips above which it is the slider's.
 SLIDER = 0.5
-#: Standard deviation of a share that may be any.
-_ANY_SHARE = 12**-0.5
 #: Ratio to the smallest drop that is seen within which events may have smaller companions.
 _NEAR = 1.5
 #: Usual intervals of uneven times up to which the force between two samples is a straight line.
@@ -315,8 +313,8 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     """Median slope of the sticks that show one, without drift, and its standard uncertainty.
 
     The level of the force changes where friction does along the track, which leaves the loading as
-    it is, and where the gauge drifts, which adds its rate: half of the rate is taken off, as any
-    share of it may be drift.
+    it is, and where the gauge drifts, which adds its rate. Which of both it is cannot be seen:
+    half of the rate is taken off, plus or minus half.
     """
     if len(events) < 2:
         return np.nan, np.nan
@@ -330,7 +328,7 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     # The median of n normal values scatters by sqrt(pi/2 n).
     one = scatter * np.sqrt(np.pi / 2 / slope.size)
     bend = float(np.median(events.slope_bend[1:][clear]))
-    return usual - rate / 2, float(np.linalg.norm([one, bend, _ANY_SHARE * rate]))
+    return usual - rate / 2, float(np.linalg.norm([one, bend, rate / 2]))
 
 
 def _smallest_drop(falls: Falls, slope: float) -> float:
