@@ -10,10 +10,10 @@ wanders, impulses, steps and a limit. A fault is: more than 1 % (and one) of the
 more than 2 % (and one) of those above the stated threshold are missed, the 95 % intervals of
 onset, end or drop hold less than 95 % by three standard errors of that share, the loading slope is
 off by more than three standard uncertainties and 1 %, or the regime is another. The truth of an
-onset is anywhere from the peak of the force to where its fall reaches a tenth of the steepest,
-later by the gauge's time constant and by the inverse of the angular frequency with which it rings;
-ends are not judged where the gauge has a tail, and hum slower than a quarter of a cycle is part of
-the force.
+onset is anywhere from the peak of the force to where its fall reaches a tenth of the steepest;
+onset and end may be later by the gauge's time constant and by the inverse of the angular frequency
+with which it rings. Ends are not judged where the gauge has a tail, and hum slower than a quarter
+of a cycle is part of the force.
 """
 
 import argparse
@@ -224,9 +224,10 @@ def judged(seed):
     seen = np.flatnonzero((drop > result.smallest_drop) & inside)
     missed, false = np.setdiff1d(seen, true).size, len(events) - read.size
     begin = np.clip(events.onset[read], onset[true], fast[true] + lag)
+    finish = np.clip(events.end[read], end[true], end[true] + lag)
     scores = {
         "onset": (events.onset[read] - begin) / events.timing_uncertainty[read],
-        "end": (events.end[read] - end[true]) / events.timing_uncertainty[read],
+        "end": (events.end[read] - finish) / events.timing_uncertainty[read],
         "drop": (events.drop[read] - drop[true]) / events.drop_uncertainty[read],
     }
     if tail:

@@ -51,7 +51,8 @@ class SlipEvents:
     Attributes
     ----------
     onset, end : array, (k,)
-        Times (s) at which the force begins and ceases to fall.
+        Times (s) at which the force begins and ceases to fall; of a gradual beginning, as that of a
+        rate-and-state law, between the peak and where the fall reaches a tenth of the steepest.
     timing_uncertainty : array, (k,)
         Of either (s).
     force_before, force_after : array, (k,)
@@ -60,6 +61,7 @@ class SlipEvents:
         Of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
         Of the middle half of the stick before the event (1/s times the unit); NaN of the first.
+        Creep throughout the stick is part of it.
     slope_bend : array, (k,)
         What of that uncertainty all sticks have in common.
     creep, creep_uncertainty : array, (k,)
