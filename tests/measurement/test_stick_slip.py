@@ -294,3 +294,14 @@ def test_the_catalogue_holds_every_event(ending, tmp_path) -> None:
 def test_another_ending_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="must be a CSV, NetCDF or JSON file"):
         write_catalogue(measure_stick_slip(recorded(saw(0, events=5).force)), tmp_path / "e.txt")
+
+
+@pytest.mark.parametrize("drift", [-3.0, 0.0, 3.0])
+def test_the_loading_slope_holds_with_and_without_a_drifting_gauge(drift) -> None:
+    """Drift and friction along the track look alike: half of the change is taken off."""
+    truth = saw(2, events=60, noise=0.02, spread=0.1)
+    changed = truth.force + drift * 0.1 * np.linspace(0, 1, truth.force.size)
+    result = measure_stick_slip(recorded(changed))
+    slope, doubt = result.loading_slope, result.loading_slope_uncertainty
+    assert abs(slope - truth.loading_slope) < 1.96 * doubt
+    assert doubt < 0.52 * abs(drift) / 60 * truth.loading_slope + 0.005 * truth.loading_slope

@@ -241,3 +241,44 @@ def test_onsets_of_damped_slips_lie_within_their_uncertainty():
     off = np.abs(events.onset - onset)
     assert np.mean(off < 1.96 * events.timing_uncertainty) > 0.9
     assert np.median(events.timing_uncertainty) < 0.15 * half
+
+
+def humming(seed, size, period, **options):
+    """A recording with hum of `size` drops and a period in samples."""
+    truth = saw(seed, impulses=0.0, **options)
+    wave = np.sin(2 * np.pi * np.arange(truth.force.size) / period)
+    return truth, truth.force + size * 0.1 * wave
+
+
+@pytest.mark.parametrize("seed", population(3))
+def test_hum_counts_in_drops_and_makes_no_events(seed) -> None:
+    truth, force = humming(seed, 0.08, 163, cycle=640, slip=15, spread=0.2, noise=0.007)
+    _, events = read(force)
+    true, found = matched(truth, events)
+    assert true.size == len(events) >= 0.97 * truth.drop.size
+    score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
+    assert np.mean(np.abs(score) < 1.96) > 0.85
+
+
+@pytest.mark.parametrize("seed", population(3))
+def test_steps_of_the_recorder_count_in_drops(seed) -> None:
+    truth = saw(seed, cycle=2000, noise=0.004, impulses=0.0)
+    _, events = read(0.008 * np.rint(truth.force / 0.008))
+    true, found = matched(truth, events)
+    score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
+    assert np.mean(np.abs(score) < 1.96) > 0.9
+    assert np.median(events.drop_uncertainty) < 0.15 * 0.1
+
+
+def test_onsets_of_shapes_outside_every_mixture_lie_within_their_uncertainty() -> None:
+    """A fall that begins as a parabola and is arrested, which no shape of the search does."""
+    u = np.arange(1, 61) / 60
+    fall = np.where(u < 0.7, 1 - 0.5 * (u / 0.7) ** 2, 0.5 * np.maximum((1 - u) / 0.3, 0) ** 1.5)
+    cycle = np.r_[np.linspace(0, 1, 1500), fall]
+    force = 0.3 + 0.1 * np.r_[np.tile(cycle, 60), cycle[:900]]
+    force += 0.001 * np.random.default_rng(0).standard_normal(force.size)
+    _, events = read(force)
+    assert len(events) == 60
+    late = (events.onset - (1499 + 1560 * np.arange(60)) / 2000) / events.timing_uncertainty
+    assert np.mean(np.abs(late) < 1.96) > 0.9
+    assert np.median(events.timing_uncertainty) < 0.3 * 60 / 2000

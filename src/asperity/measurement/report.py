@@ -159,7 +159,8 @@ def _stick_slip(measurement: StickSlipMeasurement, name: str) -> list[Section]:
     rows.append(("smallest_drop", smallest, "", "a smaller one may not have been seen"))
     columns = ("from (s)", "to (s)", "regime", "evidence")
     return [
-        Section(f"{head}\nregimes", head=columns, rows=tuple(parts)),
+        Section(head),
+        Section("regimes", head=columns, rows=tuple(parts)),
         Section("slip events", rows=tuple(rows)),
         _quality(measurement.checks),
     ]

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 CONVENTIONS = (
     "forces are F/W; drop = force_before - force_after; recurrence and stick_duration run from the "
     "onset and the end of the event before to the onset; creep is what the force at onset lacks to "
-    "the line of the first half of the stick; slip and slip_velocity are those of the slider's "
+    "the line of the middle half of the stick; slip and slip_velocity are those of the slider's "
     "displacement where it is recorded, else slip_velocity = V - dF/dt/K; uncertainties are "
     "standard uncertainties"
 )
@@ -43,7 +43,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "force_after": ("1", "F/W at the end"),
     "drop": ("1", "fall of F/W"),
     "drop_uncertainty": ("1", ""),
-    "loading_slope": ("1/s", "of F/W in the first half of the stick"),
+    "loading_slope": ("1/s", "of F/W in the middle half of the stick"),
     "slope_uncertainty": ("1/s", ""),
     "creep": ("1", "what F/W at onset lacks to the line of that slope"),
     "creep_uncertainty": ("1", ""),

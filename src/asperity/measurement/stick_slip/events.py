@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.detection import Falls
-from asperity.measurement.stick_slip.lines import Sums, lines
+from asperity.measurement.stick_slip.lines import Sums
+from asperity.measurement.stick_slip.noise import resolution
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Array = NDArray[np.float64]
@@ -34,6 +35,8 @@ _ZOOMS = 4
 _TOGETHER = 64
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
+#: A stick shorter than this many slips may be the rise of an oscillation about sliding.
+STICKING = 2.0
 #: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
 _TELLING, _MADE = 64, 64
 _RUNS, _LONGEST_RUN = 64, 4096
@@ -48,7 +51,8 @@ class SlipEvents:
     Attributes
     ----------
     onset, end : array, (k,)
-        Times (s) at which the force begins and ceases to fall.
+        Times (s) at which the force begins and ceases to fall; of a gradual beginning, as that of a
+        rate-and-state law, between the peak and where the fall reaches a tenth of the steepest.
     timing_uncertainty : array, (k,)
         Of either (s).
     force_before, force_after : array, (k,)
@@ -57,6 +61,9 @@ class SlipEvents:
         Of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
         Of the middle half of the stick before the event (1/s times the unit); NaN of the first.
+        Creep throughout the stick is part of it.
+    slope_bend : array, (k,)
+        What of that uncertainty all sticks have in common.
     creep, creep_uncertainty : array, (k,)
         What the force at onset lacks to the line of that slope; NaN of the first.
     fall_rate : array, (k,)
@@ -71,6 +78,7 @@ class SlipEvents:
     drop_uncertainty: Array
     loading_slope: Array
     slope_uncertainty: Array
+    slope_bend: Array
     creep: Array
     creep_uncertainty: Array
     fall_rate: Array
@@ -117,8 +125,12 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         events, visible, farther = _read(time, force, falls)
         # What a line before and a line after do not confirm is a bend in the loading. Where lines
         # from farther off are nearer to no drop at all, impulses have tilted those next to the
-        # fall. The others are read again without it.
-        real = (visible > least) & (farther > events.drop / 2)
+        # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
+        # zero; in an oscillation about sliding they all do. The others are read again without it.
+        clear = events.drop > 1.96 * events.drop_uncertainty
+        cycles = events.stick_duration[1:] / events.slip_duration[1:]
+        sticks = cycles.size > 0 and np.median(cycles) >= STICKING
+        real = (visible > least) & (farther > events.drop / 2) & (clear | (not sticks))
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
@@ -144,10 +156,8 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     stop = np.minimum(edges[1:], trough + length)
     # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
     quarter = (peak[1:] - trough[:-1]) // 4
-    sticks = (np.empty(0),) * 4
-    if k > 1:
-        sticks = lines(force, trough[:-1] + quarter, peak[1:] - quarter + 2)
-    rate = np.maximum(np.concatenate([sticks[2][:1] if k > 1 else [0.0], sticks[2]]), 0.0)
+    sticks = _sticks(force, trough[:-1] + quarter, peak[1:] - quarter + 2, falls.scatter)
+    rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
     bounds = peak, trough, first, stop
     # Throughout the recording: the largest of equal slips are those that noise makes so.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
@@ -163,7 +173,10 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
         for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
     ]
     onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
-    events = _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing)
+    empty = _empty_falls(sums, edges[1:-1], (onset, end), (first, stop), sticks.slope, scatter)
+    events = _measured(
+        time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty
+    )
     # Lines as far from the fall as two of its lengths, where they are as long or longer.
     away = 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - 2 * length)
@@ -375,13 +388,23 @@ def _timing(
     moved = np.array(shifts)[:, :, best]
     # In units of what the noise makes.
     power, axes = np.linalg.eigh(covariances[best])
+    known = power > 1e-12 * power[-1]
     away = np.array([*means, seen]) - means[best]
-    away = away @ axes / np.sqrt(np.maximum(power, 1e-12 * power[-1]))
-    mixture = nnls(away[:-1].T, away[-1])[0]
+    away = away @ axes[:, known] / np.sqrt(power[known])
+    # The shares of a mixture add up to one, which a row of large weight says.
+    unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
+    columns = np.hstack([away, unit])
+    mixture, left = nnls(columns[:-1].T, columns[-1])
+    # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of
+    # its own: it moves onset or end at most as the shape that moves it the most for its distance.
+    far = (away[:-1] ** 2).sum(1)
+    others = np.arange(len(_SHAPES)) != best
+    lever = (moved[others] ** 2 / far[others, None]).max(0)
+    beyond = max(left**2 - known.sum(), 0.0) * lever
     return _Timing(
         _SHAPES[best],
         float(factors[best][best]),
-        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2).max())),
+        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2 + beyond).max())),
     )
 
 
@@ -418,10 +441,11 @@ def _measured(
     sums: Sums,
     slips: tuple[Array, Array],
     bounds: tuple[Index, Index],
-    sticks: tuple[Array, Array, Array, Array],
+    sticks: _Sticks,
     timing_of: _Timing,
+    slow: float,
 ) -> SlipEvents:
-    """Forces and their uncertainties; of the sticks centre, mean, slope and number of samples."""
+    """Forces and their uncertainties, which slow noise makes `slow` times as large."""
     (onset, end), (first, stop) = slips, bounds
     step = float(time[-1] - time[0]) / (force.size - 1)
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
@@ -437,27 +461,30 @@ def _measured(
     # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
     # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
     # loaded before, a ringing gauge to the drop.
-    before_doubt = 2 * _of_mean(scatter, until - first)
-    doubt = np.hypot(before_doubt, 2 * _of_mean(scatter, stop - since))
+    before_doubt = slow * 2 * _of_mean(scatter, until - first)
+    doubt_of_noise = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
+    # The level of a line may lie anywhere within a step of the recorder.
+    rounding = resolution(force) / np.sqrt(6.0)
+    doubt_of_noise = np.hypot(doubt_of_noise, rounding)
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
     bend = creeps / rise.sum() * rise - rings / drop.sum() * drop
-    doubt = np.hypot(doubt, bend)
+    doubt = np.hypot(doubt_of_noise, bend)
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
     timing = timing_of.factor * _of_mean(scatter, long / 2) / least
-    # A line that ends too low meets the slip later by as large a share of it.
-    timing = np.hypot(timing, np.hypot(timing_of.shift, bend / least))
+    # A line that ends too low meets the slip later by as large a share of it; what noise of the
+    # spectrum of the sticks does to lines is in the factor.
+    slowly = np.hypot(doubt_of_noise * np.sqrt(1 - slow**-2), rounding) / least
+    timing = np.linalg.norm(
+        [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
+    )
     timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
     doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
-    centre, mean, slope, count = sticks
-    mean_doubt = _of_mean(scatter, count)
-    # The slope of n samples has a variance of 12/n^2 of that of their mean.
-    slope_doubt = np.sqrt(12.0) * mean_doubt / count
-    reach = onset[1:] - centre
-    lag_doubt = np.sqrt(mean_doubt**2 + (slope_doubt * reach) ** 2 + before_doubt[1:] ** 2)
+    reach = onset[1:] - sticks.centre
+    lag_doubt = np.hypot(np.hypot(sticks.mean_doubt, sticks.doubt * reach), before_doubt[1:])
     samples = np.arange(force.size, dtype=float)
     none = [np.nan]
     return SlipEvents(
@@ -467,12 +494,92 @@ def _measured(
         force_before=high,
         force_after=low,
         drop_uncertainty=doubt,
-        loading_slope=np.concatenate([none, slope / step]),
-        slope_uncertainty=np.concatenate([none, slope_doubt / step]),
-        creep=np.concatenate([none, mean + slope * reach - high[1:]]),
+        loading_slope=np.concatenate([none, sticks.slope / step]),
+        slope_uncertainty=np.concatenate([none, np.hypot(sticks.doubt, sticks.bend) / step]),
+        slope_bend=np.concatenate([none, sticks.bend / step]),
+        creep=np.concatenate([none, sticks.mean + sticks.slope * reach - high[1:]]),
         creep_uncertainty=np.concatenate([none, lag_doubt]),
         fall_rate=steepest_fall(force, onset, end, drop) / step,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sticks:
+    """Lines through the middle halves of sticks, an entry each.
+
+    Attributes
+    ----------
+    centre, mean, slope : array, (k - 1,)
+        In samples.
+    mean_doubt, doubt : array, (k - 1,)
+        Standard uncertainty of mean and slope in noise.
+    bend : array, (k - 1,)
+        What of the slope is open in all sticks, as they bend.
+    """
+
+    centre: Array
+    mean: Array
+    slope: Array
+    mean_doubt: Array
+    doubt: Array
+    bend: Array
+
+
+def _sticks(force: Array, first: Index, stop: Index, scatter: Array) -> _Sticks:
+    """Lines through runs of samples, and what lines through the halves of each say otherwise."""
+    if not first.size:
+        return _Sticks(*(np.empty(0),) * 6)
+    middle = (first + stop) // 2
+    sums = Sums(force, first, middle)
+    level, slope, _, away = sums.line(first, stop)
+    count = (stop - first).astype(float)
+    mean_doubt = _of_mean(scatter, count)
+    # The slope of n samples has a variance of 12/n^2 of that of their mean.
+    doubt = np.sqrt(12.0) * mean_doubt / count
+    # Slopes of halves, in white noise, differ by four times as much as the slope scatters.
+    change = (sums.line(first, middle)[1] - sums.line(middle, stop)[1]) / (4 * doubt)
+    usual = np.median(change)
+    doubt = doubt * max(1.0, float(np.median(np.abs(change - usual))) / 0.6745)
+    # Creep bends the second half: what it does to the whole is of the size of the difference.
+    error = np.sqrt(np.pi / 2 / first.size)
+    bend = 4 * doubt * np.sqrt(max(usual**2 - error**2, 0.0))
+    mean = level + slope * away + sums.level
+    return _Sticks(sums.origin + away, mean, slope, mean_doubt, doubt, bend)
+
+
+def _empty_falls(
+    sums: Sums,
+    edges: Index,
+    slips: tuple[Array, Array],
+    bounds: tuple[Index, Index],
+    slope: Array,
+    scatter: Array,
+) -> float:
+    """Uncertainty of drops by the noise as it is, over that by the scatter of means.
+
+    Where there is no slip, in the middle of a stick, lines on both sides of it should meet: hum and
+    other noise slower than a thirty-second of a cycle says otherwise.
+    """
+    (begin, end), (first, stop) = slips, bounds
+    half = (end - begin)[:-1] / 2
+    # Behind a slip the gauge may ring, and before the next one the slider creeps.
+    margin = (begin[1:] - end[:-1]) / 8
+    until, since = np.floor(edges - half).astype(np.intp), np.ceil(edges + half).astype(np.intp)
+    lead = np.minimum(until - end[:-1] - margin, (begin - first)[1:]).astype(np.intp)
+    tail = np.minimum(begin[1:] - margin - since, (stop - end)[:-1]).astype(np.intp)
+    long = (lead >= _SHORTEST) & (tail >= _SHORTEST)
+    if not long.any():
+        return 1.0
+    until, since, lead, tail = until[long], since[long], lead[long], tail[long]
+    before, left = sums.line(until - lead, until)[:2]
+    after, right = sums.line(since, since + tail)[:2]
+    cells = np.flatnonzero(long)
+    high = before + left * (until - sums.origin[cells]) + sums.level[cells]
+    low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
+    drop = high - low + slope[long] * (since - until)
+    doubt = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
+    # By the median, as some sticks hold slips that were not seen.
+    return max(1.0, float(np.median(np.abs(drop) / doubt)) / 0.6745)
 
 
 def _noise(force: Array, first: Index, stop: Index) -> Autoregression:

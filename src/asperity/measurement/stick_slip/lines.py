@@ -17,10 +17,11 @@ class Sums:
     """
 
     def __init__(self, force: Array, edges: Index, origin: Index) -> None:
-        cell = np.clip(np.searchsorted(edges, np.arange(force.size), side="right") - 1, 0, None)
-        cell = np.minimum(cell, origin.size - 1)
-        t = np.arange(force.size) - origin[cell].astype(float)
-        y = force - force[origin][cell]
+        # What lies before the first edge belongs to the first cell.
+        inner = np.minimum(edges[1:], force.size)
+        cells = np.append(inner, force.size) - np.append(0, inner)
+        t = np.arange(force.size) - np.repeat(origin.astype(float), cells)
+        y = force - np.repeat(force[origin], cells)
         self.origin, self.level = origin.astype(float), force[origin]
         self.t, self.tt, self.y, self.ty, self.yy = (
             np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)

@@ -35,9 +35,6 @@ Array = NDArray[np.float64]
 _FEW = 2
 #: Share of the displacement in the slips above which it is the slider's.
 SLIDER = 0.5
-#: Events that tell the rate at which the level of the force varies; standard deviation of a share
-#: that may be any.
-_LEVELS, _EITHER = 8, 12**-0.5
 #: Ratio to the smallest drop that is seen within which events may have smaller companions.
 _NEAR = 1.5
 #: Usual intervals of uneven times up to which the force between two samples is a straight line.
@@ -315,39 +312,23 @@ def _completed(machine: Machine, signals: SlidingSignals) -> Machine:
 def _loading(events: SlipEvents) -> tuple[float, float]:
     """Median slope of the sticks that show one, without drift, and its standard uncertainty.
 
-    The level of the force varies where friction does along the track, which leaves the loading as
-    it is, and where the gauge drifts, which adds its rate. Slopes say which share of the rate they
-    follow.
+    The level of the force changes where friction does along the track, which leaves the loading as
+    it is, and where the gauge drifts, which adds its rate. Which of both it is cannot be seen:
+    half of the rate is taken off, plus or minus half.
     """
     if len(events) < 2:
         return np.nan, np.nan
-    width = min(_LEVELS, len(events))
-    first = np.clip(np.arange(1, len(events)) - width // 2, 0, len(events) - width)
-    near = first[:, None] + np.arange(width)
-    at, level = events.onset[near], ((events.force_before + events.force_after) / 2)[near]
-    at = at - at.mean(1, keepdims=True)
-    rate = (at * level).sum(1) / np.maximum((at * at).sum(1), np.finfo(float).tiny)
     slope, doubt = events.loading_slope[1:], events.slope_uncertainty[1:]
     clear = doubt < 0.3 * np.abs(slope)
     if not clear.any():
         return np.nan, np.nan
-    slope, doubt, rate = slope[clear], doubt[clear], rate[clear]
-
-    def scatter(values: Array) -> float:
-        away = np.abs(values - np.median(values))
-        return max(1.4826 * float(np.median(away)), float(np.median(doubt)))
-
-    usual = np.abs(slope - np.median(slope)) < 3 * scatter(slope)
-    varies = rate[usual] - rate[usual].mean()
-    power = float(varies @ varies)
-    share, error = 0.5, _EITHER
-    if power > 0:
-        share = float(np.clip(varies @ slope[usual] / power, 0.0, 1.0))
-        error = min(scatter(slope - share * rate) / np.sqrt(power), _EITHER)
-    slope = slope - share * rate
+    slope, doubt, usual = slope[clear], doubt[clear], float(np.median(slope[clear]))
+    rate = float(np.polyfit(events.onset, events.force_before + events.force_after, 1)[0]) / 2
+    scatter = max(1.4826 * float(np.median(np.abs(slope - usual))), float(np.median(doubt)))
     # The median of n normal values scatters by sqrt(pi/2 n).
-    one = scatter(slope) * np.sqrt(np.pi / 2 / slope.size)
-    return float(np.median(slope)), float(np.hypot(one, error * rate.mean()))
+    one = scatter * np.sqrt(np.pi / 2 / slope.size)
+    bend = float(np.median(events.slope_bend[1:][clear]))
+    return usual - rate / 2, float(np.linalg.norm([one, bend, rate / 2]))
 
 
 def _smallest_drop(falls: Falls, slope: float) -> float:

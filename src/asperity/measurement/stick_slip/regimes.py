@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from asperity.measurement.stick_slip.events import SlipEvents
+from asperity.measurement.stick_slip.events import STICKING, SlipEvents
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,8 @@ _ALIKE, _ALIKE_OF_FEW, _MANY_EVENTS = 0.5, 0.2, 20
 _REGULAR = 0.15
 #: Ratio of the last drop to the first, by a straight line, of a train that grows.
 _GROWTH, _GROWTH_CHANCE = 1.5, 1e-4
-#: A stick shorter than this many slips is that of an oscillation; from the second on of stick-slip.
-_SYMMETRICAL, _STICKING = 1.5, 2.0
+#: A stick shorter than this many slips is that of an oscillation.
+_SYMMETRICAL = 1.5
 #: Relative difference of a cycle from 2 pi sqrt(M/K).
 _INERTIAL = 0.25
 #: Share of impulses above which they may be the motion.
@@ -271,9 +271,9 @@ def _train(
     inertial = natural_period is not None and abs(cycle / natural_period - 1) < _INERTIAL
     if natural_period is not None:
         text += f", median cycle {cycle / natural_period:.3g} times 2 pi sqrt(M/K)"
-    if ratio < _SYMMETRICAL or (inertial and ratio < _STICKING):
+    if ratio < _SYMMETRICAL or (inertial and ratio < STICKING):
         return Regime("oscillation about sliding", *span, first, stop, text + _mains(cycle))
-    if ratio < _STICKING and natural_period is None:
+    if ratio < STICKING and natural_period is None:
         text += ": between stick-slip and an oscillation; stiffness and mass tell"
         return Regime("cannot tell", *span, first, stop, text)
     kind: Kind = "irregular stick-slip"
