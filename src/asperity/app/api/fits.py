@@ -20,7 +20,6 @@ from pydantic import Field
 
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
-from asperity.app.decimation import thinned
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
@@ -31,6 +30,7 @@ from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
 from asperity.questions.record import Seconds, Span
+from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
-from asperity.app.decimation import thinned
 from asperity.app.endpoints import Job
 from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads import Modulate, Programme, Slide
+from asperity.recording.extremes import thinned
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, integrate_blocks
 

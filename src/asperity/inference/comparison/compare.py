@@ -12,20 +12,18 @@ import numpy as np
 
 from asperity.errors import InputError, require
 from asperity.inference.comparison.evidence import (
-    CrossValidation,
-    Evidence,
-    evidence_of,
-    leave_one_run_out,
-)
-from asperity.inference.comparison.scale import (
     DISFAVOURED,
     EXCLUDED,
     FACTOR,
     IMPOSSIBLE,
+    CrossValidation,
+    Evidence,
     Standing,
+    evidence_of,
+    leave_one_run_out,
     standing,
+    support,
 )
-from asperity.inference.comparison.support import support
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.minima import FAR_OFF
@@ -103,7 +101,7 @@ class Comparison(Drawn):
         Laws of which no fit could be made, and why.
     """
 
-    _drawn_by = "asperity.fit_report.comparison:draw_comparison"
+    _drawn_by = "asperity.fit_report.folder:draw_comparison"
 
     laws: Mapping[str, Judged]
     decided: bool

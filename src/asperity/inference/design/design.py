@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.inference.comparison.scale import EXCLUDED
+from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import (
     Candidates,
     Progress,

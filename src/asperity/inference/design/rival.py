@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison.scale import EXCLUDED
+from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import differences, predicted, with_readings
 from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
