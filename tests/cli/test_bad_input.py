@@ -7,23 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from references.commands import refused
 from references.populations import population
 
 OF = ("response", "--material", "bureau2000")
 POINT = {"--law": "rice-ruina", "-V": "1 um/s", "-e": "0.24", "-f": "120 Hz"}
 HEADER = "law,V,epsilon,frequency"
 ROW = "rice-ruina,1e-6,0.2,120"
-
-
-def refused(result, *parts: str) -> None:
-    """Exactly one line that says these things, and exit code 2."""
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.startswith("asperity: ")
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.endswith("\n")
-    for part in parts:
-        assert part in result.stderr
 
 
 @pytest.mark.parametrize(
@@ -425,8 +415,7 @@ def test_a_protocol_that_cannot_be_run(asperity, tmp_path: Path, text: str, part
     file = tmp_path / "a.toml"
     file.write_text(text, encoding="utf-8")
     result = asperity("run", file, "--out", tmp_path / "a.nc")
-    assert result.exit_code == 2
-    assert result.stdout == ""
+    refused(result)
     for part in parts:
         assert part in result.stderr.splitlines()[-1]
     assert list(tmp_path.iterdir()) == [file]

@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 import xarray
 
+from references.commands import refused
+
 LAW = ("map", "--law", "rice-ruina", "--material", "bureau2000", "-V", "1 um/s", "-f", "120 Hz")
 AXES = ("--x", "epsilon=0:0.4:5", "--y", "K=0.1:0.3:5 N/um")
 KC = (0.026 - 0.013) * 7.0 / 0.4e-6
-
-
-def refused(result, *parts: str) -> None:
-    """Exactly one line that says these things, and exit code 2."""
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.startswith("asperity: ")
-    assert result.stderr.count("\n") == 1
-    for part in parts:
-        assert part in result.stderr
 
 
 def test_a_map_as_file_picture_and_json(asperity, tmp_path: Path) -> None:

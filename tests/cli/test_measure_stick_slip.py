@@ -8,6 +8,8 @@ import pytest
 from benchmarks.stick_slip import saw
 from scipy.io import savemat
 
+from references.commands import refused
+
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
@@ -59,10 +61,7 @@ def test_a_campaign_has_one_row_a_file(asperity, recording, tmp_path) -> None:
     ],
 )
 def test_bad_input_is_one_sentence(asperity, recording, options, message) -> None:
-    result = asperity("measure", recording, *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
+    refused(asperity("measure", recording, *options), message)
 
 
 def test_a_column_without_a_meaning_is_asked_for(asperity, tmp_path) -> None:
@@ -70,8 +69,6 @@ def test_a_column_without_a_meaning_is_asked_for(asperity, tmp_path) -> None:
     path = tmp_path / "slips.csv"
     np.savetxt(path, np.stack([truth.time, truth.force], 1), "%.9g", ",", header="t (s),sensor",
                comments="")  # fmt: skip
-    result = asperity("measure", path)
-    assert result.exit_code == 2
-    assert '--column "friction=sensor"' in result.stderr
+    refused(asperity("measure", path), '--column "friction=sensor"')
     again = asperity("measure", path, "--column", "friction=sensor")
     assert "regular stick-slip" in again.stdout

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from asperity import air, materials
+from references.commands import refused
 
 MATERIAL = ("--material", "bureau2000")
 
@@ -128,9 +129,10 @@ def test_an_interrupted_reproduction_says_how_to_go_on(
 
 
 def test_an_unknown_paper_is_refused(asperity, tmp_path: Path) -> None:
-    shown = asperity("reproduce", "bureau2001", "--out", tmp_path / "report")
-    assert shown.exit_code == 2
-    assert "did you mean 'bureau2000'?" in shown.stderr
+    refused(
+        asperity("reproduce", "bureau2001", "--out", tmp_path / "report"),
+        "did you mean 'bureau2000'?",
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -140,9 +142,7 @@ def test_a_law_of_ones_own_by_its_place(asperity) -> None:
     shown = asperity("response", "--law", f"{place}:Composite", *point, "--set", "Vc=1 um/s")
     assert shown.exit_code == 0
     assert shown.stdout.startswith("composite\n")
-    wrong = asperity("response", "--law", f"{place}:Compsite", *point)
-    assert wrong.exit_code == 2
-    assert "did you mean 'Composite'?" in wrong.stderr
+    refused(asperity("response", "--law", f"{place}:Compsite", *point), "did you mean 'Composite'?")
 
 
 def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Path) -> None:
@@ -154,12 +154,8 @@ def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Pat
         ("fit", "--law", "composite must have all its numbers, got none for Vc"),
         ("compare", "--laws", "laws must be two or more, got composite;"),
     ):
-        shown = asperity(command, *common, option, f"{place}:Composite")
-        assert shown.exit_code == 2
-        assert message in shown.stderr
-        wrong = asperity(command, *common, option, f"{place}:Compsite")
-        assert wrong.exit_code == 2
-        assert "did you mean 'Composite'?" in wrong.stderr
-    wrong = asperity("serve", "--law", f"{place}:Compsite")
-    assert wrong.exit_code == 2
-    assert "did you mean 'Composite'?" in wrong.stderr
+        refused(asperity(command, *common, option, f"{place}:Composite"), message)
+        refused(
+            asperity(command, *common, option, f"{place}:Compsite"), "did you mean 'Composite'?"
+        )
+    refused(asperity("serve", "--law", f"{place}:Compsite"), "did you mean 'Composite'?")

@@ -4,10 +4,10 @@ from asperity.experiment.amplitudes import (
     AmplitudeMotion,
     AmplitudePoint,
     AmplitudeSeries,
+    Exciter,
     amplitude_motion,
     amplitude_series,
 )
-from asperity.experiment.exciter import Exciter
 from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
 from asperity.experiment.memory import (
     Holds,

@@ -4,10 +4,9 @@ from asperity.laws.amontons import Amontons
 from asperity.laws.cut_off import CutOff
 from asperity.laws.elasto_plastic import ElastoPlastic
 from asperity.laws.elasto_plastic_age import ElastoPlasticAge
-from asperity.laws.law import Law, State
+from asperity.laws.law import Law, State, parameter
 from asperity.laws.linker_dieterich import LinkerDieterich
 from asperity.laws.nagata import Nagata
-from asperity.laws.parameter import parameter
 from asperity.laws.perrin_rice_zheng import PerrinRiceZheng
 from asperity.laws.prakash_clifton import PrakashClifton
 from asperity.laws.registry import get_law, known_law, register, registered

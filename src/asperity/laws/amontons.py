@@ -12,8 +12,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.laws.law import Law, State
-from asperity.laws.parameter import parameter
+from asperity.laws.law import Law, State, parameter
 
 
 class Amontons(Law):

@@ -26,8 +26,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
-from asperity.laws.law import Law, State
-from asperity.laws.parameter import parameter
+from asperity.laws.law import Law, State, parameter
 
 #: Name of the state that has no steady value.
 POSITION = "position"

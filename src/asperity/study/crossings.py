@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
-from asperity.study.outcome import Answers
-from asperity.study.points import Float
+from asperity.study.points import Answers, Float
 
 #: Accuracy of the position of a crossing, in fractions of an axis.
 TOLERANCE = 1e-6

@@ -14,8 +14,7 @@ from asperity.orbit.floquet import kind_of_crossing
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import RULES, point_parameters
 from asperity.parameters.arguments import increments
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import Float, Index
+from asperity.study.points import Answers, Float, Index, SweepOutcome
 
 
 def answers_of_law(

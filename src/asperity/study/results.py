@@ -17,8 +17,8 @@ from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
 from asperity.study.axes import TEXTS
-from asperity.study.outcome import SweepOutcome, words
 from asperity.study.plan import OF_CHUNKS
+from asperity.study.points import SweepOutcome, words
 from asperity.study.store.lock import running_driver
 from asperity.study.store.store import SweepStore
 

@@ -33,8 +33,7 @@ from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
 from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.study.engine import solve_here
-from asperity.study.outcome import Answers
-from asperity.study.points import Points
+from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
 
 Row = list[str]

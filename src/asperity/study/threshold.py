@@ -21,8 +21,7 @@ from asperity.parameters.arguments import at_least, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import POINT_BYTES, Float
+from asperity.study.points import POINT_BYTES, Answers, Float, SweepOutcome
 from asperity.study.responses import answers_of_law, bifurcation_kinds
 
 #: What happens at a threshold.

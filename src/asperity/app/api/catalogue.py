@@ -16,7 +16,7 @@ from asperity._version import __version__
 from asperity.errors import closest, require
 from asperity.laws import registered
 from asperity.materials import Material
-from asperity.materials.loader import packaged
+from asperity.materials.record import packaged
 from asperity.operating_point import known_parameters
 from asperity.outputs.json import to_json
 from asperity.parameters import (

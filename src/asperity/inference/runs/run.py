@@ -16,8 +16,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import ndtri
 
 from asperity.errors import InputError, require
-from asperity.inference.runs.drive import Drive
-from asperity.inference.runs.velocities import constant_velocities
+from asperity.inference.runs.drive import Drive, constant_velocities
 from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals

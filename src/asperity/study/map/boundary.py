@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from asperity.study.crossings import Crossings, find_crossings
 from asperity.study.map.plane import OUTPUTS, MapPlane
-from asperity.study.outcome import Answers
-from asperity.study.points import Float, Index
+from asperity.study.points import Answers, Float, Index
 
 #: Largest distance of the boundary from the chord between two neighbouring points, in fractions of
 #: the axes.

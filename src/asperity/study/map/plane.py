@@ -15,8 +15,7 @@ from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
 from asperity.parameters.arguments import at_least, number, shown, typed
 from asperity.study.crossings import STABILITY
-from asperity.study.outcome import Answers
-from asperity.study.points import Float
+from asperity.study.points import Answers, Float
 from asperity.study.responses import answers_of_law
 
 #: Names of the numbers on the grid that a figure can show.

@@ -12,8 +12,7 @@ from asperity.parameters import OUTPUTS, Output, Parameter
 from asperity.parameters.arguments import one_of
 from asperity.questions.sweep import Sweep
 from asperity.study.axes import columns_of
-from asperity.study.outcome import Answers
-from asperity.study.points import POINT_BYTES, Points
+from asperity.study.points import POINT_BYTES, Answers, Points
 from asperity.study.responses import answers_of_law
 
 #: Number of chunks of a small plan, so that several workers share it.
