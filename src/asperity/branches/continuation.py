@@ -17,8 +17,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -354,7 +354,7 @@ def _doubled_orbit_near(
     return None
 
 
-def _alternating(line: ParameterLine, orbit: Orbit, t: NDArray[np.float64]) -> ContinuationPoint:
+def _alternating(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
     """The simple orbit twice, and the unit direction (v, -v), which changes sign in between."""
     problem = line.at(t)
     equations = condensed(problem, orbit)

@@ -18,15 +18,8 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from asperity.algebra.continuation import (
-    STEPS,
-    STUCK,
-    Attempt,
-    Curves,
-    Indices,
-    StepControl,
-    follow,
-)
+from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
+from asperity.arrays import Bool, Complex, Float, Index
 from asperity.branches.continuation import INTERVALS
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -59,7 +52,6 @@ from asperity.slider.problem import Problem
 if TYPE_CHECKING:
     import xarray
 
-Float = NDArray[np.float64]
 
 #: First step along a boundary, as a share of the span.
 _FIRST = 0.005
@@ -188,8 +180,8 @@ class BoundaryHalf(Curves):
         return "kind" if why == STUCK and self._other_kind else why
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """The point of the boundary across its direction, a step ahead."""
         step = float(length[0])
         guess = self.here.at + step * self.direction
@@ -204,7 +196,7 @@ class BoundaryHalf(Curves):
         good = None if self._other_kind else neighbour
         yield rows, Attempt.of_one(good, step, turn=turn, miss=miss)
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Keep the point; a boundary ends at the edge of the rectangle and where it closes."""
         self.report()
         before, neighbour = self.here, attempt.next
@@ -319,8 +311,8 @@ class BoundaryCurve:
     x: Float
     y: Float
     frequency: Float
-    log_multipliers: NDArray[np.complex128]
-    bounds_stability: NDArray[np.bool_]
+    log_multipliers: Complex
+    bounds_stability: Bool
     result: tuple[str, str]
 
 

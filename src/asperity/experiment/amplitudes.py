@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.air import AirLayer, transfer_function
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
@@ -97,9 +97,6 @@ class Exciter:
         common: dict[str, Any] = {"frequency": self.frequency, "rise": rise, "fall": rise}
         applied = Modulate(duration, epsilon, **common)
         return applied, Modulate(duration, size * epsilon, phase=phase, **common)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,9 +232,9 @@ class AmplitudeMotion:
         Of the integration.
     """
 
-    time: Array
-    force: Array
-    load: Array
+    time: Float
+    force: Float
+    load: Float
     epsilons: tuple[float, ...]
     velocity: float
     sliding: float

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
+from asperity.arrays import Float
 from asperity.figures.style import (
     ELASTO_PLASTIC,
     GREY,
@@ -23,12 +24,10 @@ from asperity.measurement.record import mean_cycle, residual_spectrum
 from asperity.recording.extremes import extremes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
 
-    Array = NDArray[np.float64]
+    Array = Float
 
 #: Number of blocks of a long curve, about the number of pixels.
 _COLUMNS = 1200

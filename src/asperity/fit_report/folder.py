@@ -16,16 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity._version import __version__
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.fit_report.bands import Series, bands_of
-from asperity.fit_report.pictures import (
-    Float,
-    data_figure,
-    laws_figure,
-    residual_figure,
-    run_figure,
-    svg,
-)
+from asperity.fit_report.pictures import data_figure, laws_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, LockInTable, Posterior
 from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.record import comparison_record

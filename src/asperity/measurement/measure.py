@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from asperity.arrays import Float
 from asperity.errors import ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
@@ -42,7 +42,6 @@ from asperity.parameters.parameter import Drawn, SummaryLine
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
-Array = NDArray[np.float64]
 
 #: A line this often above its background is a modulation.
 _LINE = 8.0
@@ -351,7 +350,7 @@ def _measured(
     )
 
 
-def modulation_line(time: Array, load: Array, near: float | None = None) -> SpectralLine:
+def modulation_line(time: Float, load: Float, near: float | None = None) -> SpectralLine:
     """The modulation of a load, be it in only a part of the recording.
 
     Parameters
@@ -387,7 +386,7 @@ def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int)
     return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
 
 
-def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
+def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     start, end = window
     first, stop = np.searchsorted(time, [start, end], side="left")
     stop = int(np.searchsorted(time, end, side="right"))
@@ -431,12 +430,12 @@ def _around(
     return sides[0], sides[1]
 
 
-def _no_modulation(time: Array) -> float:
+def _no_modulation(time: Float) -> float:
     """A frequency (Hz) far above what is slow in a pause."""
     return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
-def _settled_level(time: Array, force: Array) -> MeanLevel | None:
+def _settled_level(time: Float, force: Float) -> MeanLevel | None:
     """The level that the force of a pause settles to; None if it is not determined."""
     settling = settling_from(time, force, _no_modulation(time), 1)
     if settling is None or not settling.possible:

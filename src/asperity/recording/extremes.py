@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from asperity.arrays import Float, Index
 
 
-def extremes(values: NDArray[np.float64], blocks: int) -> NDArray[np.intp]:
+def extremes(values: Float, blocks: int) -> Index:
     """Smallest and largest sample of each block, by their indices in the order of time.
 
     Parameters
@@ -30,16 +31,13 @@ def extremes(values: NDArray[np.float64], blocks: int) -> NDArray[np.intp]:
     return np.sort(np.stack([low, high], axis=1), axis=1).ravel()
 
 
-Array = NDArray[np.float64]
-
-
-def thinned(x: Array, y: Array, blocks: int) -> dict[str, Array]:
+def thinned(x: Float, y: Float, blocks: int) -> dict[str, Float]:
     """The `asperity.recording.extremes` of a curve as ``x`` and ``y``."""
     kept = extremes(y, blocks)
     return {"x": _rounded(x[kept]), "y": _rounded(y[kept])}
 
 
-def _rounded(values: Array) -> Array:
+def _rounded(values: Float) -> Float:
     """Values rounded to seven digits of the largest: more than a picture shows."""
     finite = values[np.isfinite(values)]
     size = float(np.abs(finite).max()) if finite.size else 0.0

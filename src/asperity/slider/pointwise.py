@@ -15,15 +15,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import jacobian_columns
+from asperity.arrays import Float
 from asperity.loads import Excitation, Modulation
 from asperity.slider.motion import Motion
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 #: Phases in a call: the collocation points of 72 intervals.
 ROWS = 288

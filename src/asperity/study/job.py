@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.arrays import Index
 from asperity.errors import InputError
 from asperity.outputs import differences
 from asperity.study.engine import DoneChunk
@@ -111,9 +111,7 @@ class Job:
         spare_mappings()
         return DoneChunk(size, answers.failed, seconds, tuple(messages), _largest_memory())
 
-    def _solve(
-        self, points: Points, answers: Answers, rows: NDArray[np.intp], messages: list[str]
-    ) -> None:
+    def _solve(self, points: Points, answers: Answers, rows: Index, messages: list[str]) -> None:
         """Solve the points `rows`; after an error find the failing points by bisection."""
         from asperity.study.points import SweepOutcome
         from asperity.study.solve import SOLVES

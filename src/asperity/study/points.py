@@ -15,13 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float, Index
 from asperity.laws import get_law
 from asperity.loads.modulated import no_contact
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import Parameter, point_parameters
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
 #: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).
@@ -282,7 +280,7 @@ class Answers:
         self.outcome[index], self.detail[index] = outcome, detail
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Points with an answer."""
         return np.asarray(self.outcome == SweepOutcome.CONVERGED)
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from asperity.app.api import fits
 from asperity.app.api.recordings import LIMITS, Source
 from asperity.app.endpoints import Answer, Job, Question, Upload
 from asperity.app.uploads import LARGEST, Uploads
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
@@ -30,7 +30,6 @@ _RTOL, _MOST_STEPS = 1e-5, 20_000
 #: Points of the curve.
 _MOST = 800
 
-Array = NDArray[np.float64]
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -80,7 +79,7 @@ def model(question: Driven) -> dict[str, Any]:
     return {"time": motion.time, "friction": motion.force / motion.load, "stopped": stopped}
 
 
-def _times(lengths: Array) -> Array:
+def _times(lengths: Float) -> Float:
     """Times (s) of the curve: dense after each change."""
     points = max(_MOST // lengths.size, 8)
     share = np.append(0.0, np.geomspace(1e-4, 1.0, points))

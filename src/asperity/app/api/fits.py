@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from asperity.app.api.catalogue import package_material
@@ -24,6 +23,7 @@ from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
+from asperity.arrays import Float
 from asperity.errors import naming, require
 from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
@@ -38,8 +38,6 @@ _BLOCKS = 700
 #: Transients that are shown enlarged, samples that one has, and the share of its largest departure
 #: from the line after it below which it counts as settled.
 _MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
-
-Array = NDArray[np.float64]
 
 
 class Table(Question):
@@ -330,7 +328,7 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _around(time: Array, fitted: Array, begin: float, end: float) -> slice:
+def _around(time: Float, fitted: Float, begin: float, end: float) -> slice:
     """Samples around a change of the drive until the fitted friction is steady again."""
     a, b = np.searchsorted(time, (begin, end))
     after = fitted[a:b]

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from asperity.inference.fitting.result import Fit, Float
+from asperity.arrays import Bool, Float
+from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import log_density
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.runs.noise import innovations
@@ -181,7 +181,7 @@ def leave_one_run_out(fit: Fit) -> CrossValidation:
     return CrossValidation(sum(runs.values()), runs)
 
 
-def _predictive(fit: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
+def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
     """Log density of the rows left out, given the others."""
     objective = fit.objective
     rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))

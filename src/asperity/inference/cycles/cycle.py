@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
@@ -25,7 +25,6 @@ from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
-Float = NDArray[np.float64]
 
 REGULAR = "regular stick-slip"
 #: Cycles that are needed.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import (
@@ -46,8 +47,6 @@ from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
-
-Float = NDArray[np.float64]
 
 #: Efficiency below which the shares are not called optimal.
 _TRUSTED = 0.95

@@ -6,13 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from asperity._version import __version__
+from asperity.arrays import Float
 from asperity.inference.design.plan import DesignPlan, expected_values
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

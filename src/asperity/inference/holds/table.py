@@ -16,8 +16,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
@@ -26,8 +26,6 @@ from asperity.parameters.columns import read_headed_columns
 from asperity.slider.named import slider_from
 from asperity.transients.hold_and_step import hold
 from asperity.units import to_si
-
-Float = NDArray[np.float64]
 
 #: The column that tells such a table from others.
 HEALING = "healing"

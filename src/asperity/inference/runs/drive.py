@@ -13,14 +13,12 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.loads import Excitation
 from asperity.measurement.sliding.segments import Cut, Partition, partition, partition_at
 from asperity.measurement.sliding.signals import SlidingSignals
-
-Float = NDArray[np.float64]
 
 
 class Drive(NamedTuple):

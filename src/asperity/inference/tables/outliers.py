@@ -7,12 +7,10 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from asperity.arrays import Float
 from asperity.inference.objective import Residuals
-
-Float = NDArray[np.float64]
 
 #: Probability, over all rows, that a row so far off is chance.
 _CHANCE = 1e-4

@@ -17,12 +17,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
-
-Float = NDArray[np.float64]
 
 #: Columns of `Prediction.columns`.
 _MEAN, _STEADY, _HARMONICS, _AMPLITUDES, _COLUMNS = 0, 1, (2, 4), (6, 7), 8
@@ -60,7 +58,7 @@ class Weights(NamedTuple):
 
     matrix: Any
     target: Any
-    reported: NDArray[np.bool_]
+    reported: Bool
     log_scales: Float
 
     def compared(self, columns: Any) -> Any:

@@ -16,6 +16,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from asperity.arrays import Bool, Float
 from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
 from asperity.inference.tables.outliers import standardised
 from asperity.inference.tables.residuals import (
@@ -36,8 +37,6 @@ from asperity.orbit import (
 )
 from asperity.parameters import law_parameters
 from asperity.slider.named import law_from
-
-Float = NDArray[np.float64]
 
 #: Rows whose orbits are remembered, of some ten kilobytes each.
 _REMEMBERED = 2048
@@ -130,7 +129,7 @@ class LockInTerm(DataTerm):
         way = tuple(self.motion.items())
         return _CompiledResiduals(self.law, way, self.searches), (self.fixed, self.weights)
 
-    def with_rows(self, kept: NDArray[np.bool_], *, coarse: bool = False) -> LockInTerm:
+    def with_rows(self, kept: Bool, *, coarse: bool = False) -> LockInTerm:
         """The same for some of the rows with their orbits, by the coarse model on request."""
         part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
         part.fixed = {n: v[kept] for n, v in self.fixed.items()}

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Highest order, as a number and as a share of the samples.
 _HIGHEST, _SHARE = 60, 0.05

@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.arrays import Bool, Float, Index
 from asperity.recording.defects.levels import CROWDED, saturated
 from asperity.recording.defects.sampling import check_sampling, even_rate, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from asperity.recording.trace import Trace
 
-    Array = NDArray[np.float64]
+    Array = Float
 
 __all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "saturation", "usable_rows"]
 
@@ -159,7 +158,7 @@ def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
     ]
 
 
-def usable_rows(time: Array, columns: Sequence[Array]) -> NDArray[np.bool_]:
+def usable_rows(time: Array, columns: Sequence[Array]) -> Bool:
     """Whether all columns are finite and time is later than in every usable row before.
 
     Parameters
@@ -176,9 +175,7 @@ def usable_rows(time: Array, columns: Sequence[Array]) -> NDArray[np.bool_]:
     return use
 
 
-def rows_to_avoid(
-    time: Array, columns: Sequence[Array], kept: NDArray[np.bool_] | None = None
-) -> NDArray[np.intp]:
+def rows_to_avoid(time: Array, columns: Sequence[Array], kept: Bool | None = None) -> Index:
     """Rows that are saturated, stand out, or follow a gap or a row that was left out.
 
     Parameters

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from asperity.arrays import Float, Index
 
-    Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    Array = Float
 
 #: Number of levels next to the extreme that show the usual number of samples at a level.
 _LEVELS = 3
@@ -45,7 +45,7 @@ class Saturated(NamedTuple):
 
     side: str
     value: float
-    rows: NDArray[np.intp]
+    rows: Index
     usual: int
 
 

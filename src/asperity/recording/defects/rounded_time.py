@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from asperity.arrays import Float
 
-    Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    Array = Float
 
 #: Smallest mean number of samples between gaps.
 _FEWEST = 16

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.arrays import Float, Index
 from asperity.recording.defects.rounded_time import RoundedGrid, rounded_grid
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+    Array = Float
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -94,7 +93,7 @@ def check_sampling(time: Array) -> list[Finding]:
     return findings
 
 
-def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) -> list[Finding]:
+def _backward_and_repeated(steps: Array, time: Array, rows: Index) -> list[Finding]:
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
@@ -124,7 +123,7 @@ def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) ->
     return findings
 
 
-def gap_rows(time: Array) -> NDArray[np.intp]:
+def gap_rows(time: Array) -> Index:
     """Samples that follow a gap, in rising order.
 
     Parameters
@@ -163,7 +162,7 @@ def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
     return tuple(pairwise([*bounds, time.size]))
 
 
-def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
+def _gaps(steps: Array, time: Array) -> tuple[Index, Array]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
@@ -180,7 +179,7 @@ def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
     return np.concatenate(gaps), np.concatenate(missing)
 
 
-def _usual(steps: Array, window: NDArray[np.intp]) -> tuple[Array, Array]:
+def _usual(steps: Array, window: Index) -> tuple[Array, Array]:
     """Median step of each window and the longest usual step; NaN for an empty window."""
     if not window.size:
         return np.empty(0), np.empty(0)
@@ -196,7 +195,7 @@ def _usual(steps: Array, window: NDArray[np.intp]) -> tuple[Array, Array]:
     return middle, np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
 
 
-def _uneven(steps: Array, starts: NDArray[np.intp], time: Array) -> Finding:
+def _uneven(steps: Array, starts: Index, time: Array) -> Finding:
     median = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - median)))
     row = int(starts[worst])

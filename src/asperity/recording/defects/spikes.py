@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from asperity.arrays import Bool, Float, Index
 
-    Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    Array = Float
 
 #: A spike stands out of both samples at these distances. Next neighbours detect it next to a
 #: fast modulation; more distant samples detect spikes longer than a sample.
@@ -36,7 +36,7 @@ _EVERY = 8
 _AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 
-def spikes(values: Array) -> NDArray[np.intp]:
+def spikes(values: Array) -> Index:
     """Samples that are spikes, in rising order."""
     parts = [np.empty(0, dtype=np.intp)]
     most = max(_DISTANCES)
@@ -48,7 +48,7 @@ def spikes(values: Array) -> NDArray[np.intp]:
     return np.unique(np.concatenate(parts))
 
 
-def _standing_out(piece: Array, distance: int) -> NDArray[np.intp]:
+def _standing_out(piece: Array, distance: int) -> Index:
     steps = piece[distance:] - piece[:-distance]
     limit = _OUT * _usual(steps)
     if not limit > 0:
@@ -64,7 +64,7 @@ def _standing_out(piece: Array, distance: int) -> NDArray[np.intp]:
     return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, distance)]
 
 
-def _locally(sizes: Array, at: NDArray[np.intp], distance: int) -> NDArray[np.bool_]:
+def _locally(sizes: Array, at: Index, distance: int) -> Bool:
     """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
     jump = np.minimum(sizes[at - distance], sizes[at])
     out = np.ones(at.size, dtype=bool)
@@ -95,9 +95,7 @@ def _usual(steps: Array) -> float:
     return float(moving.min()) if moving.size else 0.0
 
 
-def away_from_changes(
-    values: Array, rows: NDArray[np.intp], changes: Sequence[int]
-) -> NDArray[np.intp]:
+def away_from_changes(values: Array, rows: Index, changes: Sequence[int]) -> Index:
     """Spikes without the peaks that friction itself may have at changes of the drive.
 
     Parameters
@@ -126,7 +124,7 @@ def away_from_changes(
     return np.sort(np.array(kept, np.intp))
 
 
-def without(values: Array, rows: NDArray[np.intp]) -> Array:
+def without(values: Array, rows: Index) -> Array:
     """Values with linear interpolation in place of the samples `rows`.
 
     Parameters
