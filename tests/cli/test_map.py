@@ -51,20 +51,13 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
     [
         (("--x", "K"), ["axis must be NAME=LOW:HIGH:COUNT UNIT, got 'K'"]),
         (("--x", "K=1:2:5"), ["axis of K must carry a unit"]),
-        (("--x", "K=2:1:5 N/um"), ["from a smaller to a larger"]),
-        (("--x", "epsilon=0:1:5"), ["axis of epsilon must be at least 0 and below 1"]),
         (("--x", "epsilon=0:0.4:5", "--log-x"), ["must start above zero to be logarithmic"]),
-        (("--x", "epsilom=0:0.4:5"), ["got 'epsilom'; did you mean 'epsilon'?"]),
         (("--x", "K=0.1:0.3:5 N/um"), ["axes must be two numbers, got 'K' on both"]),
-        (("--x", "alpha=0:0.2:5"), ["rice-ruina must be given its own", "linker-dieterich"]),
         (("--x", "V=1:10:5 um/s"), ["V must be given once"]),
         (("--set", "K=0.2 N/um"), ["K must be given once"]),
         (("--show", "mu9"), ["--show must be one of mean_friction, delta_mu"]),
         (("--plot", "map.jpg"), ["--plot must be a PNG file"]),
         (("--plot", "no/map.png"), ["--plot must lie in a folder that exists"]),
-        (("--law", "rice-runia"), ["did you mean 'rice-ruina'?"]),
-        (("--inertia", "--set", "M=0 kg"), ["M must be positive where inertia"]),
-        (("--radiation-damping", "5"), ["--radiation-damping must carry a unit"]),
         (("--out", "no/map.nc"), ["--out must lie in a folder that exists"]),
         (("--out", "."), ["--out must be the name of a file, got '.'"]),
     ],
@@ -72,13 +65,9 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
 def test_a_bad_question(asperity, tmp_path, monkeypatch, arguments, parts) -> None:
     monkeypatch.chdir(tmp_path)
     options = {"--x": "epsilon=0:0.4:5", "--y": "K=0.1:0.3:5 N/um", "--out": "map.nc"}
-    call = [*LAW]
-    if "--law" in arguments:
-        call[2] = arguments[1]
-        arguments = arguments[2:]
     given = dict(zip(arguments[::2], arguments[1::2], strict=False))
-    call += [text for pair in options.items() if pair[0] not in given for text in pair]
-    refused(asperity(*call, *arguments), *parts)
+    call = [text for pair in options.items() if pair[0] not in given for text in pair]
+    refused(asperity(*LAW, *call, *arguments), *parts)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -18,6 +18,7 @@ series in the small difference of the phase; elsewhere it is a cosine and a sine
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +130,7 @@ class Basis:
         u = (start - self.centre) / self.half_width
         for power in range(self.drift):
             for j in range(power + 1):
-                turned[:, power, j] = _binomial(power, j) * u ** (power - j)
+                turned[:, power, j] = math.comb(power, j) * u ** (power - j)
         k = np.arange(n)
         angle = self.omega * (start - self.centre)[:, None] * (k + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
@@ -140,10 +141,6 @@ class Basis:
         rotation = turned[:, first:second, first:second]
         turned[:, second:, first:second] = u[:, None, None] * rotation
         return turned
-
-
-def _binomial(n: int, k: int) -> int:
-    return (1, n, n * (n - 1) // 2)[k]
 
 
 def solved(normal: Float, right: Float) -> Float:

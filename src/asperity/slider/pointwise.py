@@ -57,9 +57,7 @@ class PointValues(NamedTuple):
         return self.force_mean + self.force_rest
 
 
-@jax.jit
-def _excitation(load: Modulation, theta: Array) -> Excitation:
-    return load.at(theta)
+_excitation = jax.jit(lambda load, theta: load.at(theta))
 
 
 @cache

@@ -258,7 +258,7 @@ class LockInTerm(DataTerm):
         values, slopes = function.value_and_jacobian(given, known, every=every, names=wanted)
         if known is not None and all_converged(np.asarray(values.outcome)):
             self._visited.append((dict(free), known))
-            del self._visited[: -self._most_visited]
+            del self._visited[: -max(4, _REMEMBERED // self.table.rows)]
         mu_ss, mu_slopes = _steady(self.law, given, function.compiled_points(self.table.rows))
         predicted = Prediction(
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
@@ -314,11 +314,6 @@ class LockInTerm(DataTerm):
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
         )
         return Prediction(mean, steady, harmonics), outcome
-
-    @property
-    def _most_visited(self) -> int:
-        """Calls of which the orbits are remembered."""
-        return max(4, _REMEMBERED // self.table.rows)
 
     def _nearest(self, free: Mapping[str, float]) -> KnownOrbits:
         """Orbits of the earlier call with the most similar parameters, to begin with and replace.

@@ -8,14 +8,10 @@ though the samples are evenly spaced. Without correction such stamps lower an am
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.arrays import Float
-
-if TYPE_CHECKING:
-    Array = Float
 
 #: Smallest mean number of samples between gaps.
 _FEWEST = 16
@@ -50,13 +46,13 @@ class RoundedGrid:
     gaps : int
     """
 
-    time: Array
+    time: Float
     step: float
     quantum: float
     gaps: int
 
 
-def even_times(time: Array) -> Array:
+def even_times(time: Float) -> Float:
     """Times of the samples: the grid if the stamps are a rounded grid, else the stamps.
 
     Parameters
@@ -73,7 +69,7 @@ def even_times(time: Array) -> Array:
     return time if grid is None else grid.time
 
 
-def rounded_grid(time: Array) -> RoundedGrid | None:
+def rounded_grid(time: Float) -> RoundedGrid | None:
     """The even grid that explains the stamps by rounding; None if there is no such grid.
 
     Between gaps all steps of the grid are equal; where the sampling begins anew after a gap, the
@@ -118,7 +114,7 @@ def rounded_grid(time: Array) -> RoundedGrid | None:
     return RoundedGrid(time[0] + made, step, quantum, int(gaps.size))
 
 
-def _quantum(steps: Array, exact: float) -> float | None:
+def _quantum(steps: Float, exact: float) -> float | None:
     """What stamps may have been rounded to: steps of a rounded grid take two values, one apart.
 
     A quantum is no longer than a step; where it is longer than the sampling step, so that stamps

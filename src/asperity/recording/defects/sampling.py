@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.recording.defects.rounded_time import RoundedGrid, rounded_grid
 from asperity.recording.finding import Finding
-
-if TYPE_CHECKING:
-    Array = Float
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -27,7 +23,7 @@ _CHUNK = 100_000
 _SHORTEST, _OTHER_RATE = 16, 1.5
 
 
-def even_rate(time: Array) -> float | None:
+def even_rate(time: Float) -> float | None:
     """Samples per second where all steps agree within 1 % or are even but for rounding, else None.
 
     Parameters
@@ -50,7 +46,7 @@ def even_rate(time: Array) -> float | None:
     return None if grid is None or grid.gaps else 1 / grid.step
 
 
-def check_sampling(time: Array) -> list[Finding]:
+def check_sampling(time: Float) -> list[Finding]:
     """Findings on the clock: backward and repeated stamps, gaps, uneven steps."""
     clean = time if np.isfinite(time.sum()) else time[np.isfinite(time)]
     if clean.size < 2:
@@ -93,7 +89,7 @@ def check_sampling(time: Array) -> list[Finding]:
     return findings
 
 
-def _backward_and_repeated(steps: Array, time: Array, rows: Index) -> list[Finding]:
+def _backward_and_repeated(steps: Float, time: Float, rows: Index) -> list[Finding]:
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
@@ -123,7 +119,7 @@ def _backward_and_repeated(steps: Array, time: Array, rows: Index) -> list[Findi
     return findings
 
 
-def gap_rows(time: Array) -> Index:
+def gap_rows(time: Float) -> Index:
     """Samples that follow a gap, in rising order.
 
     Parameters
@@ -134,7 +130,7 @@ def gap_rows(time: Array) -> Index:
     return _gaps(np.diff(time), time)[0] + 1
 
 
-def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
+def rate_stretches(time: Float) -> tuple[tuple[int, int], ...]:
     """Start and stop (exclusive) of each stretch with a constant sampling rate.
 
     Parameters
@@ -162,7 +158,7 @@ def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
     return tuple(pairwise([*bounds, time.size]))
 
 
-def _gaps(steps: Array, time: Array) -> tuple[Index, Array]:
+def _gaps(steps: Float, time: Float) -> tuple[Index, Float]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
@@ -179,7 +175,7 @@ def _gaps(steps: Array, time: Array) -> tuple[Index, Array]:
     return np.concatenate(gaps), np.concatenate(missing)
 
 
-def _usual(steps: Array, window: Index) -> tuple[Array, Array]:
+def _usual(steps: Float, window: Index) -> tuple[Float, Float]:
     """Median step of each window and the longest usual step; NaN for an empty window."""
     if not window.size:
         return np.empty(0), np.empty(0)
@@ -195,7 +191,7 @@ def _usual(steps: Array, window: Index) -> tuple[Array, Array]:
     return middle, np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
 
 
-def _uneven(steps: Array, starts: Index, time: Array) -> Finding:
+def _uneven(steps: Float, starts: Index, time: Float) -> Finding:
     median = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - median)))
     row = int(starts[worst])
@@ -220,20 +216,20 @@ def _rounded(grid: RoundedGrid) -> Finding:
     )
 
 
-def _are_even(steps: Array, time: Array) -> bool:
+def _are_even(steps: Float, time: Float) -> bool:
     median = float(np.median(steps))
     allowed = _EVEN * median + _slack(time, median)
     return bool(steps.max() - median <= allowed and median - steps.min() <= allowed)
 
 
-def _slack(time: Array, step: float) -> float:
+def _slack(time: Float, step: float) -> float:
     """Tolerance for a step, from the last digit of the time stamps."""
     digit = _digit(time)
     # Digits coarser than half a step give no tolerance: stamps of 1 ms at 1 kHz are exact.
     return 1.01 * digit if digit <= step / 2 else 0.0
 
 
-def _digit(time: Array) -> float:
+def _digit(time: Float) -> float:
     """The last decimal of the time stamps, s; the rounding error if they are not decimal."""
     rounding = 4 * np.spacing(np.abs(time[[0, -1]]).max())
     sample = time[:: max(1, time.size // 1000)]

@@ -9,14 +9,10 @@ of neighbouring samples elsewhere in the recording.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.arrays import Bool, Float, Index
-
-if TYPE_CHECKING:
-    Array = Float
 
 #: A spike stands out of both samples at these distances. Next neighbours detect it next to a
 #: fast modulation; more distant samples detect spikes longer than a sample.
@@ -36,7 +32,7 @@ _EVERY = 8
 _AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 
-def spikes(values: Array) -> Index:
+def spikes(values: Float) -> Index:
     """Samples that are spikes, in rising order."""
     parts = [np.empty(0, dtype=np.intp)]
     most = max(_DISTANCES)
@@ -48,7 +44,7 @@ def spikes(values: Array) -> Index:
     return np.unique(np.concatenate(parts))
 
 
-def _standing_out(piece: Array, distance: int) -> Index:
+def _standing_out(piece: Float, distance: int) -> Index:
     steps = piece[distance:] - piece[:-distance]
     limit = _OUT * _usual(steps)
     if not limit > 0:
@@ -64,7 +60,7 @@ def _standing_out(piece: Array, distance: int) -> Index:
     return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, distance)]
 
 
-def _locally(sizes: Array, at: Index, distance: int) -> Bool:
+def _locally(sizes: Float, at: Index, distance: int) -> Bool:
     """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
     jump = np.minimum(sizes[at - distance], sizes[at])
     out = np.ones(at.size, dtype=bool)
@@ -78,7 +74,7 @@ def _locally(sizes: Array, at: Index, distance: int) -> Bool:
     return out
 
 
-def _usual(steps: Array) -> float:
+def _usual(steps: Float) -> float:
     """The usual size of a difference, which a few spikes hardly change."""
     size = np.abs(steps[::_EVERY])
     size = size[np.isfinite(size)]
@@ -95,7 +91,7 @@ def _usual(steps: Array) -> float:
     return float(moving.min()) if moving.size else 0.0
 
 
-def away_from_changes(values: Array, rows: Index, changes: Sequence[int]) -> Index:
+def away_from_changes(values: Float, rows: Index, changes: Sequence[int]) -> Index:
     """Spikes without the peaks that friction itself may have at changes of the drive.
 
     Parameters
@@ -124,7 +120,7 @@ def away_from_changes(values: Array, rows: Index, changes: Sequence[int]) -> Ind
     return np.sort(np.array(kept, np.intp))
 
 
-def without(values: Array, rows: Index) -> Array:
+def without(values: Float, rows: Index) -> Float:
     """Values with linear interpolation in place of the samples `rows`.
 
     Parameters
