@@ -4,50 +4,37 @@ Command line, tables, maps, sweeps, continuation, materials, JSON and the page o
 every name from here.
 """
 
-from asperity.parameters.names import display_name, in_names, symbol_of
-from asperity.parameters.parameter import NAMES, RULES, Names, Output, Parameter, Rule, obeying
+from asperity._lazy import public_names
+from asperity.parameters.names import (
+    display_name as display_name,
+    in_names as in_names,
+    symbol_of as symbol_of,
+)
+from asperity.parameters.parameter import (
+    NAMES as NAMES,
+    RULES as RULES,
+    Names as Names,
+    Output as Output,
+    Parameter as Parameter,
+    Rule as Rule,
+    obeying as obeying,
+)
 from asperity.parameters.table import (
-    DRIVE,
-    EXPERIMENT,
-    INTERFACE,
-    MACHINE,
-    MODULATION,
-    OUTPUTS,
-    RESULT_COLUMNS,
-    all_parameters,
-    canonical_name,
-    known_name,
-    law_parameters,
-    plain_name,
-    point_parameters,
-    required,
-    suggestion,
+    DRIVE as DRIVE,
+    EXPERIMENT as EXPERIMENT,
+    INTERFACE as INTERFACE,
+    MACHINE as MACHINE,
+    MODULATION as MODULATION,
+    OUTPUTS as OUTPUTS,
+    RESULT_COLUMNS as RESULT_COLUMNS,
+    all_parameters as all_parameters,
+    canonical_name as canonical_name,
+    known_name as known_name,
+    law_parameters as law_parameters,
+    plain_name as plain_name,
+    point_parameters as point_parameters,
+    required as required,
+    suggestion as suggestion,
 )
 
-__all__ = [
-    "DRIVE",
-    "EXPERIMENT",
-    "INTERFACE",
-    "MACHINE",
-    "MODULATION",
-    "NAMES",
-    "OUTPUTS",
-    "RESULT_COLUMNS",
-    "RULES",
-    "Names",
-    "Output",
-    "Parameter",
-    "Rule",
-    "all_parameters",
-    "canonical_name",
-    "display_name",
-    "in_names",
-    "known_name",
-    "law_parameters",
-    "obeying",
-    "plain_name",
-    "point_parameters",
-    "required",
-    "suggestion",
-    "symbol_of",
-]
+__all__ = public_names(globals())
