@@ -208,7 +208,9 @@ def test_resume_goes_on_to_the_same_file(asperity, protocol, tmp_path) -> None:
     out, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
     with pytest.raises(Interrupted):
         run_protocol(load_protocol(protocol), out, progress=stop)
-    refused(asperity("run", protocol, "--out", out), "go on with --resume")
+    again = asperity("run", protocol, "--out", out)
+    assert again.exit_code == 2
+    assert "go on with --resume" in again.stderr
     assert asperity("run", protocol, "--out", out, "--resume").exit_code == 0
     assert asperity("run", protocol, "--out", whole).exit_code == 0
     assert out.read_bytes() == whole.read_bytes()

@@ -318,7 +318,7 @@ def compare(
     """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
     from asperity.inference.answers import answer_comparison
-    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.report import comparison_report
     from asperity.questions.fit import Comparison
 

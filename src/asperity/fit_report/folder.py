@@ -21,8 +21,7 @@ from asperity.errors import InputError, require
 from asperity.fit_report.bands import Series, bands_of
 from asperity.fit_report.pictures import data_figure, laws_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, LockInTable, Posterior
-from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.record import comparison_record
+from asperity.inference.comparison.compare import Comparison, comparison_record
 from asperity.inference.fitting.result import fit_record
 from asperity.inference.report import comparison_report, estimates, fit_report, posterior_sections
 from asperity.inference.runs.run import RecordedRun

@@ -15,7 +15,7 @@ import numpy as np
 from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:

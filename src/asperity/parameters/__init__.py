@@ -5,11 +5,6 @@ every name from here.
 """
 
 from asperity._lazy import public_names
-from asperity.parameters.names import (
-    display_name as display_name,
-    in_names as in_names,
-    symbol_of as symbol_of,
-)
 from asperity.parameters.parameter import (
     NAMES as NAMES,
     RULES as RULES,
@@ -29,12 +24,15 @@ from asperity.parameters.table import (
     RESULT_COLUMNS as RESULT_COLUMNS,
     all_parameters as all_parameters,
     canonical_name as canonical_name,
+    display_name as display_name,
+    in_names as in_names,
     known_name as known_name,
     law_parameters as law_parameters,
     plain_name as plain_name,
     point_parameters as point_parameters,
     required as required,
     suggestion as suggestion,
+    symbol_of as symbol_of,
 )
 
 __all__ = public_names(globals())

@@ -3,7 +3,7 @@
 import numpy as np
 
 from asperity.inference.objective import Residuals
-from asperity.inference.tables.outliers import outlying_rows, standardised
+from asperity.inference.tables.residuals import outlying_rows, standardised
 
 
 def residuals_of(values, jacobian):

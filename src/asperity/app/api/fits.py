@@ -135,7 +135,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     folder as a ZIP file in base64.
     """
     from asperity.inference.answers import answer_comparison, answer_fit
-    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import comparison_report, fit_report, posterior_sections
     from asperity.laws import get_law

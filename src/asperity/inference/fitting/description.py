@@ -24,7 +24,7 @@ from asperity.inference.fitting.intervals import (
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
-from asperity.inference.tables.outliers import outlying_rows
+from asperity.inference.tables.residuals import outlying_rows
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 from asperity.units import quantity_text

@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 
 from asperity.arrays import Float
 from asperity.inference.objective import Minimum, Objective
-from asperity.inference.tables.outliers import row_distances
+from asperity.inference.tables.residuals import row_distances
 from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.parameters import law_parameters

@@ -22,8 +22,7 @@ from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
-from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.sampling import rate_stretches
+from asperity.recording.defects.sampling import even_times, rate_stretches
 from asperity.recording.readers import read
 
 #: A load that varies by less than this share of its mean is taken as constant.

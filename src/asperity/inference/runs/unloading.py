@@ -20,7 +20,7 @@ from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.readers import read
 
 #: Samples that a line needs, and to which longer spans are averaged.

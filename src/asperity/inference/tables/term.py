@@ -18,12 +18,12 @@ from scipy.special import ndtri
 
 from asperity.arrays import Bool, Float
 from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
-from asperity.inference.tables.outliers import standardised
 from asperity.inference.tables.residuals import (
     Prediction,
     Weights,
     columns_of,
     residuals_of,
+    standardised,
     weights_of,
 )
 from asperity.inference.tables.table import LockInTable

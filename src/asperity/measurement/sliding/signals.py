@@ -20,7 +20,7 @@ from asperity.measurement.samples import (
     too_few,
 )
 from asperity.recording.defects.check import usable_rows
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
