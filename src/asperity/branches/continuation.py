@@ -26,7 +26,6 @@ from asperity.branches.parameters import (
     line_through,
     moving_parameter,
     one_problem,
-    start_of,
     starting_orbit,
 )
 from asperity.branches.steps import (
@@ -218,16 +217,7 @@ def continuation(
     Collocation with the arclength condition of Keller (1977), see
     `asperity.orbit.mesh.arclength`.
     """
-    problem = one_problem(
-        slider,
-        start_of(slider, parameter, span),
-        velocity=velocity,
-        epsilon=epsilon,
-        frequency=frequency,
-        modulation=modulation,
-        inertia=inertia,
-        radiation_damping=radiation_damping,
-    )
+    problem = one_problem(locals(), {parameter: span})
     moving = moving_parameter(problem, parameter, span)
     follower = BranchFollower(line_through(problem, (moving,), (0.0,), (1.0,)), harmonics)
     orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)

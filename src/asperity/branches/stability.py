@@ -28,7 +28,6 @@ from asperity.branches.parameters import (
     line_through,
     moving_parameter,
     one_problem,
-    start_of,
     starting_orbit,
 )
 from asperity.branches.steps import (
@@ -439,16 +438,7 @@ def stability_boundary(
     Without modulation the curves end at the closed forms of linear stability: K = Kc for a
     slider without inertia, critical frequency (V/D0) sqrt((B - A)/A) for the ageing law.
     """
-    problem = one_problem(
-        slider,
-        start_of(slider, x, x_span, "x_span") | start_of(slider, y, y_span, "y_span"),
-        velocity=velocity,
-        epsilon=epsilon,
-        frequency=frequency,
-        modulation=modulation,
-        inertia=inertia,
-        radiation_damping=radiation_damping,
-    )
+    problem = one_problem(locals(), {x: x_span, y: y_span})
     parameters = (
         moving_parameter(problem, x, x_span, "x_span"),
         moving_parameter(problem, y, y_span, "y_span"),

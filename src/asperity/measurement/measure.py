@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import stdtrit
@@ -167,29 +168,18 @@ def measure(
         If channels, window or frequency do not fit the recording, or no modulation stands out and
         no frequency is given.
     """
-    recording = _prepared(trace, load, force, frequency, detrend, refine)
-    return _measured(
-        recording, None, harmonics, window, detrend, only_whole_periods=only_whole_periods
-    )
+    options = dict(locals())
+    del options["window"]
+    return _measured(_prepared(**options), None, window)
 
 
-def measure_amplitudes(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    frequency: float | None = None,
-    harmonics: int = 4,
-    detrend: str = "linear",
-    only_whole_periods: bool = False,
-    refine: bool = True,
-) -> list[Measurement | InputError]:
+def measure_amplitudes(trace: Trace, **options: Any) -> list[Measurement | InputError]:
     """Read every modulated stretch of a recording, in their order.
 
     Parameters
     ----------
-    trace, load, force, frequency, harmonics, detrend, only_whole_periods, refine
-        As in `measure`.
+    trace, **options
+        As in `measure`, all but the window.
 
     Returns
     -------
@@ -201,17 +191,13 @@ def measure_amplitudes(
     InputError
         As `measure` where the recording as a whole cannot be read.
     """
-    recording = _prepared(trace, load, force, frequency, detrend, refine)
+    recording = _prepared(trace, **options)
     measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
             continue
         try:
-            measurements.append(
-                _measured(
-                    recording, part, harmonics, None, detrend, only_whole_periods=only_whole_periods
-                )
-            )
+            measurements.append(_measured(recording, part, None))
         except InputError as error:
             measurements.append(error)
     return measurements
@@ -220,7 +206,7 @@ def measure_amplitudes(
 def modulation_of(trace: Trace) -> float | None:
     """Frequency (Hz) at which the recorded load is modulated; None of another recording."""
     try:
-        return _prepared(trace, "W", "F", None, "linear", refine=True).frequency
+        return _prepared(trace).frequency
     except InputError:
         return None
 
@@ -232,11 +218,19 @@ class _ModulatedRecording:
     samples: Samples
     parts: list[LoadInterval]
     frequency: float
-    refine: bool
+    only_whole_periods: bool
+    lock_in: Mapping[str, Any]
 
 
 def _prepared(
-    trace: Trace, load: str, force: str, frequency: float | None, detrend: str, refine: bool
+    trace: Trace,
+    load: str = "W",
+    force: str = "F",
+    frequency: float | None = None,
+    only_whole_periods: bool = False,
+    detrend: str = "linear",
+    refine: bool = True,
+    **lock_in: Any,
 ) -> _ModulatedRecording:
     rule = "be none, linear or quadratic"
     require(detrend in DRIFTS, "measure.detrend", rule, f"'{detrend}'", "choose one")
@@ -252,17 +246,13 @@ def _prepared(
             "give the frequency if you know it, or measure without modulation",
         )
     start = frequency if frequency is not None and not refine else line.frequency
-    return _ModulatedRecording(samples, _parts(samples, line, start), start, refine)
+    options = {**lock_in, "detrend": detrend, "refine": refine}
+    parts = _parts(samples, line, start)
+    return _ModulatedRecording(samples, parts, start, only_whole_periods, options)
 
 
 def _measured(
-    recording: _ModulatedRecording,
-    part: LoadInterval | None,
-    harmonics: int,
-    window: tuple[float, float] | None,
-    detrend: str,
-    *,
-    only_whole_periods: bool,
+    recording: _ModulatedRecording, part: LoadInterval | None, window: tuple[float, float] | None
 ) -> Measurement:
     """One stretch; the longest modulated one, or that of the window, if none is given."""
     samples, parts, start = recording.samples, recording.parts, recording.frequency
@@ -270,12 +260,12 @@ def _measured(
         chosen = part or max(
             (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
         )
-        first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
+        first, stop = _chosen(samples, chosen, start, DRIFTS[recording.lock_in["detrend"]])
     else:
         first, stop = _given(samples.time, window)
         # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
-    if only_whole_periods:
+    if recording.only_whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
     time, force_values = samples.time[cut], samples.force[cut]
@@ -284,10 +274,8 @@ def _measured(
         samples.load[cut],
         force_values,
         frequency=start,
-        harmonics=harmonics,
-        detrend=detrend,
-        refine=recording.refine,
         settles=True,
+        **recording.lock_in,
     )
     chosen_by = "program" if window is None else "user"
     before, after = _around(samples, parts, chosen, reading.W0)
