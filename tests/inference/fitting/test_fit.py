@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+import asperity as asp
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import fit_record
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
+from asperity.recording.writers import write
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 FREE = ("lambda", "eps_ratio", "A")
@@ -319,3 +321,25 @@ def test_one_row_with_as_many_parameters_as_data_is_refused(pmma):
     found = fit(table_of(columns), "rice-ruina", ("eps_ratio",), material=pmma, starts=1)
     assert found.converged
     assert found.chi2 == pytest.approx(0, abs=1e-6)
+
+
+def test_a_file_is_fitted_as_what_it_is(tmp_path) -> None:
+    trace = asp.samples.velocity_steps(seed=5).slice(120, 330)
+    file = write(trace, tmp_path / "steps.csv")
+    fit = asp.fit(file, starts=1)
+    assert fit.law == "rice-ruina"
+    for name, true in (("A", 0.009), ("B", 0.0125), ("D0", 8e-6)):
+        low, high = fit.parameters[name].interval_95
+        middle, half = (low + high) / 2, (high - low) / 2
+        # Twice the half-width of 95 %: four standard errors.
+        assert abs(true - middle) < 2 * half
+    figure = fit.plot()
+    residual = figure.axes[1].get_lines()[0].get_ydata()
+    assert np.std(residual) < 1e-3
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"no\.csv"):
+        asp.fit(tmp_path / "no.csv")
+    with pytest.raises(InputError, match="law"):
+        asp.compare(tmp_path / "no.csv", laws=["no-such-law"])
