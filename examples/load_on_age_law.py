@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from asperity.laws.parameter import parameter
 from jax.typing import ArrayLike
 
 from asperity.laws import LinkerDieterich
+from asperity.laws.parameter import parameter
 
 
 class LoadOnAge(LinkerDieterich):

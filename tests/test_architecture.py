@@ -28,11 +28,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "_jax": set(),
     "_lazy": set(),
     "errors": set(),
-    "units": {"errors"},
-    "outputs": {"errors", "_version"},  # files of any content
-    "parameters": {"errors", "units"},  # knows no laws: it reads the fields that they declare
+    "units": {"errors", "_lazy"},
+    "outputs": {"errors", "_lazy", "_version"},  # files of any content
+    "parameters": {"errors", "units", "_lazy"},  # reads fields that laws declare
     "questions": _BASE | {"loads"},  # knows nothing of how they are answered
-    "algebra": {"_jax"},
+    "algebra": {"arrays", "_jax"},
     "laws": _BASE,  # knows no springs, no loads, no numbers of any paper
     "loads": _BASE,  # knows no laws
     "air": _BASE,  # knows no friction

@@ -5,9 +5,10 @@ from asperity.laws.amontons import Amontons as Amontons
 from asperity.laws.cut_off import CutOff as CutOff
 from asperity.laws.elasto_plastic import ElastoPlastic as ElastoPlastic
 from asperity.laws.elasto_plastic_age import ElastoPlasticAge as ElastoPlasticAge
-from asperity.laws.law import Law as Law, State as State, parameter as parameter
+from asperity.laws.law import Law as Law, State as State
 from asperity.laws.linker_dieterich import LinkerDieterich as LinkerDieterich
 from asperity.laws.nagata import Nagata as Nagata
+from asperity.laws.parameter import parameter as parameter
 from asperity.laws.perrin_rice_zheng import PerrinRiceZheng as PerrinRiceZheng
 from asperity.laws.prakash_clifton import PrakashClifton as PrakashClifton
 from asperity.laws.registry import (

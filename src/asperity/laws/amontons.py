@@ -12,7 +12,8 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.laws.law import Law, State, parameter
+from asperity.laws.law import Law, State
+from asperity.laws.parameter import parameter
 
 
 class Amontons(Law):

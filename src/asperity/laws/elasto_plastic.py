@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from jax.typing import ArrayLike
 
-from asperity.laws.law import parameter
+from asperity.laws.parameter import parameter
 from asperity.laws.rice_ruina import RiceRuina
 
 

@@ -9,8 +9,7 @@ one array per state variable, `w` the normal load over its mean, W/W0.
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import partial
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,69 +18,8 @@ from jax.typing import ArrayLike
 
 from asperity._jax import configure
 from asperity.laws.inverse import invert_friction
-from asperity.parameters import INTERFACE, Parameter, law_parameters, obeying, plain_name
+from asperity.parameters import law_parameters
 from asperity.parameters.parameter import Displayed, SummaryLine, parameter_line
-
-
-def parameter(
-    name: str,
-    kind: str,
-    rule: str = "positive",
-    *,
-    symbol: str = "",
-    meaning: str = "",
-    geophysics: str = "",
-) -> Any:
-    """Declare a field of a law: texts become SI, values that break the rule are refused.
-
-    The declaration is the entry of the parameter in the table of parameters.
-
-    Parameters
-    ----------
-    name : str
-        Name in messages, such as ``law.D0``.
-    kind : str
-        Kind of quantity, a key of `asperity.units.KINDS`.
-    rule : {"positive", "not negative", "finite"}
-    symbol : str
-        In LaTeX; by default that of `asperity.parameters.INTERFACE` for the same quantity, else
-        the name.
-    meaning, geophysics : str
-        In one line; by default that of the symbol.
-
-    Returns
-    -------
-    dataclass field
-        Its values are float64 arrays; its metadata hold the entry and the SI unit.
-    """
-    bare = plain_name(name)
-    shared = INTERFACE.get(bare)
-    if shared is None or shared.kind != kind:
-        shared = Parameter(bare, kind, rule, symbol=bare)
-    entry = Parameter(
-        bare,
-        kind,
-        rule,
-        meaning or shared.meaning,
-        symbol or shared.symbol,
-        label=name,
-        aliases=shared.aliases,
-        meant=shared.meant,
-        geophysics=geophysics or shared.geophysics,
-    )
-    converter = partial(checked, name=name, kind=kind, rule=rule)
-    return eqx.field(converter=converter, metadata={"parameter": entry, "unit": entry.unit})
-
-
-def checked(value: Any, *, name: str, kind: str, rule: str) -> Any:
-    """Convert `value` to SI and check its rule, as `asperity.parameters.obeying`.
-
-    Returns
-    -------
-    JAX array of float64
-    """
-    return jnp.asarray(obeying(value, name, kind, rule))
-
 
 configure()  # double precision, before any law makes an array
 

@@ -16,7 +16,8 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.laws.law import State, parameter
+from asperity.laws.law import State
+from asperity.laws.parameter import parameter
 from asperity.laws.rice_ruina import RiceRuina
 
 

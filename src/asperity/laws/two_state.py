@@ -16,7 +16,8 @@ from typing import ClassVar
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.laws.law import State, parameter
+from asperity.laws.law import State
+from asperity.laws.parameter import parameter
 from asperity.laws.ruina_slip import RuinaSlip
 
 

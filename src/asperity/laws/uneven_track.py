@@ -26,7 +26,8 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
-from asperity.laws.law import Law, State, parameter
+from asperity.laws.law import Law, State
+from asperity.laws.parameter import parameter
 
 #: Name of the state that has no steady value.
 POSITION = "position"

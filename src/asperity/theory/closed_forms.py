@@ -24,7 +24,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError, require
-from asperity.laws.law import checked
+from asperity.laws.parameter import checked
 
 Form: TypeAlias = Literal["derived", "as_printed"]
 
