@@ -37,7 +37,7 @@ BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 BRIEF = (
     *("orbit", "docs", "theory", "transients", "laws", "app"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
-    *(f"cli/test_{name}.py" for name in ("map", "other_commands", "response", "run")),
+    *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
 )
 _SWITCH = "jax_disable_most_optimizations"
 

@@ -134,6 +134,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     ``bands``, ``residuals`` and ``runs``; and, if requested, ``posterior`` and ``report``, the
     folder as a ZIP file in base64.
     """
+    from asperity.inference import sample_posterior
     from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.fitting.result import fit_record
@@ -177,7 +178,13 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     posterior = None
     if best is not None and best.converged:
         if question.posterior:
-            posterior = _sampled(best, question, report)
+            posterior = sample_posterior(
+                best,
+                chains=question.chains,
+                draws=question.draws,
+                seed=question.seed,
+                progress=lambda done, total: report(draws=done, of=total),
+            )
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
             record["sections"] += described(posterior_sections(posterior), best.law)
         report(stage="figures")
@@ -217,19 +224,6 @@ def _read(data: Any) -> Any:
     """A recording for a fit; files are read within the limits of all readers of the page."""
     with named(data.file, data.name), limited(LIMITS):
         return read_source(data.file, data.source)
-
-
-def _sampled(result: Any, question: Fitted, report: Callable[..., None]) -> Any:
-    """The posterior; finished draws are reported, and the sampler asks twice a second to go on."""
-    from asperity.inference import sample_posterior
-
-    return sample_posterior(
-        result,
-        chains=question.chains,
-        draws=question.draws,
-        seed=question.seed,
-        progress=lambda done, total: report(draws=done, of=total),
-    )
 
 
 def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
