@@ -199,7 +199,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--out", "."), ["--out must be the name of a file, got '.'"]),
     ],
 )
-def test_a_bad_question(asperity, tmp_path, monkeypatch, arguments, parts) -> None:
+def test_a_bad_question_to_a_map(asperity, tmp_path, monkeypatch, arguments, parts) -> None:
     monkeypatch.chdir(tmp_path)
     options = {"--x": "epsilon=0:0.4:5", "--y": "K=0.1:0.3:5 N/um", "--out": "map.nc"}
     given = dict(zip(arguments[::2], arguments[1::2], strict=False))
@@ -209,7 +209,7 @@ def test_a_bad_question(asperity, tmp_path, monkeypatch, arguments, parts) -> No
 
 
 @pytest.mark.parametrize("missing", ["--x", "--y", "--out"])
-def test_a_missing_option(asperity, tmp_path, monkeypatch, missing) -> None:
+def test_a_missing_option_of_a_map(asperity, tmp_path, monkeypatch, missing) -> None:
     monkeypatch.chdir(tmp_path)
     options = {"--x": "epsilon=0:0.4:5", "--y": "K=0.1:0.3:5 N/um", "--out": "map.nc"}
     call = [text for pair in options.items() if pair[0] != missing for text in pair]
@@ -217,6 +217,6 @@ def test_a_missing_option(asperity, tmp_path, monkeypatch, missing) -> None:
     refused(asperity("map", *call), "must be given, got nothing")
 
 
-def test_a_point_without_numbers_is_told(asperity, tmp_path) -> None:
+def test_a_map_without_numbers_is_told(asperity, tmp_path) -> None:
     call = ("map", "--law", "rice-ruina", *AXES, "-V", "1 um/s", "-f", "120 Hz")
     refused(asperity(*call, "--out", tmp_path / "m.nc"), "got none for mu0, A, B, D0, V0, W0")
