@@ -15,6 +15,7 @@ import xarray
 from asperity.outputs import Interrupted
 from asperity.protocol import load_protocol, run_protocol
 from asperity.recording import read
+from asperity.recording.writers import WRITERS
 from references.commands import refused
 
 PROTOCOL = """
@@ -95,6 +96,24 @@ def test_a_run_is_recorded(asperity, protocol, tmp_path) -> None:
     modulated = trace.slice(0.4, 0.5).channel("W").values
     amplitude = np.ptp(modulated) / 2
     assert amplitude == pytest.approx(0.24 * 7 / np.hypot(1, 0.12), rel=0.01)
+
+
+def test_an_interrupted_recording_leaves_the_motion_and_says_so(
+    asperity, protocol, tmp_path, monkeypatch
+) -> None:
+    def interrupted(trace, columns, path):
+        path.write_text("half a recording")
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(WRITERS, ".csv", interrupted)
+    protocol.write_text(PROTOCOL + _TRIBOMETER)
+    out, record = tmp_path / "run.nc", tmp_path / "recording.csv"
+    left = asperity("run", protocol, "--out", out, "--record", record)
+    assert left.exit_code == 130
+    assert "interrupted after the motion was finished" in left.stderr
+    assert f"'{out}' is whole" in " ".join(left.stderr.split())
+    assert out.is_file()
+    assert not record.exists()
 
 
 def test_a_recording_without_tribometer_or_format_costs_no_work(
