@@ -8,7 +8,6 @@ recordings are in a table, or in the names of the files.
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import multiprocessing
@@ -22,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
-from asperity.outputs import UnfinishedText, output_file, written_file
+from asperity.outputs import UnfinishedText, output_file, write_table, written_file
 from asperity.parameters.columns import read_headed_columns
 
 if TYPE_CHECKING:
@@ -257,11 +256,7 @@ def write_csv(path: Path, table: list[Row]) -> None:
         From `modulated_rows` and `sliding_rows`.
     """
     names = _columns(table)
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(names)
-        for row in table:
-            writer.writerow([_cell(row.get(name, "")) for name in names])
+    write_table(path, names, ([_cell(row.get(name, "")) for name in names] for row in table))
 
 
 def _cell(value: Any) -> Any:

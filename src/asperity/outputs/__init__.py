@@ -24,6 +24,7 @@ from asperity.outputs.unfinished import (
 )
 from asperity.outputs.written import (
     require_folder as require_folder,
+    write_table as write_table,
     written_file as written_file,
     written_folder as written_folder,
 )
