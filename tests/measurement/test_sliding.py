@@ -181,9 +181,7 @@ def held(pulled):
         velocities += [0.0, V]
         lengths += [hold, 400e-6]
         rates += [100 if hold < 100 else 5, 100]
-    return pulled(
-        velocities, lengths, rates, noise=2e-4, slope=3.0, stiffness=STIFFNESS, resolution=2e-8
-    )
+    return pulled(velocities, lengths, rates, noise=2e-4, slope=3.0, k=STIFFNESS, resolution=2e-8)
 
 
 def true_readings(held):
