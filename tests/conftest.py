@@ -37,7 +37,7 @@ BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 BRIEF = (
     *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "papers/bureau2000/"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
-    *(f"cli/test_{name}.py" for name in ("design", "map", "other_commands", "response", "run")),
+    *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
     *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
     *("inference/fitting/test_fit.py", "inference/runs/test_motion.py"),
 )

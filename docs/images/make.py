@@ -14,8 +14,8 @@ import asperity as asp
 from asperity.figures.stick_slip import draw_stick_slip
 from asperity.figures.style import style
 from asperity_papers.bureau2000.figures import draw
-from asperity_papers.bureau2000.harmonics import figure_11
 from asperity_papers.bureau2000.machine import Machine
+from asperity_papers.bureau2000.response_figures import figure_11
 
 FOLDER = Path(__file__).parent
 

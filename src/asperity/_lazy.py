@@ -1,14 +1,16 @@
-"""Names of a package that are imported when they are first used.
+"""Public names of a package: those that it imports as themselves, at once or when first used.
 
-The package lists them once, in its stub ``__init__.pyi``, which type checkers and editors read too.
+Names that are imported when first used are listed once, in the stub ``__init__.pyi`` of the
+package, which type checkers and editors read too.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 
 def lazy_names(package: str, file: str) -> tuple[Callable[[str], object], list[str]]:
@@ -40,3 +42,15 @@ def lazy_names(package: str, file: str) -> tuple[Callable[[str], object], list[s
         return getattr(import_module(module), there)
 
     return get, public
+
+
+def public_names(names: Mapping[str, object]) -> list[str]:
+    """The ``__all__`` of a package that imports its public names, and nothing else, as themselves.
+
+    Parameters
+    ----------
+    names : mapping of str to object
+        Its ``globals()``.
+    """
+    private = {n for n, v in names.items() if isinstance(v, ModuleType) or v is public_names}
+    return sorted(n for n in names if not n.startswith("_") and n not in private)

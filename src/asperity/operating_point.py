@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulated import lowest_load, modulated
@@ -264,7 +264,7 @@ def respond(
     )
 
 
-def motions(values: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.intp]]:
+def motions(values: Mapping[str, Float]) -> list[Index]:
     """Groups of points with one equation of motion and one kind of load, as indices.
 
     The load is harmonic, even in time, which the fast method solves too, or any other.
@@ -283,25 +283,25 @@ def motions(values: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.intp]]
     return [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
 
 
-def without_mass(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bool_]:
+def without_mass(values: Mapping[str, Float]) -> Bool:
     """Points with inertia and no mass."""
     return (np.asarray(values["inertia"]) > 0) & ~(np.asarray(values["M"]) > 0)
 
 
-def lowest_loads(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def lowest_loads(values: Mapping[str, Float]) -> Float:
     """Lowest W/W0 over the period at each point; the contact is lost where it is not positive."""
     harmonics = _further_harmonics(values)
     # A harmonic load stays positive by the rule of epsilon.
     return lowest_load(values["epsilon"], harmonics) if harmonics else np.ones(len(values["V"]))
 
 
-def _more_modulated(values: Mapping[str, Any]) -> NDArray[np.bool_]:
+def _more_modulated(values: Mapping[str, Any]) -> Bool:
     """Points with a modulation beyond the first harmonic of the load."""
     amplitudes = ("epsilon2", "epsilon3", "pull", "tilt")
     return sum((np.asarray(values.get(n, 0.0)) != 0 for n in amplitudes), np.asarray(False))
 
 
-def _not_even(values: Mapping[str, Any]) -> NDArray[np.bool_]:
+def _not_even(values: Mapping[str, Any]) -> Bool:
     """Points at which one of the modulated quantities is not even in time."""
     pairs = [(np.asarray(values.get(n, 0.0)), np.asarray(values.get(f"{n}_phase", 0.0)))
              for n in ("epsilon2", "epsilon3", "pull")]  # fmt: skip

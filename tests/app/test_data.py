@@ -12,7 +12,6 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.app.api import fits, recordings
@@ -23,6 +22,7 @@ from asperity.errors import InputError
 from asperity.inference.answers import read_data
 from asperity.outputs.tables import Section
 from asperity.questions import fit as questions
+from references.spring_slider import spring_slider
 
 MU1, PHASE1 = 0.012, -0.4
 
@@ -486,22 +486,10 @@ PLANTED = {"A": 0.013, "B": 0.0175, "D0": 4e-7}
 @pytest.fixture(scope="module")
 def stepped():
     """A recording of steps of the velocity, up tenfold and down again, of `PLANTED`, as CSV."""
-    A, B, D0 = PLANTED.values()
-    V0, edges, rate = 1e-6, (0.0, 2.0, 3.0, 5.0), 40
-    velocities = (V0, 10 * V0, V0)
-
-    def rates(t, state, pulled):
-        friction, log_age = state
-        slip = V0 * np.exp((friction - 0.6 - B * log_age) / A)
-        return [2e5 / 10 * (pulled - slip), V0 / D0 * np.exp(-log_age) - slip / D0]
-
-    t, last, parts = np.arange(int(edges[-1] * rate)) / rate, [0.6, 0.0], []
-    for begin, end, V in zip(edges[:-1], edges[1:], velocities, strict=True):
-        at = np.append(t[(t >= begin) & (t < end)], end)
-        solved = solve_ivp(rates, (begin, end), last, "LSODA", at, args=(V,), rtol=1e-8, atol=1e-10)
-        parts.append(solved.y[0, :-1])
-        last = solved.y[:, -1]
-    friction = np.concatenate(parts) + 3e-4 * np.random.default_rng(5).normal(size=t.size)
+    edges, rate, velocities = (0.0, 2.0, 3.0, 5.0), 40, (1e-6, 1e-5, 1e-6)
+    t = np.arange(int(edges[-1] * rate)) / rate
+    friction = spring_slider(velocities, edges, t, **PLANTED, k=2e4)
+    friction = friction + 3e-4 * np.random.default_rng(5).normal(size=t.size)
     pulled = np.interp(t, edges, [0.0, *np.cumsum(np.diff(edges) * velocities)])
     file = io.StringIO()
     header = "time (s),displacement (m),Ft (N),Fn (N)"

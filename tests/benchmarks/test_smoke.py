@@ -1,4 +1,4 @@
-"""The benchmark runs from end to end; no time is asserted, the errors are."""
+"""Benchmarks run to their end, and go on where they were; no time is asserted, the errors are."""
 
 import json
 import os
@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from benchmarks import whole_range
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,3 +55,30 @@ def test_two_points(tmp_path):
         for error in errors:
             assert error is None or error < WORST[method], row
     assert all(row["mean"] is not None for row in rows if row["what"] == "asperity, elasto-plastic")
+
+
+def call(monkeypatch, capsys, folder):
+    monkeypatch.setattr(whole_range, "SLICE", 3)
+    # Of this seed all points are answered by two methods, and no pulse is narrow.
+    options = ["--points", "6", "--seed", "10", "--out", str(folder)]
+    monkeypatch.setattr(sys, "argv", ["whole_range", *options])
+    whole_range.main()
+    return capsys.readouterr().out
+
+
+def test_goes_on_where_it_was_and_counts_what_is_wrong(tmp_path, monkeypatch, capsys):
+    first = call(monkeypatch, capsys, tmp_path)
+    assert "0 done\n3 done\n6 points in 2 of 2 slices" in first
+    assert "obey the equations                 6" in first
+    assert "contradict them                    0" in first
+    kept, lost = sorted(tmp_path.iterdir())
+    found = dict(np.load(kept))
+    found["wrong"][:2] = True
+    np.savez(kept, **found)
+    written = kept.stat().st_mtime_ns
+    lost.unlink()
+    second = call(monkeypatch, capsys, tmp_path)
+    assert "3 done\n6 points in 2 of 2 slices" in second
+    assert "0 done" not in second
+    assert kept.stat().st_mtime_ns == written
+    assert "contradict them                    2" in second

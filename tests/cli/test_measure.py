@@ -9,6 +9,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from references.commands import refused
 from references.populations import population
 
 F, EPSILON, MU1, PHASE1 = 40.02, 0.2, 2e-3, -1.4
@@ -205,41 +206,15 @@ def test_a_table_of_modulated_and_unmodulated_files(asperity, recording, step, t
     assert abs(float(rows[1]["change"]) + 0.003) < 5 * float(rows[1]["change_uncertainty"])
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--window", "10"), "--window must be START:END"),
-        (("--window", "a:b"), "--window must"),
-        (("--frequency", "120"), "--frequency must carry a unit"),
-        (("--frequency", "40 rpm"), "--frequency must"),
-        (("--exact-frequency",), "--exact-frequency must go with --frequency"),
-        (("--harmonics", "0"), "--harmonics"),
-        (("--unit", "N"), "--unit must be NAME=VALUE"),
-        (("--column", "velocity"), "--column must be NAME=VALUE"),
-        (("--plot", "out.pdf"), "--plot must be a PNG file"),
-        (("--plot", "no/such/folder/out.png"), "--plot must lie in a folder that exists"),
-    ],
-)
-def test_bad_input_is_one_sentence(asperity, recording, options, message) -> None:
-    result = asperity("measure", recording, *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
 def test_a_file_that_is_not_there(asperity, tmp_path) -> None:
-    result = asperity("measure", tmp_path / "none.csv")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert result.stderr.count("\n") == 1
+    refused(asperity("measure", tmp_path / "none.csv"))
 
 
 def test_a_constant_load_is_told_what_to_do(asperity, tmp_path) -> None:
     path = tmp_path / "constant.csv"
     rows = [f"{i * 1e-3:.3f},7,{2.8 + 0.01 * (i % 7)}" for i in range(500)]
     path.write_text("time (s),W (N),F (N)\n" + "\n".join(rows))
-    result = asperity("measure", path)
-    assert result.exit_code == 2
-    assert "must be modulated" in result.stderr
+    refused(asperity("measure", path), "must be modulated")
 
 
 def test_a_file_without_times_of_stresses_in_groups(asperity, tmp_path) -> None:
@@ -263,9 +238,7 @@ def test_a_file_without_times_of_stresses_in_groups(asperity, tmp_path) -> None:
     assert force["W0"] == pytest.approx(2e6 * 25e-4, rel=1e-3)
     assert force["mu1"] == pytest.approx(stress["mu1"], rel=1e-9)
     assert abs(stress["frequency"] - F) < 5 * stress["uncertainties"]["frequency"]
-    refused = asperity("measure", tmp_path / "runs.h5", "--rate", "1 kHz")
-    assert refused.exit_code == 2
-    assert "'short' (500 rows)" in refused.stderr
+    refused(asperity("measure", tmp_path / "runs.h5", "--rate", "1 kHz"), "'short' (500 rows)")
 
 
 @pytest.mark.parametrize("part", population([0.777, 0.4, 0.5]))
@@ -320,8 +293,13 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
     ("options", "message"),
     [
         (["--window", "12:4"], "--window must enclose"),
+        (["--window", "10"], "--window must be START:END"),
+        (["--exact-frequency"], "--exact-frequency must go with --frequency"),
+        (["--unit", "N"], "--unit must be NAME=VALUE"),
+        (["--column", "velocity"], "--column must be NAME=VALUE"),
+        (["--plot", "out.pdf"], "--plot must be a PNG file"),
+        (["--plot", "no/such/folder/out.png"], "--plot must lie in a folder that exists"),
         (["--force", "nothing"], "--force must be a column"),
-        (["--detrend", "cubic"], "--detrend must be none, linear or quadratic"),
         (["--harmonics", "64"], "--harmonics must lie below half the sampling rate"),
         (["--no-modulation", "--steps", "900"], "--steps must lie inside the recording"),
         (["--no-modulation", "--steps", "no/such/file"], "--steps must be times or a file"),
@@ -335,16 +313,16 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
 )
 def test_errors_name_the_option(asperity, recording, options, message) -> None:
     result = asperity("measure", recording, *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
+    refused(result, message)
     for inside in ("measure.", "lock_in.", "columns=", "units=", "columns[", "Trace."):
         assert inside not in result.stderr
 
 
 def test_several_recordings_need_a_table(asperity, recording, step) -> None:
-    result = asperity("measure", recording, step)
-    assert result.exit_code == 2
-    assert "--out must be given with several recordings, got 2 without" in result.stderr
+    refused(
+        asperity("measure", recording, step),
+        "--out must be given with several recordings, got 2 without",
+    )
 
 
 def test_an_ambiguous_column_is_chosen_by_an_option(asperity, tmp_path) -> None:
@@ -353,7 +331,8 @@ def test_an_ambiguous_column_is_chosen_by_an_option(asperity, tmp_path) -> None:
     columns = np.c_[np.arange(100) * 0.1, 7 + rng.random((100, 3))]
     header = "time (s),normal force (N),shear force 1 (N),shear force 2 (N)"
     np.savetxt(path, columns, "%.5f", ",", header=header, comments="")
-    result = asperity("measure", path, "--no-modulation")
-    assert result.exit_code == 2
-    assert '--force "shear force 1"' in result.stderr
-    assert "--force must name one channel, got several, " in result.stderr
+    refused(
+        asperity("measure", path, "--no-modulation"),
+        '--force "shear force 1"',
+        "--force must name one channel, got several, ",
+    )

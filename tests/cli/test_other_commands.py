@@ -1,11 +1,13 @@
-"""`asperity air`, `materials` and `reproduce`."""
+"""`asperity air`, `materials`, `design` and `reproduce`."""
 
+import csv
 import json
 from pathlib import Path
 
 import pytest
 
 from asperity import air, materials
+from references.commands import refused
 
 MATERIAL = ("--material", "bureau2000")
 
@@ -128,9 +130,10 @@ def test_an_interrupted_reproduction_says_how_to_go_on(
 
 
 def test_an_unknown_paper_is_refused(asperity, tmp_path: Path) -> None:
-    shown = asperity("reproduce", "bureau2001", "--out", tmp_path / "report")
-    assert shown.exit_code == 2
-    assert "did you mean 'bureau2000'?" in shown.stderr
+    refused(
+        asperity("reproduce", "bureau2001", "--out", tmp_path / "report"),
+        "did you mean 'bureau2000'?",
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -140,9 +143,7 @@ def test_a_law_of_ones_own_by_its_place(asperity) -> None:
     shown = asperity("response", "--law", f"{place}:Composite", *point, "--set", "Vc=1 um/s")
     assert shown.exit_code == 0
     assert shown.stdout.startswith("composite\n")
-    wrong = asperity("response", "--law", f"{place}:Compsite", *point)
-    assert wrong.exit_code == 2
-    assert "did you mean 'Composite'?" in wrong.stderr
+    refused(asperity("response", "--law", f"{place}:Compsite", *point), "did you mean 'Composite'?")
 
 
 def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Path) -> None:
@@ -154,12 +155,75 @@ def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Pat
         ("fit", "--law", "composite must have all its numbers, got none for Vc"),
         ("compare", "--laws", "laws must be two or more, got composite;"),
     ):
-        shown = asperity(command, *common, option, f"{place}:Composite")
-        assert shown.exit_code == 2
-        assert message in shown.stderr
-        wrong = asperity(command, *common, option, f"{place}:Compsite")
-        assert wrong.exit_code == 2
-        assert "did you mean 'Composite'?" in wrong.stderr
-    wrong = asperity("serve", "--law", f"{place}:Compsite")
-    assert wrong.exit_code == 2
-    assert "did you mean 'Composite'?" in wrong.stderr
+        refused(asperity(command, *common, option, f"{place}:Composite"), message)
+        refused(
+            asperity(command, *common, option, f"{place}:Compsite"), "did you mean 'Composite'?"
+        )
+    refused(asperity("serve", "--law", f"{place}:Compsite"), "did you mean 'Composite'?")
+
+
+PLAN = """
+law = "elasto-plastic"
+material = "bureau2000"
+free = ["lambda", "eps_ratio", "A"]
+measure = "lambda"
+points = 8
+[ranges]
+V = ["1 um/s", "10 um/s"]
+epsilon = { from = 0.1, to = 0.5, levels = 5 }
+frequency = "120 Hz"
+[fixed]
+W0 = "3 N"
+[values]
+eps_ratio = 0.48
+[noise]
+delta_mu = 1e-3
+mu1 = 2e-5
+phase1 = "2 deg"
+mu2 = 1e-5
+"""
+
+
+@pytest.fixture
+def plan(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    return path
+
+
+def test_points_as_text_JSON_and_a_table(asperity, plan, tmp_path):
+    table = tmp_path / "points.csv"
+    result = asperity("design", plan, "--csv", table, "--json")
+    assert result.exit_code == 0
+    record = json.loads(result.stdout)
+    with table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert sum(int(row["readings"]) for row in rows) == record["readings"] == 8
+    assert [float(row["epsilon"]) for row in rows] == [p["epsilon"] for p in record["points"]]
+    assert {row["law"] for row in rows} == {"elasto-plastic"}
+    result = asperity("design", plan)
+    assert result.exit_code == 0
+    assert "to measure lambda" in result.stdout
+    assert "10 of 10 combinations can be used" in result.stdout
+
+
+def test_a_mistake_in_a_plan_is_one_line_and_leaves_no_file(asperity, plan, tmp_path):
+    table = tmp_path / "points.csv"
+    plan.write_text(PLAN.replace('"120 Hz"', "120"))
+    refused(asperity("design", plan, "--csv", table), "frequency must carry a unit")
+    assert not table.exists()
+    assert asperity("design", plan, "--csv", plan).exit_code == 2
+    assert asperity("design", tmp_path / "absent.toml").exit_code == 2
+
+
+def test_a_recipe_needs_its_measurements(asperity, tmp_path):
+    readings, thresholds = tmp_path / "readings.csv", tmp_path / "thresholds.csv"
+    readings.write_text("V,epsilon,frequency,delta_mu,delta_mu_err\n1e-6,0.3,120,-0.05,0.002\n")
+    thresholds.write_text(
+        "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,32500,1000,0.4,0.04\n"
+    )
+    refused(
+        asperity("recipe", "bureau2000", readings, "--thresholds", thresholds),
+        "must have rows with epsilon = 0 and mean_friction",
+    )
+    refused(asperity("recipe", "bureau1999", readings, "--thresholds", thresholds), "bureau2000")

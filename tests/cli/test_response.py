@@ -1,14 +1,17 @@
-"""`asperity response` for one operating point."""
+"""`asperity response` for one operating point, and `asperity map` over two numbers of it."""
 
 import json
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 import asperity as asp
 from asperity.outputs.json import to_json
+from references.commands import refused
 
 POINT = ("--law", "elasto-plastic", "-V", "1 um/s", "-e", "0.24", "-f", "120 Hz")
 KEYS = {
@@ -79,9 +82,10 @@ def test_without_a_material_all_numbers_come_from_set(asperity) -> None:
 
 
 def test_without_a_material_the_missing_numbers_are_listed(asperity) -> None:
-    shown = asperity("response", *POINT, "--set", "A=0.01", "--set", "K=1 N/um")
-    assert (shown.exit_code, shown.stdout) == (2, "")
-    assert "got none for mu0, B, D0, V0, lambda, W0;" in shown.stderr
+    refused(
+        asperity("response", *POINT, "--set", "A=0.01", "--set", "K=1 N/um"),
+        "got none for mu0, B, D0, V0, lambda, W0;",
+    )
 
 
 def test_a_multiplier_beyond_double_precision_is_null(asperity) -> None:
@@ -139,6 +143,80 @@ def test_other_modulations_by_set(asperity) -> None:
 )
 def test_other_modulations_that_are_refused(asperity, settings, message) -> None:
     point = ("response", "--law", "rice-ruina", "-V", "1 um/s", "-f", "120 Hz")
-    shown = asperity(*point, *settings, "--material", "bureau2000")
-    assert (shown.exit_code, shown.stdout) == (2, "")
-    assert message in shown.stderr
+    refused(asperity(*point, *settings, "--material", "bureau2000"), message)
+
+
+LAW = ("map", "--law", "rice-ruina", "--material", "bureau2000", "-V", "1 um/s", "-f", "120 Hz")
+AXES = ("--x", "epsilon=0:0.4:5", "--y", "K=0.1:0.3:5 N/um")
+KC = (0.026 - 0.013) * 7.0 / 0.4e-6
+
+
+def test_a_map_as_file_picture_and_json(asperity, tmp_path: Path) -> None:
+    out, plot = tmp_path / "map.nc", tmp_path / "map.png"
+    result = asperity(*LAW, *AXES, "--out", out, "--plot", plot, "--show", "mu1", "--json")
+    assert result.exit_code == 0, result.stderr
+    record = json.loads(result.stdout)
+    assert record["points"] == 25
+    assert record["stable"] + record["unstable"] == 25
+    assert record["failed"] == record["boundary_not_found"] == 0
+    (line,) = record["boundaries"]
+    unmodulated = line["K"][line["epsilon"].index(0.0)]
+    assert unmodulated == pytest.approx(KC, rel=2e-6)
+    assert set(line["kind"]) == {"Neimark-Sacker"}
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    with xarray.open_dataset(out) as found:
+        assert found["mu1"].dims == ("K", "epsilon")
+        assert found["A"].attrs["origin"] == "bureau2000"
+        assert found["V"].attrs["origin"] == "command line"
+        assert int(found["stable"].sum()) == record["stable"]
+
+
+def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
+    out = tmp_path / "map.nc"
+    call = (*LAW, "--x", "epsilon=0.001:0.1:3", "--log-x", "--y", "K=0.1:0.4:3 N/um", "--log-y")
+    result = asperity(*call, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.split()[:2] == ["points", "9"]
+    assert "boundary  Neimark-Sacker" in result.stdout
+    with xarray.open_dataset(out) as found:
+        np.testing.assert_allclose(found["epsilon"], [1e-3, 1e-2, 1e-1], rtol=1e-12)
+        np.testing.assert_allclose(found["K"], [1e5, 2e5, 4e5], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--x", "K"), ["axis must be NAME=LOW:HIGH:COUNT UNIT, got 'K'"]),
+        (("--x", "K=1:2:5"), ["axis of K must carry a unit"]),
+        (("--x", "epsilon=0:0.4:5", "--log-x"), ["must start above zero to be logarithmic"]),
+        (("--x", "K=0.1:0.3:5 N/um"), ["axes must be two numbers, got 'K' on both"]),
+        (("--x", "V=1:10:5 um/s"), ["V must be given once"]),
+        (("--set", "K=0.2 N/um"), ["K must be given once"]),
+        (("--show", "mu9"), ["--show must be one of mean_friction, delta_mu"]),
+        (("--plot", "map.jpg"), ["--plot must be a PNG file"]),
+        (("--plot", "no/map.png"), ["--plot must lie in a folder that exists"]),
+        (("--out", "no/map.nc"), ["--out must lie in a folder that exists"]),
+        (("--out", "."), ["--out must be the name of a file, got '.'"]),
+    ],
+)
+def test_a_bad_question_to_a_map(asperity, tmp_path, monkeypatch, arguments, parts) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = {"--x": "epsilon=0:0.4:5", "--y": "K=0.1:0.3:5 N/um", "--out": "map.nc"}
+    given = dict(zip(arguments[::2], arguments[1::2], strict=False))
+    call = [text for pair in options.items() if pair[0] not in given for text in pair]
+    refused(asperity(*LAW, *call, *arguments), *parts)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("missing", ["--x", "--y", "--out"])
+def test_a_missing_option_of_a_map(asperity, tmp_path, monkeypatch, missing) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = {"--x": "epsilon=0:0.4:5", "--y": "K=0.1:0.3:5 N/um", "--out": "map.nc"}
+    call = [text for pair in options.items() if pair[0] != missing for text in pair]
+    refused(asperity(*LAW, *call), f"{missing} must be given, got nothing")
+    refused(asperity("map", *call), "must be given, got nothing")
+
+
+def test_a_map_without_numbers_is_told(asperity, tmp_path) -> None:
+    call = ("map", "--law", "rice-ruina", *AXES, "-V", "1 um/s", "-f", "120 Hz")
+    refused(asperity(*call, "--out", tmp_path / "m.nc"), "got none for mu0, A, B, D0, V0, W0")

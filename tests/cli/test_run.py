@@ -15,6 +15,8 @@ import xarray
 from asperity.outputs import Interrupted
 from asperity.protocol import load_protocol, run_protocol
 from asperity.recording import read
+from asperity.recording.writers import WRITERS
+from references.commands import refused
 
 PROTOCOL = """
 title = "modulation"
@@ -96,16 +98,36 @@ def test_a_run_is_recorded(asperity, protocol, tmp_path) -> None:
     assert amplitude == pytest.approx(0.24 * 7 / np.hypot(1, 0.12), rel=0.01)
 
 
+def test_an_interrupted_recording_leaves_the_motion_and_says_so(
+    asperity, protocol, tmp_path, monkeypatch
+) -> None:
+    def interrupted(trace, columns, path):
+        path.write_text("half a recording")
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(WRITERS, ".csv", interrupted)
+    protocol.write_text(PROTOCOL + _TRIBOMETER)
+    out, record = tmp_path / "run.nc", tmp_path / "recording.csv"
+    left = asperity("run", protocol, "--out", out, "--record", record)
+    assert left.exit_code == 130
+    assert "interrupted after the motion was finished" in left.stderr
+    assert f"'{out}' is whole" in " ".join(left.stderr.split())
+    assert out.is_file()
+    assert not record.exists()
+
+
 def test_a_recording_without_tribometer_or_format_costs_no_work(
     asperity, protocol, tmp_path
 ) -> None:
-    result = asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.csv")
-    assert result.exit_code == 2
-    assert "--record must go with a [tribometer]" in result.stderr
+    refused(
+        asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.csv"),
+        "--record must go with a [tribometer]",
+    )
     protocol.write_text(PROTOCOL + _TRIBOMETER)
-    result = asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.xlsx")
-    assert result.exit_code == 2
-    assert "must end in the name of a format" in result.stderr
+    refused(
+        asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.xlsx"),
+        "must end in the name of a format",
+    )
     assert list(tmp_path.iterdir()) == [protocol]
 
 
@@ -150,19 +172,13 @@ def test_all_mistakes_are_exit_code_2_and_a_line_each(asperity, protocol, tmp_pa
 )
 def test_bad_input_is_one_sentence(asperity, protocol, monkeypatch, arguments, message) -> None:
     monkeypatch.chdir(protocol.parent)
-    result = asperity("run", *(a.format(protocol.parent.name) for a in arguments))
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert message in result.stderr
+    refused(asperity("run", *(a.format(protocol.parent.name) for a in arguments)), message)
 
 
 @pytest.mark.parametrize("load", ["0 N", "-1 N", "-0.0 N", "1e-9 N", "1e-300 N"])
 def test_a_start_without_contact_is_one_sentence(asperity, protocol, tmp_path, load) -> None:
     protocol.write_text(PROTOCOL.replace("[start]", f"[start]\nload = '{load}'"))
-    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert "load must" in result.stderr
+    refused(asperity("run", protocol, "--out", tmp_path / "run.nc"), "load must")
     assert list(tmp_path.iterdir()) == [protocol]
 
 
@@ -176,15 +192,10 @@ def test_more_rows_than_anything_holds(asperity, protocol, tmp_path, rate) -> No
     protocol.write_text(text.replace("2 kHz", f"{rate:.3e} Hz"))
     options = ("--csv",), ("--record", tmp_path / "rec.csv"), ()
     for option in options:
-        result = asperity("run", protocol, "--out", tmp_path / "run.nc", *option)
-        assert result.exit_code == 2
-        assert result.stderr.count("\n") == 1
-        assert "rows" in result.stderr
+        refused(asperity("run", protocol, "--out", tmp_path / "run.nc", *option), "rows")
         assert list(tmp_path.iterdir()) == [protocol]
     protocol.write_text(text.replace("slide for 0.2 s", f"slide for {rate:.3e} s"))
-    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
-    assert result.exit_code == 2
-    assert "rows" in result.stderr
+    refused(asperity("run", protocol, "--out", tmp_path / "run.nc"), "rows")
 
 
 @pytest.mark.parametrize("blocked", ["run.nc", "run.csv", "run.png", "rec.csv", "run.nc.partial"])
@@ -203,9 +214,7 @@ def test_every_output_is_checked_before_the_run(
         "--record",
         tmp_path / "rec.csv",
     )
-    result = asperity("run", protocol, *outputs)
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
+    refused(asperity("run", protocol, *outputs))
     assert {p.name for p in tmp_path.iterdir()} == {"protocol.toml", blocked}
 
 
@@ -218,9 +227,9 @@ def test_resume_goes_on_to_the_same_file(asperity, protocol, tmp_path) -> None:
     out, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
     with pytest.raises(Interrupted):
         run_protocol(load_protocol(protocol), out, progress=stop)
-    refused = asperity("run", protocol, "--out", out)
-    assert refused.exit_code == 2
-    assert "go on with --resume" in refused.stderr
+    again = asperity("run", protocol, "--out", out)
+    assert again.exit_code == 2
+    assert "go on with --resume" in again.stderr
     assert asperity("run", protocol, "--out", out, "--resume").exit_code == 0
     assert asperity("run", protocol, "--out", whole).exit_code == 0
     assert out.read_bytes() == whole.read_bytes()

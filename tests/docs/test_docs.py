@@ -1,17 +1,21 @@
-"""Nothing that a user can name is missing from the documentation, and its parts fit together."""
+"""All that a user can name is in the documentation; its parts fit together, its examples run."""
 
 import base64
 import dataclasses
+import doctest
 import importlib
+import inspect
 import json
 import re
 import sys
 import tomllib
 from pathlib import Path
 
+import matplotlib as mpl
 import pytest
 
 import asperity
+import asperity as asp
 from asperity import materials
 from asperity.cli.main import main
 from asperity.laws import law_parameters, registered
@@ -235,3 +239,20 @@ def test_outside_the_repository_the_readme_has_no_links_into_it() -> None:
     targets = re.findall(r"\]\(([^)]+)\)", text)
     assert [t for t in targets if not t.startswith("https://")] == []
     assert "getting started" in text.lower()
+
+
+#: What needs a browser, or another function's result, and what no one calls.
+OTHERS = {"InputError", "doubled_branch", "explore"}
+FUNCTIONS = [n for n in asp.__all__ if callable(getattr(asp, n)) and n not in OTHERS]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_example_runs(name, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    mpl.use("agg")
+    examples = doctest.DocTestParser().get_examples(inspect.getdoc(getattr(asp, name)) or "")
+    assert examples
+    namespace: dict[str, object] = {}
+    for example in examples:
+        exec(compile(example.source, f"help({name})", "single"), namespace)

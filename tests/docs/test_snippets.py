@@ -75,7 +75,7 @@ def run_console(snippet, where, capsys, included) -> None:
         program, *arguments = command.arguments
         if program == "asperity" and arguments[0] == "reproduce":
             # Half a minute of work that tests/papers does; here its options are parsed.
-            import asperity.cli.reproduce as module
+            import asperity.cli.papers as module
 
             module.reproduce.make_context("reproduce", arguments[1:])
         elif program == "asperity":

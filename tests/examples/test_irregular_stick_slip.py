@@ -1,5 +1,6 @@
-"""The recipe of irregular stick-slip: run, recorded and measured, it gives back its truth."""
+"""The recipe of irregular stick-slip gives back its truth; a reader of one's own reads its file."""
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -28,3 +29,12 @@ def test_the_recipe_gives_slips_and_friction_along_the_track(tmp_path) -> None:
     level = np.asarray(protocol.slider.law.level(before / 20e-6))
     assert np.corrcoef(events.force_before[1:], level[1:])[0, 1] > 0.8
     assert np.std(events.force_before) == pytest.approx(0.02, rel=0.5)
+
+
+SCRIPT = Path(__file__).parents[2] / "examples" / "lab_reader.py"
+
+
+def test_script_recognises_and_reads_its_own_file(capsys):
+    runpy.run_path(str(SCRIPT))["main"]()
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["recognised: True", "columns: load cell (N), shear gauge (N)"]

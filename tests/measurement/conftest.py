@@ -2,38 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from asperity.recording import Channel, Trace
+from references.spring_slider import spring_slider
 
-A, B, DC, MU0, V0 = 0.010, 0.014, 8e-6, 0.6, 1e-6
-
-
-def spring_slider(velocities, bounds, times, *, a=A, b=B, dc=DC, stiffness=3e3):
-    """Friction of a quasi-static slider with the ageing law, pulled at each velocity in turn.
-
-    Times lie between the bounds; stiffness is in friction per metre.
-    """
-    out = np.empty(times.size)
-
-    def slip_rate(mu, log_theta):
-        return V0 * np.exp((mu - MU0 - b * (np.log(V0 / dc) + log_theta)) / a)
-
-    state = [MU0 + (a - b) * np.log(velocities[0] / V0), np.log(dc / velocities[0])]
-    for velocity, start, end in zip(velocities, bounds[:-1], bounds[1:], strict=True):
-
-        def rates(_, y, pull=velocity):
-            v = slip_rate(*y)
-            return [stiffness * (pull - v), np.exp(-y[1]) - v / dc]
-
-        found = solve_ivp(
-            rates, (start, end), state, method="LSODA", rtol=1e-8, atol=1e-10, dense_output=True
-        )
-        here = (times >= start) & (times <= end)
-        out[here] = found.sol(times[here])[0]
-        state = found.y[:, -1]
-    return out
+LAW = {"A": 0.010, "B": 0.014, "D0": 8e-6, "k": 3e3}
 
 
 def rig_noise(rng, size, rate, white=4e-4, red=3e-4, samples=100):
@@ -65,7 +39,7 @@ def pulled():
         time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
         slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
         slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
-        clean = spring_slider(velocities, bounds, time, **law) + slope * slip
+        clean = spring_slider(velocities, bounds, time, **LAW | law) + slope * slip
         added = rig_noise(rng, time.size, max(rates)) if noise is None else 0.0
         if noise:
             added = noise * rng.standard_normal(time.size)

@@ -15,7 +15,7 @@ import pytest
 from jax.typing import ArrayLike
 
 import asperity as asp
-from asperity.errors import InputError, InputTypeError
+from asperity.errors import InputError, InputTypeError, closest
 from asperity.laws import Law
 from asperity.loads import CyclicLoading, Hold, Programme, Slide
 from asperity.parameters.arguments import FilePath, annotations_of, at_least, of_type, typed
@@ -151,3 +151,36 @@ def test_a_wrong_type_is_bad_input_at_every_door() -> None:
 
 def test_a_range_is_an_array() -> None:
     assert asp.units.to_si(range(3), "velocity", "velocity").tolist() == [0.0, 1.0, 2.0]
+
+
+LAWS = ("amontons", "elasto-plastic", "linker-dieterich", "rice-ruina")
+
+
+def test_input_error_is_a_value_error() -> None:
+    with pytest.raises(ValueError, match="must be > 0"):
+        raise InputError("slider.K must be > 0, got -1 N/m; give a stiffness")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("rice-ruine", "rice-ruina"),
+        ("Amontons", "amontons"),
+        ("elastoplastic", "elasto-plastic"),
+        ("LINKER", "linker-dieterich"),
+    ],
+)
+def test_a_near_name_is_suggested(written: str, meant: str) -> None:
+    assert closest(written, LAWS) == f"did you mean '{meant}'?"
+
+
+def test_names_are_listed_when_none_is_near() -> None:
+    assert closest("qqq", LAWS) == "choose one of " + ", ".join(LAWS)
+
+
+def test_the_suggestion_keeps_the_case_of_the_known_name() -> None:
+    assert closest("d0", ["D0", "W0"]) == "did you mean 'D0'?"
+
+
+def test_any_iterable_will_do() -> None:
+    assert closest("amonton", (name for name in LAWS)) == "did you mean 'amontons'?"

@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.parameters import OUTPUTS
 from asperity.study import SweepPlan, run_sweep
-from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.points import Answers, SweepOutcome
 from asperity.study.solve import SOLVES, SolveKind
 from asperity.study.workers import Workers
 

@@ -1,11 +1,13 @@
-"""Blocks: the same numbers as in one piece, a bounded size, and a way to go on."""
+"""Blocks: the same numbers as in one piece, a bounded size, a way to go on; and long programmes."""
 
 import itertools
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from asperity.loads import Modulate, Programme, Slide, StepLoad
+from asperity.errors import InputError
+from asperity.loads import Hold, Modulate, Programme, RampLoad, RampVelocity, Slide, StepLoad
 from asperity.transients import Trajectory, integrate_blocks, transient
 
 PROGRAMME = Programme(
@@ -82,3 +84,140 @@ def test_a_long_run_starts_at_once_and_holds_one_block(slider) -> None:
     first = list(itertools.islice(blocks, 3))
     assert [len(b.time) for b in first] == [20_000] * 3
     np.testing.assert_array_equal(first[2].time, np.arange(40_000, 60_000) / 10_000)
+
+
+V, W0 = 1e-5, 7.0
+AGES = 1e15
+
+
+@pytest.fixture(scope="module")
+def ringing(physical):
+    """A slider that rings on its asperities at 420 Hz."""
+    return physical.Experiment(M=1.6, lambda_=6.2e-7)
+
+
+def after_a_long_hold(experiment, times: np.ndarray) -> np.ndarray:
+    """States by SciPy: the ringing is resolved until it is weak, then damped by long steps."""
+    known = (lambda t: (W0, 0.0), lambda t: 0.0)
+    start = experiment.steady(V, W0)
+    first = solve_ivp(
+        experiment.rates, (0, 0.3), start, "DOP853", args=known, rtol=1e-11,
+        atol=[1e-18, 1e-13, 1e-18, 1e-18, 1e-18],
+    )  # fmt: skip
+    rest = solve_ivp(
+        experiment.rates, (0.3, times[-1]), first.y[:, -1], "Radau", t_eval=times, args=known,
+        rtol=1e-10, atol=[1e-17, 1e-10, 1e-17, 1e-13, 1e-17],
+    )  # fmt: skip
+    assert rest.success, rest.message
+    return rest.y
+
+
+def test_a_hold_of_four_months_on_elastic_asperities(ringing) -> None:
+    times = np.array([1.0, 1e2, 1e4, 1e6, 1e7])
+    programme = Programme(Hold(1e7), load=W0, velocity=V)
+    found = transient(ringing.slider, programme, sampling=times, inertia=True)
+    expected = after_a_long_hold(ringing, times)
+    np.testing.assert_allclose(found.force, ringing.K * expected[0], rtol=1e-10)
+    np.testing.assert_allclose(found.displacement, expected[2], rtol=0, atol=1e-16)
+    log_age = found.states[:, 3] + np.log(ringing.D0 / ringing.V0)
+    np.testing.assert_allclose(log_age, expected[1], rtol=0, atol=1e-9)
+    # The ringing itself makes 4e9 periods.
+    assert found.provenance["steps"] < 20_000
+    # sqrt(lambda W0 / M) of the tolerated error of F_i/W, in m/s.
+    friction = found.force[-1] / W0
+    error = 1e-11 + 1e-9 * friction
+    assert found.provenance["unresolved_ringing"] == pytest.approx(
+        np.sqrt(6.2e-7 * W0 / 1.6) * error, rel=0.1
+    )
+
+
+def test_a_hold_resumed_without_its_ringing(ringing) -> None:
+    programme = Programme(Hold(1e7), load=W0, velocity=V)
+    options = {"sampling": np.geomspace(1, 1e7, 40), "inertia": True}
+    whole = transient(ringing.slider, programme, **options)
+    first = next(iter(integrate_blocks(ringing.slider, programme, rows=15, **options)))
+    rest = integrate_blocks(ringing.slider, programme, rows=15, resume=first.checkpoint, **options)
+    joined = Trajectory.joined([first, *rest])
+    np.testing.assert_array_equal(joined.time, whole.time)
+    np.testing.assert_allclose(joined.force, whole.force, rtol=1e-9)
+
+
+def test_a_short_motion_resolves_its_ringing(ringing) -> None:
+    programme = Programme(Slide(0.2), Hold(0.5), load=W0, velocity=V)
+    found = transient(ringing.slider, programme, sampling=[0.0], inertia=True)
+    assert found.provenance["unresolved_ringing"] == 0
+
+
+@pytest.mark.parametrize("mass", [0.0, 1.6])
+@pytest.mark.parametrize(
+    ("step", "load", "velocity"),
+    [
+        (Slide(AGES), W0, V),
+        (RampLoad(8.4, AGES), 8.4, V),
+        (RampVelocity(1e-4, AGES), W0, 1e-4),
+    ],
+    ids=["slide", "ramp of the load", "ramp of the velocity"],
+)
+def test_thirty_million_years(physical, mass, step, load, velocity) -> None:
+    """So slow that it is steady sliding at every instant."""
+    experiment = physical.Experiment(M=mass, lambda_=6.2e-7)
+    programme = Programme(step, load=W0, velocity=V)
+    found = transient(experiment.slider, programme, sampling=[0.0, AGES], inertia=mass > 0)
+    assert found.termination is None
+    expected = experiment.K * experiment.steady(velocity, load)[0]
+    assert found.force[-1] == pytest.approx(expected, rel=1e-9)
+    way = 0.5 * (V + velocity) * AGES
+    assert found.displacement[-1] == pytest.approx(way, rel=1e-9)
+
+
+def test_hardly_any_mass_is_like_none(physical) -> None:
+    """Steps far beyond the limit of stability are refused however small their estimated error."""
+    programme = Programme(Slide(1.0), Hold(10.0), load=W0, velocity=V)
+    times = np.linspace(1.1, 11, 10)
+    forces = [
+        transient(
+            physical.Experiment(M=mass, lambda_=6.2e-7).slider, programme, sampling=times,
+            inertia=mass > 0,
+        ).force
+        for mass in (0.0, 1e-12)
+    ]  # fmt: skip
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-7)
+
+
+def test_an_end_out_of_reach_is_an_outcome(ringing) -> None:
+    programme = Programme(Modulate(AGES, 0.2, 120.0), load=W0, velocity=V)
+    found = transient(ringing.slider, programme, sampling=[0.0, 1.0], inertia=True)
+    assert found.termination.kind == "too many steps"
+    assert 0 < found.termination.time < AGES
+    assert "more to the end" in found.stopped
+    assert found.time[-1] <= found.termination.time
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.9 * AGES], ids=["grazing", "rising"])
+def test_the_loss_of_contact_is_not_searched_for_ages(ringing, rise) -> None:
+    """A modulation by 100 % grazes zero between the instants of any search."""
+    epsilon, phase = (1.5, 0.0) if rise else (1.0, 0.3)
+    programme = Programme(
+        Slide(0.1), Modulate(AGES, epsilon, 120.0, rise=rise, phase=phase), load=W0, velocity=V
+    )
+    found = transient(ringing.slider, programme, sampling=[0.0], inertia=True)
+    assert found.termination.kind in ("too many steps", "loss of contact", "reversal")
+
+
+def test_more_rows_than_memory_holds_are_refused_at_once(ringing) -> None:
+    programme = Programme(Slide(1.0), load=W0, velocity=V)
+    for rate in 10.0 ** np.random.default_rng(3).uniform(12, 308, 20):
+        with pytest.raises(InputError, match="sampling must fit into the free space"):
+            transient(ringing.slider, programme, sampling=float(rate))
+
+
+def test_a_limit_of_steps_is_kept(ringing) -> None:
+    programme = Programme(Slide(0.2), Modulate(2.0, 0.2, 120.0), load=W0, velocity=V)
+    options = {"sampling": [0.0], "inertia": True}
+    whole = transient(ringing.slider, programme, **options)
+    assert whole.termination is None
+    few = transient(ringing.slider, programme, **options, most_steps=3000)
+    assert few.termination.kind == "too many steps"
+    assert 3000 <= few.provenance["steps"] < whole.provenance["steps"]
+    many = transient(ringing.slider, programme, **options, most_steps=whole.provenance["steps"])
+    assert many.termination is None

@@ -4,28 +4,27 @@
 modulation do the micro-contacts bear? No module of this room depends on friction.
 """
 
-from asperity.air.inverse import InverseResult, gap, patch_radius
-from asperity.air.layer import AirLayer, bessel_ratio, shear_viscosity_ratio
-from asperity.air.normal_contact import NormalContact, mindlin_length_ratio, normal_length
+from asperity._lazy import public_names
+from asperity.air.inverse import (
+    InverseResult as InverseResult,
+    gap as gap,
+    patch_radius as patch_radius,
+)
+from asperity.air.layer import (
+    AirLayer as AirLayer,
+    bessel_ratio as bessel_ratio,
+    shear_viscosity_ratio as shear_viscosity_ratio,
+)
+from asperity.air.normal_contact import (
+    NormalContact as NormalContact,
+    mindlin_length_ratio as mindlin_length_ratio,
+    normal_length as normal_length,
+)
 from asperity.air.transfer import (
-    air_vacuum_ratio,
-    effective_modulation,
-    modulation_phase,
-    transfer_function,
+    air_vacuum_ratio as air_vacuum_ratio,
+    effective_modulation as effective_modulation,
+    modulation_phase as modulation_phase,
+    transfer_function as transfer_function,
 )
 
-__all__ = [
-    "AirLayer",
-    "InverseResult",
-    "NormalContact",
-    "air_vacuum_ratio",
-    "bessel_ratio",
-    "effective_modulation",
-    "gap",
-    "mindlin_length_ratio",
-    "modulation_phase",
-    "normal_length",
-    "patch_radius",
-    "shear_viscosity_ratio",
-    "transfer_function",
-]
+__all__ = public_names(globals())

@@ -14,11 +14,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.air.layer import AirLayer
 from asperity.air.normal_contact import as_real
 from asperity.air.transfer import effective_modulation
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
@@ -166,9 +166,7 @@ def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _extrema(
-    function: Callable[[float], float], u: NDArray[np.float64], scan: NDArray[np.float64]
-) -> list[float]:
+def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[float]:
     """Abscissae of the interior extrema, each refined between the scan's points around it."""
     from scipy.optimize import minimize_scalar
 
@@ -189,9 +187,7 @@ def _extrema(
     return result
 
 
-def _roots(
-    function: Callable[[float], float], knots: NDArray[np.float64], target: float
-) -> list[float]:
+def _roots(function: Callable[[float], float], knots: Float, target: float) -> list[float]:
     """One root for every monotone piece between `knots` that passes through `target`."""
     from scipy.optimize import brentq
 

@@ -16,9 +16,10 @@ from math import factorial
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from asperity.air.normal_contact import Real, as_real, check_shapes
+from asperity.arrays import Complex, Float
 from asperity.errors import InputError
 from asperity.parameters.arguments import one_of
 
@@ -47,20 +48,20 @@ def _asymptotic_coefficients() -> tuple[float, ...]:
     return tuple(c)
 
 
-def _ratio_by_fraction(s: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _ratio_by_fraction(s: Float) -> Complex:
     # With (gamma R)^2 = -i q every level keeps both parts positive: no digit cancels, and the
     # (tiny) elastic part of a nearly viscous layer is as accurate as its damping.
     q = 1j * s**2
     tail = np.full(s.shape, 2.0 * (_LEVELS + 1), dtype=complex)
     for k in range(_LEVELS, 1, -1):
         tail = 2.0 * k + q / tail
-    ratio: NDArray[np.complex128] = -q / (2 * tail + q)
+    ratio: Complex = -q / (2 * tail + q)
     return ratio
 
 
-def _ratio_by_asymptotics(s: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _ratio_by_asymptotics(s: Float) -> Complex:
     u = np.exp(-0.25j * np.pi) / s
-    ratio: NDArray[np.complex128] = -1 + 2 * u * np.polyval(_asymptotic_coefficients()[::-1], u)
+    ratio: Complex = -1 + 2 * u * np.polyval(_asymptotic_coefficients()[::-1], u)
     return ratio
 
 
@@ -222,7 +223,7 @@ class AirLayer:
         return -self.P0 / self.h0 * _profile(rho, squeeze)[()]
 
 
-def _profile(rho: NDArray[np.float64], s: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _profile(rho: Float, s: Float) -> Complex:
     """1 - J0(rho z)/J0(z) at z = (1 - i)/sqrt(2) s."""
     from scipy.special import jve
 

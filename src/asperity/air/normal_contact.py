@@ -13,13 +13,14 @@ from math import factorial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.parameters import obeying
 
 #: A number or an array of numbers, in SI.
-Real: TypeAlias = float | NDArray[np.float64]
+Real: TypeAlias = float | Float
 
 #: Powers of (beta/2)^2 kept in I0(beta) - 1 for beta <= 1; the first one dropped is below 1e-17.
 _I0_SERIES = (*(1.0 / factorial(k) ** 2 for k in range(10, 0, -1)), 0.0)
@@ -95,7 +96,7 @@ class NormalContact:
         closure: Real = self.lambda_z * np.log(relative)
         return closure
 
-    def load_harmonics(self, amplitude: ArrayLike, count: int = 4) -> NDArray[np.float64]:
+    def load_harmonics(self, amplitude: ArrayLike, count: int = 4) -> Float:
         """Harmonics of W/W0 when the gap moves sinusoidally, without linearising.
 
         With h = h_mean - a cos(wt) and a mean load that stays W0, the law gives exactly
@@ -133,7 +134,7 @@ class NormalContact:
         rise: Real = self.lambda_z * np.where(beta < 1, small, np.log(ive(0, beta)) + beta)[()]
         return rise
 
-    def closure_harmonics(self, epsilon: ArrayLike, count: int = 4) -> NDArray[np.float64]:
+    def closure_harmonics(self, epsilon: ArrayLike, count: int = 4) -> Float:
         """Harmonics (m) of the closure when the contacts' load is sinusoidal.
 
         For W = W0 (1 + eps cos wt) and rho = eps/(1 + sqrt(1 - eps^2)),

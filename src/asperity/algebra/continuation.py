@@ -18,8 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from asperity.arrays import Bool, Float, Index
 
 #: Factors on the length of a step after a failure, and after many corrector iterations.
 _SHRINKAGE, _SLOWDOWN = 0.4, 0.7
@@ -75,7 +74,7 @@ class Attempt(NamedTuple):
     """
 
     next: Any
-    converged: NDArray[np.bool_]
+    converged: Bool
     iterations: Float
     turn: Float
     miss: Float
@@ -119,15 +118,15 @@ class Curves(ABC):
 
     @abstractmethod
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterable[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterable[tuple[Index, Attempt]]:
         """Try a step on each of the curves `rows`, in any number of parts.
 
         `length` and `failures` are of all curves.
         """
 
     @abstractmethod
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Move the curves `rows` to the entries `chosen` of an attempt.
 
         Returns
@@ -138,7 +137,7 @@ class Curves(ABC):
 
 
 def follow(
-    curves: Curves, length: Float, *, rows: Indices | None = None, most: int | None = None
+    curves: Curves, length: Float, *, rows: Index | None = None, most: int | None = None
 ) -> list[str]:
     """Follow curves until each has ended.
 

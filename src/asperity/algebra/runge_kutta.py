@@ -17,9 +17,8 @@ import numpy as np
 from jax.tree_util import register_static
 from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss, legvander
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float
 
 
 class ExplicitTableau(NamedTuple):

@@ -14,7 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
+
+from asperity.arrays import Float
 
 #: Entries [row][column] of a small matrix, each an array over the operating points.
 Matrix = list[list[Array]]
@@ -197,7 +198,7 @@ def product(a: Array, b: Array) -> Array:
     return (a[:, :, None] * b[None]).sum(1)
 
 
-def scaled_product(maps: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def scaled_product(maps: Float) -> tuple[Float, Float]:
     """Product of the maps of successive intervals, the last one leftmost, kept near unit size.
 
     Parameters
@@ -225,8 +226,8 @@ def scaled_product(maps: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
 
 
 def _scaled_products(
-    factors: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    factors: Float,
+) -> tuple[Float, Float]:
     """Products over the first axis of (count, n, n, ...), and the logarithms of their scales."""
     done, log_scale = factors[0], np.zeros(factors.shape[3:])
     for factor in factors[1:]:

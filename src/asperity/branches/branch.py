@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Complex, Float
 from asperity.branches.parameters import fixed_as_text
 from asperity.orbit.floquet import from_logs
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from asperity.branches.steps import BranchFollower, BranchOrbit
     from asperity.orbit.mesh.arclength import ContinuationPoint
     from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Bifurcation:
     value: float
     error: float
     mean_friction: float
-    log_multipliers: NDArray[np.complex128]
+    log_multipliers: Complex
     frequency: float
     unstable_before: int
     unstable_after: int
@@ -64,7 +63,7 @@ class Bifurcation:
     critical: BranchOrbit = field(repr=False)
 
     @property
-    def multipliers(self) -> NDArray[np.complex128]:
+    def multipliers(self) -> Complex:
         """Floquet multipliers by falling modulus."""
         return from_logs(self.log_multipliers)
 
@@ -139,8 +138,8 @@ class Branch(Displayed):
     unit: str
     parameter: Float
     mean_friction: Float
-    harmonics: NDArray[np.complex128]
-    log_multipliers: NDArray[np.complex128]
+    harmonics: Complex
+    log_multipliers: Complex
     periods: int
     bifurcations: tuple[Bifurcation, ...]
     result: str
@@ -173,7 +172,7 @@ class Branch(Displayed):
         return np.abs(self.harmonics[:, 2 * self.periods - 1])
 
     @property
-    def multipliers(self) -> NDArray[np.complex128]:
+    def multipliers(self) -> Complex:
         """Floquet multipliers; beyond the range of doubles they are inf or 0."""
         return from_logs(self.log_multipliers)
 
@@ -183,7 +182,7 @@ class Branch(Displayed):
         return np.asarray((self.log_multipliers.real > 0).sum(1))
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Bool:
         """Whether a small perturbation dies out."""
         return np.asarray(self.unstable == 0)
 

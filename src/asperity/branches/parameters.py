@@ -14,7 +14,6 @@ import numpy as np
 
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law
-from asperity.loads import Modulation
 from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.search import find_orbits
@@ -26,6 +25,9 @@ from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
 _LOGARITHMIC = 2.0
+
+#: Arguments that say what the operating point is.
+_POINT = ("velocity", "epsilon", "frequency", "modulation", "inertia", "radiation_damping")
 
 
 @dataclass(frozen=True)
@@ -138,56 +140,36 @@ def _end(parameter: Parameter, value: Any, field: str) -> float:
     return checked
 
 
-def start_of(slider: Slider, parameter: str, span: Any, field: str = "span") -> dict[str, Any]:
-    """The start of a span under the name of its parameter.
-
-    Raises
-    ------
-    InputError
-        If there is no such parameter or a span is not a pair.
-    """
-    return {continued_name(type(slider.law), parameter): span[0]}
-
-
-def one_problem(
-    slider: Slider,
-    moving: dict[str, Any],
-    *,
-    velocity: Any,
-    epsilon: Any,
-    frequency: Any,
-    modulation: Modulation | None,
-    inertia: bool,
-    radiation_damping: Any,
-) -> Problem:
+def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Problem:
     """Equations and load of one operating point, parameters of shape (1,).
 
-    `moving` has values for those of velocity, epsilon, frequency and damping that are continued.
+    Parameters
+    ----------
+    arguments : dict
+        Those of `continuation`, or more.
+    spans : dict
+        Spans by the name of the parameter: velocity, epsilon, frequency and damping that are
+        continued stand at the start of theirs.
 
     Raises
     ------
     InputError
-        If a value breaks its rule, one is missing, or there are arrays.
+        If a value breaks its rule, one is missing, there are arrays, or there is no parameter of a
+        name.
     """
-    given = {
-        "velocity": moving.get("V", velocity),
-        "frequency": moving.get("frequency", frequency),
-    }
-    for name, value in given.items():
-        if value is None:
+    slider: Slider = arguments["slider"]
+    point = {name: arguments[name] for name in _POINT}
+    moving = {continued_name(type(slider.law), name): span[0] for name, span in spans.items()}
+    for name, symbol in (("velocity", "V"), ("frequency", "frequency")):
+        point[name] = moving.get(symbol, point[name])
+        if point[name] is None:
             raise InputError(name, "be given", "None", "or continue in it")
     rule, got = "depend on the velocity to have a branch with bifurcations", slider.law.name
     require(slider.law.rate_dependent, "law", rule, got, "its force is mu W for all parameters")
-    amplitude = moving.get("epsilon", epsilon)
-    problem = checked_problem(
-        slider,
-        **given,
-        epsilon=amplitude if modulation is None else epsilon,
-        modulation=modulation,
-        inertia=inertia,
-        radiation_damping=moving.get("eta", radiation_damping),
-    )
-    flat, shape = flatten(problem)
+    if point["modulation"] is None:
+        point["epsilon"] = moving.get("epsilon", point["epsilon"])
+    point["radiation_damping"] = moving.get("eta", point["radiation_damping"])
+    flat, shape = flatten(checked_problem(slider, **point))
     rule, got = "be numbers for a continuation", f"arrays of shape {shape}"
     require(shape in ((), (1,)), "parameters", rule, got, "follow one operating point at a time")
     return flat

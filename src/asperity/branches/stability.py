@@ -18,15 +18,8 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from asperity.algebra.continuation import (
-    STEPS,
-    STUCK,
-    Attempt,
-    Curves,
-    Indices,
-    StepControl,
-    follow,
-)
+from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
+from asperity.arrays import Bool, Complex, Float, Index
 from asperity.branches.continuation import INTERVALS
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -35,7 +28,6 @@ from asperity.branches.parameters import (
     line_through,
     moving_parameter,
     one_problem,
-    start_of,
     starting_orbit,
 )
 from asperity.branches.steps import (
@@ -59,7 +51,6 @@ from asperity.slider.problem import Problem
 if TYPE_CHECKING:
     import xarray
 
-Float = NDArray[np.float64]
 
 #: First step along a boundary, as a share of the span.
 _FIRST = 0.005
@@ -188,8 +179,8 @@ class BoundaryHalf(Curves):
         return "kind" if why == STUCK and self._other_kind else why
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """The point of the boundary across its direction, a step ahead."""
         step = float(length[0])
         guess = self.here.at + step * self.direction
@@ -204,7 +195,7 @@ class BoundaryHalf(Curves):
         good = None if self._other_kind else neighbour
         yield rows, Attempt.of_one(good, step, turn=turn, miss=miss)
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Keep the point; a boundary ends at the edge of the rectangle and where it closes."""
         self.report()
         before, neighbour = self.here, attempt.next
@@ -319,8 +310,8 @@ class BoundaryCurve:
     x: Float
     y: Float
     frequency: Float
-    log_multipliers: NDArray[np.complex128]
-    bounds_stability: NDArray[np.bool_]
+    log_multipliers: Complex
+    bounds_stability: Bool
     result: tuple[str, str]
 
 
@@ -447,16 +438,7 @@ def stability_boundary(
     Without modulation the curves end at the closed forms of linear stability: K = Kc for a
     slider without inertia, critical frequency (V/D0) sqrt((B - A)/A) for the ageing law.
     """
-    problem = one_problem(
-        slider,
-        start_of(slider, x, x_span, "x_span") | start_of(slider, y, y_span, "y_span"),
-        velocity=velocity,
-        epsilon=epsilon,
-        frequency=frequency,
-        modulation=modulation,
-        inertia=inertia,
-        radiation_damping=radiation_damping,
-    )
+    problem = one_problem(locals(), {x: x_span, y: y_span})
     parameters = (
         moving_parameter(problem, x, x_span, "x_span"),
         moving_parameter(problem, y, y_span, "y_span"),

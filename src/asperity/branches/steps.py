@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
-from asperity.algebra.continuation import STEPS, Attempt, Curves, Indices, StepControl, follow
+from asperity.algebra.continuation import STEPS, Attempt, Curves, StepControl, follow
+from asperity.arrays import Complex, Float, Index
 from asperity.orbit.floquet import log_multipliers
 from asperity.orbit.mesh.arclength import (
     ArclengthStep,
@@ -31,8 +32,6 @@ from asperity.orbit.mesh.arclength import (
 from asperity.orbit.mesh.equations import read_orbit
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change, remeshed
-
-Float = NDArray[np.float64]
 
 #: A step is accepted if Newton's last change is below this; the error is about its square.
 _CONVERGED = 1e-6
@@ -61,8 +60,8 @@ class BranchOrbit(NamedTuple):
     t: float
     direction: float
     mean_friction: float
-    harmonics: NDArray[np.complex128]
-    logs: NDArray[np.complex128]
+    harmonics: Complex
+    logs: Complex
     point: ContinuationPoint
 
     @property
@@ -201,14 +200,14 @@ class ParameterBranch(Curves):
         return np.minimum(length, _LARGEST_PART / np.maximum(abs(self.here.direction), 1e-12))
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """One step of the arclength."""
         following, step = self.follower.step(self.here.point, float(length[0]))
         iterations, turn = float(step.iterations[0]), float(step.turn[0])
         yield rows, Attempt.of_one(following, float(length[0]), iterations=iterations, turn=turn)
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Visit the new orbit; the branch ends outside the span."""
         following = attempt.next
         self.visit(self.here, float(attempt.length[0]), following)

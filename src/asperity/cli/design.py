@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,7 +48,7 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
     """
     from asperity import inference
     from asperity.cli.progress import bar
-    from asperity.outputs import output_file, written_file
+    from asperity.outputs import output_file, write_table, written_file
 
     target = None
     if table is not None:
@@ -59,13 +58,8 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
         result = inference.design(checked, simulate=simulate, progress=update)
     if target is not None:
         rows = result.rows()
-        with (
-            written_file(target) as fresh,
-            fresh.open("w", encoding="utf-8", newline="") as stream,
-        ):
-            writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        with written_file(target) as fresh:
+            write_table(fresh, rows[0], [row.values() for row in rows])
     output.answer(result.record, lambda: _sections(result), checked.truth.law.name)
     return 0
 

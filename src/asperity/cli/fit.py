@@ -204,12 +204,10 @@ def fit(
     laws: tuple[str, ...],
     fields: dict[str, Any],
     posterior: bool,
-    chains: int,
-    draws: int,
-    seed: int,
     out: Path | None,
     report: Path | None,
     output: Output,
+    **sampling: int,
 ) -> int:
     """Fit a friction law to recordings, to tables of readings, or to holds.
 
@@ -225,7 +223,6 @@ def fit(
 
     one, advice = len(laws) < 2 and "all" not in laws, "compare several: asperity compare"
     require(one, "--law", "be one law for a fit", ",".join(laws), advice)
-    sampling = {"chains": chains, "draws": draws, "seed": seed}
     _check_sampling(posterior, sampling, out)
     if report is not None:
         require_folder(report, "--report")
@@ -318,7 +315,7 @@ def compare(
     """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
     from asperity.inference.answers import answer_comparison
-    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.report import comparison_report
     from asperity.questions.fit import Comparison
 

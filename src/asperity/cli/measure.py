@@ -58,8 +58,12 @@ class FileRows:
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; one row with the reason if it cannot be measured."""
-        from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
-        from asperity.measurement.conditions import MACHINE_FIELDS
+        from asperity.measurement.campaign import (
+            MACHINE_FIELDS,
+            failed_row,
+            modulated_rows,
+            sliding_rows,
+        )
         from asperity.measurement.from_file import measured_parts
         from asperity.measurement.stick_slip.catalogue import stick_slip_row
         from asperity.measurement.stick_slip.measure import StickSlipMeasurement
@@ -320,7 +324,7 @@ def _file_rows(
     recordings: tuple[Path, ...], source: Source, question: Question, conditions: str | None
 ) -> FileRows:
     """What measures each file, its conditions checked before anything is read."""
-    from asperity.measurement.conditions import MACHINE_FIELDS, conditions_of
+    from asperity.measurement.campaign import MACHINE_FIELDS, conditions_of
 
     if conditions is None:
         return FileRows(source, question)
@@ -459,7 +463,7 @@ def _campaign(
 
 def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """What ``--set`` says of the machine, by the fields of the question."""
-    from asperity.measurement.conditions import MACHINE_FIELDS
+    from asperity.measurement.campaign import MACHINE_FIELDS
 
     rule, like = f"name one of {', '.join(MACHINE_FIELDS)}", 'write it like --set "K=168 N/m"'
     for name in given if strict else ():

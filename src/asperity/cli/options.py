@@ -267,7 +267,7 @@ def parameter_name(name: str) -> str:
     if context is None or context.meta.get(CHOSEN_NAMES, NAMES[0]) == NAMES[0]:
         return name
     from asperity.laws import get_law
-    from asperity.parameters.names import parameter_named
+    from asperity.parameters.table import parameter_named
 
     law = context.params.get("law") or next(iter(context.params.get("laws") or ()), "all")
     return parameter_named(name, None if law == "all" else get_law(law))

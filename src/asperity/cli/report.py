@@ -63,7 +63,7 @@ class Output:
         from asperity.outputs import json
         from asperity.outputs.tables import as_text
         from asperity.parameters import in_names
-        from asperity.parameters.names import plain_names
+        from asperity.parameters.table import plain_names
 
         known = get_law(law) if law and self.names != NAMES[0] else None
         if self.as_json:

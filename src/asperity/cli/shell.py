@@ -56,7 +56,7 @@ class Shell(click.Group):
             if ctx.meta.get(CHOSEN_NAMES, "friction") == "friction":
                 raise
             from asperity.laws import registered
-            from asperity.parameters.names import in_names
+            from asperity.parameters.table import in_names
 
             text = str(error)
             for law in registered().values():

@@ -84,21 +84,17 @@ def sweep(context: click.Context) -> None:
 @option("--out", "STORE", "Folder of the store, like results.zarr.", Path)
 @option("--workers", "N", "Processes of this machine; one a core by default.", Count())
 @option("--cluster", "N", "A Dask cluster of N workers on this machine, instead.", Count())
-@option("--scheduler", "ADDRESS", "A Dask scheduler that runs, instead.")
-@switch("--extend", "The plan has more rows behind those of the store.")
+@option("--scheduler address", "ADDRESS", "A Dask scheduler that runs, instead.")
+@switch("--extend extend_store", "The plan has more rows behind those of the store.")
 @switch("--retry-failed", "Solve chunks with failed points again.")
 @switch("--dry-run", "Only say what it would take, from a sample.")
 @output_options()
 def run(
     plan: Path,
     out: Path | None,
-    workers: int | None,
-    cluster: int | None,
-    scheduler: str | None,
-    extend: bool,
-    retry_failed: bool,
     dry_run: bool,
     output: Output,
+    **options: Any,
 ) -> int:
     """Run a plan; "asperity sweep PLAN" is the same."""
     if dry_run:
@@ -124,13 +120,9 @@ def run(
             result = run_sweep(
                 plan,
                 out,
-                workers=workers,
-                cluster=cluster,
-                address=scheduler,
-                extend_store=extend,
-                retry_failed=retry_failed,
                 progress=progress,
                 log=lambda text: tqdm.write(text, file=sys.stderr),
+                **options,
             )
     except KeyboardInterrupt:
         raise KeyboardInterrupt(

@@ -1,53 +1,41 @@
 """Experiments on a simulated slider, recorded by the virtual tribometer and measured."""
 
+from asperity._lazy import public_names
 from asperity.experiment.amplitudes import (
-    AmplitudeMotion,
-    AmplitudePoint,
-    AmplitudeSeries,
-    amplitude_motion,
-    amplitude_series,
+    AmplitudeMotion as AmplitudeMotion,
+    AmplitudePoint as AmplitudePoint,
+    AmplitudeSeries as AmplitudeSeries,
+    Exciter as Exciter,
+    amplitude_motion as amplitude_motion,
+    amplitude_series as amplitude_series,
 )
-from asperity.experiment.exciter import Exciter
-from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
+from asperity.experiment.loading import (
+    ElasticLength as ElasticLength,
+    elastic_length as elastic_length,
+    loading_recording as loading_recording,
+)
 from asperity.experiment.memory import (
-    Holds,
-    VelocityStepResponse,
-    hold_response,
-    step_response,
+    Holds as Holds,
+    VelocityStepResponse as VelocityStepResponse,
+    hold_response as hold_response,
+    step_response as step_response,
 )
-from asperity.experiment.motion import DISPLACEMENT, DRIVE, FORCE, LOAD
+from asperity.experiment.motion import (
+    DISPLACEMENT as DISPLACEMENT,
+    DRIVE as DRIVE,
+    FORCE as FORCE,
+    LOAD as LOAD,
+)
 from asperity.experiment.recipes import (
-    SlideHoldSlide,
-    VelocitySteps,
-    slide_hold_slide,
-    velocity_steps,
+    SlideHoldSlide as SlideHoldSlide,
+    VelocitySteps as VelocitySteps,
+    slide_hold_slide as slide_hold_slide,
+    velocity_steps as velocity_steps,
 )
-from asperity.experiment.stick_slip import StickSlip, stick_slip_response
-from asperity.tribometer.tribometer import channel_gain
+from asperity.experiment.stick_slip import (
+    StickSlip as StickSlip,
+    stick_slip_response as stick_slip_response,
+)
+from asperity.tribometer.tribometer import channel_gain as channel_gain
 
-__all__ = [
-    "DISPLACEMENT",
-    "DRIVE",
-    "FORCE",
-    "LOAD",
-    "AmplitudeMotion",
-    "AmplitudePoint",
-    "AmplitudeSeries",
-    "ElasticLength",
-    "Exciter",
-    "Holds",
-    "SlideHoldSlide",
-    "StickSlip",
-    "VelocityStepResponse",
-    "VelocitySteps",
-    "amplitude_motion",
-    "amplitude_series",
-    "channel_gain",
-    "elastic_length",
-    "hold_response",
-    "loading_recording",
-    "slide_hold_slide",
-    "step_response",
-    "stick_slip_response",
-    "velocity_steps",
-]
+__all__ = public_names(globals())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.arrays import Float
 from asperity.laws import Law
 from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters
@@ -18,8 +19,6 @@ from asperity.slider.named import slider_values
 
 if TYPE_CHECKING:
     import xarray
-
-Float = NDArray[np.float64]
 
 
 def shaped(array: Any, shape: tuple[int, ...]) -> Any:

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
@@ -21,8 +21,6 @@ from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
 from asperity.units import to_si
-
-Array = NDArray[np.float64]
 
 #: Share of each branch that is left out at both ends, because filters smooth the turning points.
 _TRIM = 0.1
@@ -48,7 +46,7 @@ class ElasticLength:
 
     lambda_: float
     uncertainty: float
-    cycles: Array
+    cycles: Float
     stiffness: float
 
 
@@ -155,7 +153,7 @@ def elastic_length(
     return ElasticLength(float(pairs.mean()), doubt, pairs, float(1 / np.mean(slopes)))
 
 
-def _turning_points(force: Array) -> list[int]:
+def _turning_points(force: Float) -> list[int]:
     """First sample, every turning point of the force, and last sample."""
     reach = _TURN * float(np.ptp(force))
     turns, best, rising = [0], 0, None

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.errors import InputError, require
 from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.laws import Law
@@ -31,8 +32,6 @@ from asperity.transients.hold_and_step import (
     settle,
     step,
 )
-
-Float = NDArray[np.float64]
 
 #: Velocity (m/s), and ratio to the drive's, that a slider without inertia reaches by runaway only.
 _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
@@ -69,7 +68,7 @@ class _Memory(Labelled):
     slip: Float = measured("m", "slip to the extremum")
     settling_distance: Float = measured("m", f"way of the drive {_WITHIN}")
     settling_slip: Float = measured("m", f"slip {_WITHIN}")
-    stable: NDArray[np.bool_] = measured("1", "whether steady sliding is stable")
+    stable: Bool = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
     slider: Slider
     velocity: Float = measured("m/s")
@@ -133,7 +132,7 @@ class Holds(_Memory):
     velocity_at_maximum: Float
     states: Float
     states_at_maximum: Float
-    has_maximum: NDArray[np.bool_]
+    has_maximum: Bool
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -172,7 +171,7 @@ class VelocityStepResponse(_Memory):
     direct: Float = measured("1", "extremum less F/W0 before the step")
     evolution: Float = measured("1", "extremum less F/W0 in steady sliding after the step")
     states_at_extremum: Float
-    has_extremum: NDArray[np.bool_]
+    has_extremum: Bool
 
 
 @typed
@@ -340,15 +339,13 @@ def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float)
     return jax.tree.map(lambda *a: np.concatenate(a), *parts)
 
 
-def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
+def _stable(slider: Slider, V: Float) -> Bool:
     """Whether a small disturbance of steady sliding dies out."""
     run = lambda slider, V, *_: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
     return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
 
 
-def _settling(
-    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_]
-) -> dict[str, Any]:
+def _settling(after: SettlingDistance | None, end: Any, stable: Bool) -> dict[str, Any]:
     """Columns of what follows the extremum."""
     none = np.full(len(stable), np.nan)
     ends = end if after is None else after.end

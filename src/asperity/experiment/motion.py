@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.loads import Programme
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.transients import Trajectory, integrate_blocks
 from asperity.tribometer.tribometer import Tribometer
-
-Array = NDArray[np.float64]
 
 #: Channels that a tribometer may have of a simulated slider; the drive is the load point.
 FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
@@ -34,7 +32,7 @@ def motion_rate(tribometer: Tribometer) -> float:
 
 def signals(
     slider: Slider, programme: Programme, rate: float, names: tuple[str, ...], **options: Any
-) -> tuple[dict[str, Array], Trajectory]:
+) -> tuple[dict[str, Float], Trajectory]:
     """Time and selected columns of a transient.
 
     Parameters
@@ -52,7 +50,7 @@ def signals(
     (dict of str to array, Trajectory)
         The columns with ``time``, and the last block, which has the reason of the end.
     """
-    kept: dict[str, list[Array]] = {name: [] for name in ("time", *names)}
+    kept: dict[str, list[Float]] = {name: [] for name in ("time", *names)}
     for block in integrate_blocks(slider, programme, sampling=rate, **options):
         for name, parts in kept.items():
             parts.append(getattr(block, name))

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.errors import require
 from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.parameters import MACHINE, obeying
@@ -18,8 +19,6 @@ from asperity.slider import Slider, equation_of_motion
 from asperity.slider.problem import flatten
 from asperity.theory.memory import steady_growth
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -65,8 +64,8 @@ class StickSlip(Labelled, Drawn):
     slip_duration: Float = measured("s", "time of a period in which the force falls")
     peak_velocity: Float = measured("m/s", "largest velocity of the slider")
     slips: NDArray[np.int_] = measured("1", "slips in a period; 0 without stick-slip")
-    steady: NDArray[np.bool_] = measured("1", "whether the motion comes to steady sliding")
-    stable: NDArray[np.bool_] = measured("1", "whether steady sliding is stable")
+    steady: Bool = measured("1", "whether the motion comes to steady sliding")
+    stable: Bool = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
     slider: Slider
     cycle: LimitCycle | None = None

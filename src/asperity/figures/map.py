@@ -19,6 +19,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from asperity.arrays import Float
 from asperity.figures.style import new_figure
 from asperity.parameters import DRIVE, INTERFACE, MACHINE, OUTPUTS
 from asperity.units import KINDS
@@ -26,7 +27,6 @@ from asperity.units import KINDS
 if TYPE_CHECKING:
     import xarray
 
-Float = NDArray[np.float64]
 
 #: Line of each kind of bifurcation.
 KIND_LINES: dict[str, Any] = {

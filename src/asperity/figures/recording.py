@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
+from asperity.arrays import Float
 from asperity.figures.style import (
     ELASTO_PLASTIC,
     GREY,
@@ -23,12 +24,9 @@ from asperity.measurement.record import mean_cycle, residual_spectrum
 from asperity.recording.extremes import extremes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
 
-    Array = NDArray[np.float64]
 
 #: Number of blocks of a long curve, about the number of pixels.
 _COLUMNS = 1200
@@ -179,7 +177,7 @@ def _since(start: float) -> str:
     return f"time $-$ {start:.10g} s (s)" if start else "time (s)"
 
 
-def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
+def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> None:
     """A curve; a long curve is reduced to the extremes of blocks of its samples.
 
     Nothing is drawn between samples that are far apart.
@@ -196,7 +194,7 @@ def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> 
     axis.yaxis.set_major_formatter(formatter)
 
 
-def _gaps(time: Array) -> list[int]:
+def _gaps(time: Float) -> list[int]:
     """Samples that follow a visible gap, a step far longer than the steps around it."""
     steps = np.diff(time)
     if steps.size < 3:

@@ -1,6 +1,5 @@
 """The report folder of a fit or a comparison: page, JSON, materials and posterior draws."""
 
-from asperity.fit_report.comparison import write_comparison
-from asperity.fit_report.folder import write_report
+from asperity.fit_report.folder import write_comparison, write_report
 
 __all__ = ["write_comparison", "write_report"]

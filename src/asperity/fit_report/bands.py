@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.inference import Fit, LockInTable, Posterior
 from asperity.inference.tables.term import LockInTerm
 from asperity.orbit import Outcome
-
-Float = NDArray[np.float64]
 
 #: Number of amplitudes of a curve, and of parameter sets of a band.
 _AMPLITUDES, _SETS = 24, 100
@@ -46,7 +44,7 @@ class Series(NamedTuple):
     """
 
     label: str
-    rows: NDArray[np.bool_]
+    rows: Bool
     bands: dict[str, Band]
 
 
@@ -96,7 +94,7 @@ def bands_of(
     return series
 
 
-def _series(table: LockInTable) -> list[tuple[str, NDArray[np.bool_]]]:
+def _series(table: LockInTable) -> list[tuple[str, Bool]]:
     """Labels and rows of series, by everything but the amplitude."""
     names = [n for n in ("V", "frequency", *table.points) if n != "epsilon"]
     names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(table.points[n]).size > 1]

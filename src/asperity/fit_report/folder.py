@@ -1,4 +1,4 @@
-"""The folder of a fit: report.html, fit.json, material.toml, and posterior.nc if it was sampled.
+"""The folder of a fit or of a comparison: report.html, and the same as JSON and materials.
 
 A page is one file, with nothing to fetch.
 """
@@ -13,14 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from asperity._version import __version__
-from asperity.errors import require
-from asperity.fit_report.bands import bands_of
-from asperity.fit_report.pictures import data_figure, residual_figure, run_figure, svg
-from asperity.inference import Fit, Posterior
+from asperity.arrays import Float
+from asperity.errors import InputError, require
+from asperity.fit_report.bands import Series, bands_of
+from asperity.fit_report.pictures import data_figure, laws_figure, residual_figure, run_figure, svg
+from asperity.inference import Fit, LockInTable, Posterior
+from asperity.inference.comparison.compare import Comparison, comparison_record
 from asperity.inference.fitting.result import fit_record
-from asperity.inference.report import fit_report, posterior_sections
+from asperity.inference.report import comparison_report, estimates, fit_report, posterior_sections
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
@@ -193,3 +197,110 @@ def provenance(fit: Fit) -> str:
         f"<p>asperity {__version__}, {made}; data: {escape(names)}; numbers that were fixed, in "
         f"SI:</p>{html_table(('', 'value'), fixed)}<p>The law:</p>{sources}"
     )
+
+
+#: Columns of panels that are legible in half the width of the page.
+_MOST_NARROW = 2
+
+
+def write_comparison(folder: Path, comparison: Comparison) -> None:
+    """Write the report of a comparison into a folder, completely or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+    comparison : Comparison
+        With one converged fit at least.
+
+    Raises
+    ------
+    InputError
+        If no fit has converged, or the folder cannot be written.
+    """
+    fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
+    rule = "have a converged fit for a report"
+    require(fits, "comparison", rule, "none", f"{comparison.verdict}")
+    with written_folder(folder, "report") as staging:
+        record = json.dumps(comparison_record(comparison), indent=2)
+        (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
+        (staging / "report.html").write_text(comparison_page(comparison, fits), encoding="utf-8")
+        for name, fit in fits.items():
+            (staging / f"{name}.toml").write_text(material_text(fit), encoding="utf-8")
+
+
+def comparison_page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
+    """The page as text, with embedded figures and without external resources.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    fits : mapping of str to Fit
+        The converged fits.
+    """
+    first = next(iter(fits.values()))
+    names = " and ".join(term.name for term in first.objective.terms)
+    sections = {
+        "Verdict": as_html(comparison_report(comparison, reasons=True)),
+        "Data and laws": _figures_of_laws(fits),
+        "Estimates": "".join(
+            f"<h3>{escape(name)}</h3>{as_html([estimates(fit)])}" for name, fit in fits.items()
+        ),
+        "Data": data_tables(first),
+        "Provenance": "".join(
+            f"<h3>{escape(name)}</h3>{provenance(fit)}" for name, fit in fits.items()
+        ),
+    }
+    return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
+
+
+def draw_comparison(comparison: Comparison) -> Figure:
+    """The first recording with the motion of each law, or the first table with bands of each.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Raises
+    ------
+    InputError
+        If no fit has converged, or the data are of another kind.
+    """
+    fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
+    for fit in fits.values():
+        if fit.objective.terms_of(RunTerm):
+            return run_figure(*_motions(fits, 0))
+        if fit.objective.terms_of(LockInTerm):
+            return laws_figure(*_predictions(fits, 0))
+    rule = "have laws compared on a recording or a table of readings"
+    got = "another kind of data or no fit"
+    raise InputError("plot", rule, got, "plot the residuals of the fits yourself")
+
+
+def _predictions(fits: Mapping[str, Fit], i: int) -> tuple[LockInTable, dict[str, list[Series]]]:
+    """The table of a number, which is the same for all laws, and bands of each."""
+    terms = {name: fit.objective.terms_of(LockInTerm)[i] for name, fit in fits.items()}
+    table = next(iter(terms.values())).table
+    return table, {name: bands_of(fit, terms[name], None) for name, fit in fits.items()}
+
+
+def _motions(fits: Mapping[str, Fit], i: int) -> tuple[RecordedRun, dict[str, Float]]:
+    """The recording of a number, which is the same for all laws, and the motion of each."""
+    terms = {name: fit.objective.terms_of(RunTerm)[i] for name, fit in fits.items()}
+    run = next(iter(terms.values())).run
+    return run, {name: terms[name].fitted_friction(fit.values) for name, fit in fits.items()}
+
+
+def _figures_of_laws(fits: Mapping[str, Fit]) -> str:
+    first = next(iter(fits.values()))
+    parts = []
+    for i in range(len(first.objective.terms_of(LockInTerm))):
+        table, predicted = _predictions(fits, i)
+        caption = (
+            "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
+            "each law, by the normal approximation."
+        )
+        many = len(next(iter(predicted.values()))) > _MOST_NARROW
+        parts.append(figure(svg(laws_figure(table, predicted)), caption, wide=many))
+    for i in range(len(first.objective.terms_of(RunTerm))):
+        parts.append(figure(svg(run_figure(*_motions(fits, i))), RUN_CAPTION))
+    return "\n".join(parts)

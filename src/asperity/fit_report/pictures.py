@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.figures.style import new_figure, style
 from asperity.fit_report.bands import Series, bands_of
@@ -18,8 +18,6 @@ from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
-
-Float = NDArray[np.float64]
 
 #: Approximate number of samples of a recording in a figure.
 _DRAWN = 2000

@@ -72,11 +72,6 @@ def is_table(data: questions.Data) -> bool:
     return cells is None or HEALING in cells or any(cell in OBSERVABLES for cell in cells)
 
 
-def _has_holds(data: questions.Data) -> bool:
-    """Whether a table is one of slide-hold-slide tests."""
-    return data.file.suffix.lower() != ".json" and HEALING in (_heading(data.file) or ())
-
-
 def _heading(path: Path) -> list[str] | None:
     """Words of the first line that is no comment; None where the file cannot be opened."""
     try:
@@ -124,7 +119,8 @@ def read_data(
     for data, table in zip(question.data, tables, strict=True):
         rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
         require(not table or data.window is None, "window", rule, "a table", advice)
-        if table and _has_holds(data):
+        json = data.file.suffix.lower() == ".json"
+        if table and not json and HEALING in (_heading(data.file) or ()):
             result.append(read_healing(data.file, held))
         elif table:
             result.append(read_table(data.file, at, name=data.name))

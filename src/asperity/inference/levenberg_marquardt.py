@@ -17,9 +17,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Damping at the beginning, factors after a step that was taken and one that was not, and the
 #: damping from which no step is left.

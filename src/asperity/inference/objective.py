@@ -19,12 +19,12 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from asperity.arrays import Float, Index
 from asperity.errors import InputError
 from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
-Float = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Residuals of parameters by name, and of arrays.
@@ -54,7 +54,7 @@ class Residuals(NamedTuple):
     values: Float
     jacobian: Float
     observable: NDArray[np.str_]
-    row: NDArray[np.intp]
+    row: Index
     log_scale: float
 
 

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.record import laws_table
+from asperity.inference.comparison.compare import Comparison, laws_table
 from asperity.inference.fitting.result import NOT_DETERMINED, Estimate, Fit, Shown
 from asperity.inference.fitting.windows import WindowedFit
-from asperity.inference.holds.term import HoldTerm
+from asperity.inference.holds.table import HoldTerm
 from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.outputs.tables import Section

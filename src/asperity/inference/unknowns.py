@@ -8,14 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
-
-Float = NDArray[np.float64]
 
 #: Share of the applied modulation that the contacts carry; no parameter of an operating point.
 EPS_RATIO = Parameter(

@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.parameters.columns import read_headed_columns
 from asperity.units import to_si
-
-Float = NDArray[np.float64]
 
 
 def read_columns(

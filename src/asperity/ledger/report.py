@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import time
 from collections import Counter
@@ -18,7 +17,7 @@ from asperity.ledger.contents import KINDS
 from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
-from asperity.outputs import written_folder
+from asperity.outputs import write_table, written_folder
 from asperity.parameters.parameter import count_text
 
 if TYPE_CHECKING:
@@ -152,7 +151,9 @@ def reproduce(
         shown += [_show(section, folder, begin, points) for section in sections[1:]]
         begin("page")
         _write_json(paper, claims, folder / "claims.json")
-        _write_csv(claims, folder / "claims.csv")
+        # Without their separate numbers.
+        rows = ([getattr(claim, name) for name in _FIELDS] for claim in claims)
+        write_table(folder / "claims.csv", _FIELDS, rows)
         agreement = points.write(folder)
         page = build_page(paper, folder, shown, claims, paper.headlines(claims), agreement)
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
@@ -201,14 +202,6 @@ def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
     }
     text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _write_csv(claims: Sequence[Claim], path: Path) -> None:
-    """One claim a row, without its separate numbers."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(_FIELDS)
-        table.writerows([getattr(claim, name) for name in _FIELDS] for claim in claims)
 
 
 def _summary(

@@ -1,35 +1,24 @@
 """Modulations and programmes of normal load, shear force and pulling velocity."""
 
-from asperity.loads.modulated import modulated, sampled
-from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
-from asperity.loads.programme.programme import Programme
+from asperity._lazy import public_names
+from asperity.loads.modulated import modulated as modulated, sampled as sampled
+from asperity.loads.modulation import (
+    Excitation as Excitation,
+    Harmonic as Harmonic,
+    Modulation as Modulation,
+    Periodic as Periodic,
+)
+from asperity.loads.programme.programme import Programme as Programme
 from asperity.loads.programme.steps import (
-    CyclicLoading,
-    Follow,
-    Hold,
-    Modulate,
-    ProgrammeStep,
-    RampLoad,
-    RampVelocity,
-    Slide,
-    StepLoad,
+    CyclicLoading as CyclicLoading,
+    Follow as Follow,
+    Hold as Hold,
+    Modulate as Modulate,
+    ProgrammeStep as ProgrammeStep,
+    RampLoad as RampLoad,
+    RampVelocity as RampVelocity,
+    Slide as Slide,
+    StepLoad as StepLoad,
 )
 
-__all__ = [
-    "CyclicLoading",
-    "Excitation",
-    "Follow",
-    "Harmonic",
-    "Hold",
-    "Modulate",
-    "Modulation",
-    "Periodic",
-    "Programme",
-    "ProgrammeStep",
-    "RampLoad",
-    "RampVelocity",
-    "Slide",
-    "StepLoad",
-    "modulated",
-    "sampled",
-]
+__all__ = public_names(globals())

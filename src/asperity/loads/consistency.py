@@ -6,8 +6,8 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, code_of_others
 from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
 from asperity.parameters.arguments import shown
@@ -21,8 +21,6 @@ _VALUES = 2**18
 #: Largest error of a mean or of the amplitude, and share of the variation of W/W0 that its slope
 #: may miss: far above the error of a load with a kink, far below that of a wrong sign or factor.
 _MEAN, _SLOPE = 1e-3, 2e-2
-
-Array = NDArray[np.float64]
 
 
 def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modulation:
@@ -69,7 +67,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
 
 
 def _first_fault(
-    structure: Any, leaves: list[Array], points: int, name: str, samples: int = _SAMPLES[0]
+    structure: Any, leaves: list[Float], points: int, name: str, samples: int = _SAMPLES[0]
 ) -> str:
     """A fault that remains with more samples; empty without a fault."""
     at_once = _VALUES // samples
@@ -141,7 +139,7 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
     return ""
 
 
-def _missed_by_slope(values: Array, slopes: Array) -> float:
+def _missed_by_slope(values: Float, slopes: Float) -> float:
     """Largest share of the variation that the integral of the slope misses, by Simpson's rule."""
     step = 2 * np.pi / len(values)
     ahead = [np.roll(slopes, -k, axis=0) for k in range(3)]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.loads.modulation import Periodic, Series
 from asperity.parameters.arguments import shown
@@ -70,7 +70,7 @@ def modulated(
 
 def lowest_load(
     epsilon: ArrayLike | str = 0.0, load: Mapping[int, tuple[Any, Any]] | None = None
-) -> NDArray[np.float64]:
+) -> Float:
     """Lowest W/W0 over the period at each point; a lower bound of it where that is positive.
 
     Parameters
@@ -149,7 +149,7 @@ def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]
     return size * np.cos(phase), -size * np.sin(phase)
 
 
-def _checked_tilt(value: Any) -> NDArray[np.float64]:
+def _checked_tilt(value: Any) -> Float:
     angle = np.asarray(to_radians(value, "tilt"), float)
     bad = angle[~(np.abs(angle) < np.pi / 2)]
     if bad.size:
@@ -186,7 +186,7 @@ def _require_contact(series: Series) -> None:
         raise InputError(no_contact(lowest))
 
 
-def _lowest_load(series: Series) -> NDArray[np.float64]:
+def _lowest_load(series: Series) -> Float:
     """Lowest W/W0 over the period at each point, a few points at a time.
 
     Where the amplitudes together are below 1 it is their bound 1 - sum e_n instead.

@@ -16,8 +16,8 @@ A `LockInStream` reads recordings that do not fit into memory, or are not finish
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
 from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inverted, join, sums
@@ -33,8 +33,6 @@ from asperity.lock_in.reference import (
 )
 from asperity.lock_in.settling import Settling, find_settlings, without
 
-Array = NDArray[np.float64]
-
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
 #: With more samples than this, an additional pass over all samples is avoided.
@@ -47,9 +45,9 @@ _OFF = 0.1
 
 
 def lock_in(
-    time: Array,
-    load: Array,
-    force: Array,
+    time: Float,
+    load: Float,
+    force: Float,
     *,
     frequency: float | None = None,
     harmonics: int = 4,
@@ -168,7 +166,7 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     )
 
 
-def _load_columns(basis: Basis, load: Array, refine: bool) -> Array:
+def _load_columns(basis: Basis, load: Float, refine: bool) -> Float:
     """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
     selected = np.eye(basis.size)[:, : basis.linear + refine]
     if refine:
@@ -176,7 +174,7 @@ def _load_columns(basis: Basis, load: Array, refine: bool) -> Array:
     return selected
 
 
-def _on_basis(basis: Basis, beta: Array, change: float) -> Array:
+def _on_basis(basis: Basis, beta: Float, change: float) -> Float:
     """Coefficients of both fits on the whole basis, the frequency changed to first order."""
     full = np.zeros((basis.size, 2))
     full[: basis.linear] = beta
@@ -185,7 +183,7 @@ def _on_basis(basis: Basis, beta: Array, change: float) -> Array:
     return full
 
 
-def _white(blocks: BlockSums, residual: NDArray[np.complex128]) -> Array:
+def _white(blocks: BlockSums, residual: Complex) -> Float:
     """Covariance of the residual if it is white, from its sums over the blocks."""
     total = residual[:, 0].real
     return total.T @ total / max(float(blocks.count.sum()) - blocks.basis.linear - 1, 1.0)
@@ -197,7 +195,7 @@ def _degree(detrend: str) -> int:
     return DRIFTS[detrend]
 
 
-def _check(time: Array, load: Array, force: Array, harmonics: int, degree: int) -> None:
+def _check(time: Float, load: Float, force: Float, harmonics: int, degree: int) -> None:
     require(not harmonics < 1, "lock_in.harmonics", "be at least 1", harmonics, "ask for 1 or more")
     rule, got = "have one length", f"{time.size}, {load.size} and {force.size}"
     advice = "cut them to the same samples"
@@ -215,12 +213,12 @@ def _check_finite(blocks: BlockSums) -> BlockSums:
     return blocks
 
 
-def _check_clock(time: Array) -> None:
+def _check_clock(time: Float) -> None:
     rule, got = "rise from sample to sample", "equal or decreasing times"
     require((time[1:] > time[:-1]).all(), "lock_in.time", rule, got, "sort or cut the recording")
 
 
-def _check_resolved(time: Array, frequency: float, harmonics: int) -> None:
+def _check_resolved(time: Float, frequency: float, harmonics: int) -> None:
     span = float(time[-1] - time[0])
     # Gaps do not lower the sampling rate of the remaining samples.
     rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
@@ -271,7 +269,7 @@ class LockInStream:
         self._basis = Basis(2 * np.pi * frequency, harmonics, DRIFTS[detrend], start + half, half)
         self._parts: list[BlockSums] = []
 
-    def add(self, time: Array, load: Array, force: Array) -> None:
+    def add(self, time: Float, load: Float, force: Float) -> None:
         """Add the next samples, arrays (n,) each.
 
         Raises

@@ -12,12 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Complex, Float, Index
 from asperity.lock_in.normal_equations import Basis, BlockSums
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Lines averaged around a harmonic and next to zero frequency.
 _AROUND_HARMONIC = 20
@@ -41,10 +38,10 @@ class LocalNoise:
     """
 
     spectra: Complex
-    dof: Array
+    dof: Float
 
 
-def residual_sums(blocks: BlockSums, beta: Array) -> Complex:
+def residual_sums(blocks: BlockSums, beta: Float) -> Complex:
     """Sums of residual times e^(-i k phi) over each block.
 
     Parameters
@@ -62,7 +59,7 @@ def residual_sums(blocks: BlockSums, beta: Array) -> Complex:
     return np.stack([harmonic_sums(left, blocks.basis, k) for k in orders], axis=1)
 
 
-def harmonic_sums(sums: Array, basis: Basis, order: int) -> Complex:
+def harmonic_sums(sums: Float, basis: Basis, order: int) -> Complex:
     """Sums times e^(-i k phi), from sums times the columns.
 
     Parameters
@@ -83,7 +80,7 @@ def harmonic_sums(sums: Array, basis: Basis, order: int) -> Complex:
 
 
 def local_noise(
-    blocks: BlockSums, residual: Complex, white: Array, settles: bool = False
+    blocks: BlockSums, residual: Complex, white: Float, settles: bool = False
 ) -> LocalNoise:
     """Noise around each harmonic.
 
@@ -104,7 +101,7 @@ def local_noise(
 
 
 def noise_around(
-    k: int, blocks: BlockSums, residual: Complex, white: Array, *, settles: bool
+    k: int, blocks: BlockSums, residual: Complex, white: Float, *, settles: bool
 ) -> tuple[Complex, float]:
     """Noise around one harmonic: its spectral matrix, and its degrees of freedom.
 
@@ -136,7 +133,7 @@ def noise_around(
     return spectrum, float(near.shape[0])
 
 
-def _growth(lines: Array, turned: Complex) -> Array:
+def _growth(lines: Float, turned: Complex) -> Float:
     """Ratio of the noise that acts on the mean to that of the lowest lines; (channels,).
 
     1/f noise is stronger below the lowest line than at it. Its power law is extrapolated down to a
@@ -155,7 +152,7 @@ def _growth(lines: Array, turned: Complex) -> Array:
 
 def free_lines(
     k: int, periods: float, basis: Basis, samples: float, blocks: int, taken: int
-) -> Array:
+) -> Float:
     """Numbers of the spectral lines next to a harmonic that are free of fitted columns.
 
     Parameters
@@ -188,13 +185,13 @@ def free_lines(
     return lines[np.argsort(np.abs(lines - k * periods), kind="stable")[: 2 * wanted]]
 
 
-def column_harmonics(basis: Basis) -> NDArray[np.intp]:
+def column_harmonics(basis: Basis) -> Index:
     """Harmonic of each column of the basis, 0 for the drift; (size,)."""
     k = np.arange(1, basis.harmonics + 1)
     return np.concatenate([np.zeros(basis.drift, dtype=np.intp), k, k, k, k])
 
 
-def quadrature(basis: Basis) -> Array:
+def quadrature(basis: Basis) -> Float:
     """The matrix that maps cos to sin and sin to -cos, (size, size); 0 for the drift."""
     n = basis.harmonics
     turn = np.zeros((basis.size, basis.size))
@@ -206,8 +203,8 @@ def quadrature(basis: Basis) -> Array:
 
 
 def sum_covariance(
-    basis: Basis, gram: Array, noise: LocalNoise, columns: tuple[Array, Array]
-) -> Array:
+    basis: Basis, gram: Float, noise: LocalNoise, columns: tuple[Float, Float]
+) -> Float:
     """Covariance of the sums of noise times columns, for two channels.
 
     Parameters

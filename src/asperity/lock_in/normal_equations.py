@@ -18,16 +18,13 @@ series in the small difference of the phase; elsewhere it is a cosine and a sine
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Complex, Float
 from asperity.errors import require
-
-Array = NDArray[np.float64]
-
-Complex = NDArray[np.complex128]
 
 #: Samples of a chunk: their products fit into the second-level cache.
 _CHUNK = 8192
@@ -79,7 +76,7 @@ class Basis:
         """Number of all columns."""
         return self.drift + 4 * self.harmonics
 
-    def columns(self, time: Array, out: Array | None = None) -> Array:
+    def columns(self, time: Float, out: Float | None = None) -> Float:
         """Columns of the basis at the times `time`.
 
         Parameters
@@ -112,11 +109,11 @@ class Basis:
         np.multiply(out[self.drift : self.linear], u, out=out[self.linear :])
         return out
 
-    def _cosines_and_sines(self, columns: Array) -> tuple[Array, Array]:
+    def _cosines_and_sines(self, columns: Float) -> tuple[Float, Float]:
         trigonometric = columns[self.drift : self.linear]
         return trigonometric[: self.harmonics], trigonometric[self.harmonics :]
 
-    def shift(self, start: Array) -> Array:
+    def shift(self, start: Float) -> Float:
         """Matrices that transform the columns at `centre + s` into those at `start + s`.
 
         Parameters
@@ -133,7 +130,7 @@ class Basis:
         u = (start - self.centre) / self.half_width
         for power in range(self.drift):
             for j in range(power + 1):
-                turned[:, power, j] = _binomial(power, j) * u ** (power - j)
+                turned[:, power, j] = math.comb(power, j) * u ** (power - j)
         k = np.arange(n)
         angle = self.omega * (start - self.centre)[:, None] * (k + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
@@ -146,11 +143,7 @@ class Basis:
         return turned
 
 
-def _binomial(n: int, k: int) -> int:
-    return (1, n, n * (n - 1) // 2)[k]
-
-
-def solved(normal: Array, right: Array) -> Array:
+def solved(normal: Float, right: Float) -> Float:
     """Solution of normal equations.
 
     Parameters
@@ -167,7 +160,7 @@ def solved(normal: Array, right: Array) -> Array:
     return inverted(normal) @ right
 
 
-def inverted(normal: Array) -> Array:
+def inverted(normal: Float) -> Float:
     """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it has none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = 1 / np.sqrt(np.diagonal(normal))
@@ -183,8 +176,8 @@ def inverted(normal: Array) -> Array:
 
 
 def uneven_sums(
-    basis: Basis, time: Array, channels: list[Array], length: int
-) -> tuple[Array, Array]:
+    basis: Basis, time: Float, channels: list[Float], length: int
+) -> tuple[Float, Float]:
     """Gram matrices and moments of blocks of some thousand samples.
 
     Parameters
@@ -215,7 +208,7 @@ def uneven_sums(
 class _Chunk:
     """Buffers and tables for chunks of one recording."""
 
-    def __init__(self, basis: Basis, time: Array, channels: int, size: int) -> None:
+    def __init__(self, basis: Basis, time: Float, channels: int, size: int) -> None:
         self._basis = basis
         # u^0 .. u^m for the Gram matrix; each channel times u^0 .. u^p.
         self.powers = max(2 * basis.degree, basis.degree + 1, 2) + 1
@@ -230,7 +223,7 @@ class _Chunk:
         self._weights = np.empty((self.rows, size))
         self._scratch = np.empty((4, size))
 
-    def sums(self, time: Array, channels: list[Array]) -> Complex:
+    def sums(self, time: Float, channels: list[Float]) -> Complex:
         """Sums of each weight times e^(ik phi), k = 0 .. 2n; (2n + 1, rows)."""
         basis, size = self._basis, time.size
         waves, weights = self._waves[:, :, :size], self._weights[:, :size]
@@ -256,7 +249,7 @@ class _Chunk:
         turned = np.exp(1j * turn * np.arange(most + 1))[:, None]
         return np.asarray((both[:, 0] + 1j * both[:, 1]) * turned)
 
-    def _fundamental(self, time: Array, wave: Array) -> float:
+    def _fundamental(self, time: Float, wave: Float) -> float:
         """Fill in cos and sin of the phase without a constant part, which is returned."""
         size, omega = time.size, self._basis.omega
         small, square = self._scratch[:2, :size]
@@ -288,7 +281,7 @@ class _Chunk:
         return float(omega * (time[0] - self._basis.centre))
 
 
-def _usual_step(time: Array, size: int) -> float:
+def _usual_step(time: Float, size: int) -> float:
     """Median step over chunks of `size` samples."""
     last = np.arange(size, time.size, size)
     if not last.size:
@@ -305,7 +298,7 @@ def _terms(widest: float) -> int:
     return terms
 
 
-def _gram(basis: Basis, powers: Complex) -> Array:
+def _gram(basis: Basis, powers: Complex) -> Float:
     """Gram matrices of the basis from sums of u^m e^(ik phi), (blocks, 2n + 1, m)."""
     n, first, second = basis.harmonics, basis.drift, basis.linear
     gram = np.empty((powers.shape[0], basis.size, basis.size))
@@ -329,7 +322,7 @@ def _gram(basis: Basis, powers: Complex) -> Array:
     return gram
 
 
-def _moments(basis: Basis, sums: Complex, channels: int) -> Array:
+def _moments(basis: Basis, sums: Complex, channels: int) -> Float:
     """Moments from sums of each channel times u^m e^(ik phi), (blocks, 2n + 1, channels * m)."""
     n, first, second = basis.harmonics, basis.drift, basis.linear
     of_channel = sums.reshape(*sums.shape[:2], channels, -1)
@@ -359,12 +352,12 @@ class BlockSums:
     """
 
     basis: Basis
-    gram: Array
-    moments: Array
-    count: Array
-    middle: Array
+    gram: Float
+    moments: Float
+    count: Float
+    middle: Float
 
-    def totals(self) -> tuple[Array, Array]:
+    def totals(self) -> tuple[Float, Float]:
         """Normal equations of all blocks together, (size, size) and (size, channels)."""
         return self.gram.sum(0), self.moments.sum(0)
 
@@ -382,7 +375,7 @@ def join(parts: list[BlockSums]) -> BlockSums:
     return BlockSums(parts[0].basis, *together)
 
 
-def even_step(time: Array, omega: float) -> float | None:
+def even_step(time: Float, omega: float) -> float | None:
     """Sampling interval (s) of an even clock; None if it is not even.
 
     Parameters
@@ -407,8 +400,8 @@ def even_step(time: Array, omega: float) -> float | None:
 
 def sums(
     basis: Basis,
-    time: Array,
-    channels: list[Array],
+    time: Float,
+    channels: list[Float],
     *,
     blocks: int = 1,
     step: float | None = None,
@@ -431,7 +424,7 @@ def sums(
     return _even(basis, time, channels, min(length, _BUFFER), step)
 
 
-def _even(basis: Basis, time: Array, channels: list[Array], length: int, step: float) -> BlockSums:
+def _even(basis: Basis, time: Float, channels: list[Float], length: int, step: float) -> BlockSums:
     table = basis.columns(basis.centre + step * np.arange(float(length)))
     whole = time.size // length
     parts = [_turned(basis, time[0], channels, table, step, 0, whole)]
@@ -444,8 +437,8 @@ def _even(basis: Basis, time: Array, channels: list[Array], length: int, step: f
 def _turned(
     basis: Basis,
     begin: float,
-    channels: list[Array],
-    table: Array,
+    channels: list[Float],
+    table: Float,
     step: float,
     first: int,
     blocks: int,
@@ -462,7 +455,7 @@ def _turned(
     return BlockSums(basis, gram, shift @ raw, count, start + step * (length - 1) / 2)
 
 
-def _uneven(basis: Basis, time: Array, channels: list[Array], length: int) -> BlockSums:
+def _uneven(basis: Basis, time: Float, channels: list[Float], length: int) -> BlockSums:
     blocks = -(-time.size // length)
     if length >= _BUFFER // 8:
         gram, moments = uneven_sums(basis, time, channels, length)
@@ -476,7 +469,7 @@ def _uneven(basis: Basis, time: Array, channels: list[Array], length: int) -> Bl
 
 
 def _short_blocks(
-    basis: Basis, time: Array, channels: list[Array], length: int, gram: Array, moments: Array
+    basis: Basis, time: Float, channels: list[Float], length: int, gram: Float, moments: Float
 ) -> None:
     """Many blocks at once, padded to equal length by zeros."""
     together = max(1, _BUFFER // length)

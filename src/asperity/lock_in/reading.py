@@ -6,19 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Complex, Float
 from asperity.errors import InputError, closest, require
 from asperity.lock_in.noise import LocalNoise
 from asperity.lock_in.normal_equations import BlockSums
 from asperity.lock_in.settling import Settling
 
-Array = NDArray[np.float64]
-
 #: Standard deviation (rad) of an angle that is uniform over the circle, pi/sqrt(3).
 _UNKNOWN_PHASE = math.pi / math.sqrt(3)
-
-Complex = NDArray[np.complex128]
 
 _SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
 
@@ -38,7 +34,7 @@ class Phasor:
     """
 
     value: complex
-    covariance: Array
+    covariance: Float
     dof: float
 
     @property
@@ -77,12 +73,12 @@ class Phasor:
         return bool(distance > fdtri(2, self.dof, level))
 
     @property
-    def _direction(self) -> Array:
+    def _direction(self) -> Float:
         if not self.amplitude:
             return np.array([1.0, 0.0])
         return np.array([self.value.real, self.value.imag]) / self.amplitude
 
-    def _along(self, direction: Array) -> float:
+    def _along(self, direction: Float) -> float:
         return math.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
 
 
@@ -135,10 +131,10 @@ class LockInReading:
     harmonics: Complex
     load_harmonics: Complex
     names: tuple[str, ...]
-    covariance: Array
-    dof: Array
-    drift: Array
-    drift_uncertainty: Array
+    covariance: Float
+    dof: Float
+    drift: Float
+    drift_uncertainty: Float
     start: float
     end: float
     samples: int
@@ -153,7 +149,7 @@ class LockInReading:
         """The settling of the mean force, if it is present."""
         return next((s for s in self.settlings if s.present and not s.order), None)
 
-    def without_settling(self, time: Array, force: Array) -> Array:
+    def without_settling(self, time: Float, force: Float) -> Float:
         """A force of the window without the settling of its mean; arrays (n,)."""
         settling = self.settling
         return force if settling is None else force - settling.at(time - self.start)
@@ -235,9 +231,9 @@ class LockInReading:
 
 def reading_of(
     blocks: BlockSums,
-    beta: Array,
+    beta: Float,
     omega: float,
-    covariance: Array,
+    covariance: Float,
     noise: LocalNoise,
     residual: Complex,
     *,
@@ -309,13 +305,13 @@ def reading_of(
 
 def _jacobian(
     first: int,
-    average: Array,
+    average: Float,
     phasors: Complex,
     relative: Complex,
     mean_load: float,
     mean_force: float,
     fitted: bool,
-) -> Array:
+) -> Float:
     """Derivatives of the numbers of a reading by (beta of the load, omega, beta of the force)."""
     n = phasors.shape[0]
     linear = first + 2 * n

@@ -18,12 +18,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import ConstantLoadError, InputError, require
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
-
-Array = NDArray[np.float64]
 
 #: Samples of the spectrum in which the line is searched.
 _SPECTRUM = 1 << 16
@@ -48,7 +46,7 @@ class SpectralLine(NamedTuple):
 
 
 def strongest_line(
-    time: Array, values: Array, *, between: tuple[float, float] | None = None
+    time: Float, values: Float, *, between: tuple[float, float] | None = None
 ) -> SpectralLine:
     """The strongest line of the spectrum of a signal.
 
@@ -88,7 +86,7 @@ def strongest_line(
     return max(present, key=lambda line: line.amplitude)
 
 
-def require_modulated(line: SpectralLine, load: Array) -> None:
+def require_modulated(line: SpectralLine, load: Float) -> None:
     """Refuse a load that is constant; noise alone is not refused.
 
     Raises
@@ -111,8 +109,8 @@ def around(frequency: float | None) -> tuple[float, float] | None:
 
 
 def fit_frequency(
-    time: Array,
-    load: Array,
+    time: Float,
+    load: Float,
     start: float,
     *,
     harmonics: int,
@@ -154,7 +152,7 @@ def fit_frequency(
         size = min(4 * size, most)
 
 
-def frequency_direction(basis: Basis, beta: Array) -> Array:
+def frequency_direction(basis: Basis, beta: Float) -> Float:
     """Derivative of a fit with respect to omega, as coefficients on the basis.
 
     Parameters
@@ -176,14 +174,14 @@ def frequency_direction(basis: Basis, beta: Array) -> Array:
     return direction
 
 
-def window_basis(time: Array, omega: float, harmonics: int, degree: int) -> Basis:
+def window_basis(time: Float, omega: float, harmonics: int, degree: int) -> Basis:
     """The basis of a window, its time counted from the middle."""
     half = float(time[-1] - time[0]) / 2
     return Basis(omega, harmonics, degree, float(time[0]) + half, half)
 
 
 def _converged(
-    time: Array, load: Array, omega: float, harmonics: int, degree: int, step: float | None
+    time: Float, load: Float, omega: float, harmonics: int, degree: int, step: float | None
 ) -> float:
     for _ in range(_MOST_STEPS):
         basis = window_basis(time, omega, harmonics, degree)
@@ -197,7 +195,7 @@ def _converged(
     return omega
 
 
-def frequency_step(basis: Basis, gram: Array, moments: Array) -> float:
+def frequency_step(basis: Basis, gram: Float, moments: Float) -> float:
     """Gauss-Newton step of omega.
 
     Parameters
@@ -213,7 +211,7 @@ def frequency_step(basis: Basis, gram: Array, moments: Array) -> float:
     return float(solved(columns.T @ gram @ columns, columns.T @ moments)[linear])
 
 
-def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
+def _scanned(time: Float, load: Float, omega: float, degree: int) -> float:
     """The frequency near an initial guess whose fit has the smallest residual."""
     span = float(time[-1] - time[0])
     width = min(0.5 * omega, 2 * np.pi / span)
@@ -231,7 +229,7 @@ def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
     return float(tried[np.argmin([residual(w) for w in tried])])
 
 
-def _evenly(time: Array, values: Array, most: int) -> tuple[float, Array]:
+def _evenly(time: Float, values: Float, most: int) -> tuple[float, Float]:
     """Step and values on an even grid of at most `most` points; block means if it is coarser."""
     together = -(-time.size // most)
     if together > 1:
@@ -246,7 +244,7 @@ def _evenly(time: Array, values: Array, most: int) -> tuple[float, Array]:
     return span / (values.size - 1), values
 
 
-def _spectrum(step: float, values: Array) -> tuple[Array, Array]:
+def _spectrum(step: float, values: Float) -> tuple[Float, Float]:
     """Frequencies and amplitudes of lines, without mean and slope, in a Hann window."""
     # Lengths with large prime factors cost many times as much.
     values = values[: _smooth(values.size)]
@@ -260,7 +258,7 @@ def _spectrum(step: float, values: Array) -> tuple[Array, Array]:
 
 
 def _top(
-    frequency: Array, amplitude: Array, between: tuple[float, float] | None
+    frequency: Float, amplitude: Float, between: tuple[float, float] | None
 ) -> SpectralLine | None:
     allowed = np.ones(amplitude.size, dtype=bool)
     allowed[:2] = allowed[-1:] = False
@@ -337,7 +335,7 @@ def retuned(blocks: BlockSums, change: float) -> BlockSums:
     )
 
 
-def _turn(blocks: BlockSums, change: float) -> Array:
+def _turn(blocks: BlockSums, change: float) -> Float:
     """Matrices from the old columns to the new ones, (blocks, size, size)."""
     basis = blocks.basis
     n, first, second = basis.harmonics, basis.drift, basis.linear

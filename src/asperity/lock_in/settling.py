@@ -19,12 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.lock_in.noise import harmonic_sums, noise_around
 from asperity.lock_in.normal_equations import BlockSums, inverted
-
-Array = NDArray[np.float64]
 
 #: Prior odds of a settling times the Occam factor of its amplitude, for the mean and for a
 #: harmonic, which has two amplitudes. With these odds of the mean, 3 to 10 of 1,000 steady
@@ -85,13 +83,13 @@ class Settling:
     odds: float
     longest: float
     unfinished: float
-    shift: Array
-    covariance: Array
-    removed: Array
+    shift: Float
+    covariance: Float
+    removed: Float
     noise: float
     gain: float
 
-    def at(self, since: Array) -> Array:
+    def at(self, since: Float) -> Float:
         """The settling of a mean at times (s) since the window's beginning, (n,)."""
         return np.asarray(self.amplitude.real * np.exp(-since / self.decay))
 
@@ -125,7 +123,7 @@ def settling_of_mean(blocks: BlockSums) -> Settling | None:
 
 
 def find_settlings(
-    blocks: BlockSums, channel: int, fitted: Array, inner: Array, white: float
+    blocks: BlockSums, channel: int, fitted: Float, inner: Float, white: float
 ) -> tuple[Settling, ...]:
     """Settlings of a channel, of its mean and of each harmonic; those that are possible at all.
 
@@ -177,8 +175,8 @@ class _Profile:
         self,
         blocks: BlockSums,
         channel: int,
-        fitted: Array,
-        inner: Array,
+        fitted: Float,
+        inner: Float,
         white: float,
         order: int,
     ) -> None:
@@ -259,7 +257,7 @@ class _Profile:
             float(gain[best] / noise),
         )
 
-    def _lines(self, decays: Array) -> list[Array]:
+    def _lines(self, decays: Float) -> list[Float]:
         """Level, and slope in u, of e^(-t/tau) in each block; (decays, blocks) each."""
         z = self._half / decays[:, None]
         height = np.exp(-self._begun / decays[:, None])
@@ -273,7 +271,7 @@ class _Profile:
             return [level]
         return [level - slope * self._u, slope]
 
-    def _solved(self, decays: Array) -> tuple[Array, Array, Array, Array]:
+    def _solved(self, decays: Float) -> tuple[Float, Float, Float, Float]:
         """Gain, amplitudes, normal matrices and coefficients of the columns for each decay."""
         gram, linear = self._blocks.gram, self._blocks.basis.linear
         lines = self._lines(decays)
@@ -296,7 +294,7 @@ class _Profile:
         amplitude = np.linalg.solve(schur, right[..., None])[..., 0]
         return (amplitude * right).sum(1), amplitude, schur, moved
 
-    def _removed(self, decay: Array, amplitude: Array) -> Array:
+    def _removed(self, decay: Float, amplitude: Float) -> Float:
         """Sums of all columns times a settling, (blocks, size)."""
         gram = self._blocks.gram
         made = np.zeros(gram.shape[:2])
@@ -304,7 +302,7 @@ class _Profile:
             made += line[0][:, None] * (gram[:, :, at] @ amplitude)
         return made
 
-    def _noise(self, left: Array, *, settles: bool) -> tuple[float, float]:
+    def _noise(self, left: Float, *, settles: bool) -> tuple[float, float]:
         """Variance of white noise as strong as that of this order, and its degrees of freedom."""
         white = np.array([[self._white]])
         around = harmonic_sums(left, self._blocks.basis, self._order)[:, None]
@@ -315,6 +313,6 @@ class _Profile:
         return max(float(spectrum[0, 0].real), rounding**2, least), dof
 
 
-def _log_likelihood(loss: Array | float, noise: float, dof: float, amplitudes: int) -> Array:
+def _log_likelihood(loss: Float | float, noise: float, dof: float, amplitudes: int) -> Float:
     """Student's log-likelihood of a loss of squares, relative to none."""
     return np.asarray(-(dof + amplitudes) / 2 * np.log1p(np.asarray(loss) / noise / dof))

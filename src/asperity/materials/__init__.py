@@ -30,7 +30,7 @@ __all__ = [
 
 def available() -> tuple[str, ...]:
     """Names of the materials that come with the package."""
-    from asperity.materials.loader import packaged
+    from asperity.materials.record import packaged
 
     return tuple(sorted(packaged()))
 
@@ -60,7 +60,7 @@ def load(name: str | PathLike[str]) -> Material:
     InputError
         If there is no such material, or the file is not a valid material file.
     """
-    from asperity.materials.loader import load_material
+    from asperity.materials.record import load_material
 
     return load_material(name)
 

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib.resources import files
+from os import PathLike, fspath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import field_validator
@@ -15,7 +19,8 @@ from pydantic import field_validator
 from asperity.errors import InputError, closest, require
 from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
-from asperity.parameters.arguments import shown, typed
+from asperity.parameters.arguments import file_path, shown, typed
+from asperity.parameters.toml_file import parsed_toml, toml_content
 from asperity.questions.record import Question
 from asperity.units import to_si
 
@@ -149,3 +154,29 @@ def _plain(name: str) -> str:
 def _field(parameter: str, law: type[Law]) -> str:
     """The law's field of a parameter: with the underscore that a word of Python needs."""
     return parameter if parameter in law.__dataclass_fields__ else f"{parameter}_"
+
+
+@cache
+def packaged() -> Mapping[str, Any]:
+    """The material files that come with the package, by name."""
+    folder = files("asperity.materials")
+    return {f.name.removesuffix(".toml"): f for f in folder.iterdir() if f.name.endswith(".toml")}
+
+
+@cache
+def _packaged_content(name: str) -> dict[str, Any]:
+    """The parsed file of a material that comes with the package; parsing takes milliseconds."""
+    text = packaged()[name].read_text(encoding="utf-8")
+    return parsed_toml(text, "material", f"'{name}'")
+
+
+def load_material(name: str | PathLike[str]) -> Material:
+    """See `asperity.materials.load`."""
+    text = fspath(file_path(name, "material"))
+    if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
+        file, content = toml_content(text, "material")
+        return Material.of_content({"name": file.stem, **content}, text)
+    if text not in packaged():
+        rule = "be a known material or the path of a .toml file"
+        raise InputError("material", rule, f"'{text}'", closest(text, packaged()))
+    return Material.of_content({"name": text, **_packaged_content(text)}, text)

@@ -2,15 +2,16 @@
 
 Files are measured in separate processes. Finished rows are kept next to the output as lines of
 JSON, so that an interrupted campaign goes on where it stopped; at the end the table is written as
-CSV or NetCDF. A file that cannot be measured is a row with its reason.
+CSV or NetCDF. A file that cannot be measured is a row with its reason. Machine conditions of the
+recordings are in a table, or in the names of the files.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import multiprocessing
+import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,9 +19,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
-from asperity.outputs import UnfinishedText, output_file, written_file
+from asperity.outputs import UnfinishedText, output_file, write_table, written_file
+from asperity.parameters.columns import read_headed_columns
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -254,11 +256,7 @@ def write_csv(path: Path, table: list[Row]) -> None:
         From `modulated_rows` and `sliding_rows`.
     """
     names = _columns(table)
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(names)
-        for row in table:
-            writer.writerow([_cell(row.get(name, "")) for name in names])
+    write_table(path, names, ([_cell(row.get(name, "")) for name in names] for row in table))
 
 
 def _cell(value: Any) -> Any:
@@ -311,3 +309,88 @@ def _unit(name: str) -> str:
     if stem in ("recurrence", "stick_duration", "slip_duration"):
         return "s"
     return units.get(stem, "" if stem in ("W0", "mean_force") else "1")
+
+
+#: Fields of a measurement's question by the names that tables have.
+MACHINE_FIELDS = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
+_LABEL = "measure.conditions"
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_EXAMPLE = "write it like run_k{K N/m}_v{V um/s}, or name a table with a column file"
+
+
+def conditions_of(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | str]]:
+    """K, V, M and W0 of each recording.
+
+    Parameters
+    ----------
+    files : sequence of Path
+    text : str
+        A CSV with a column ``file``, a row a recording, and columns K, V, M or W0 in SI or with
+        the unit in the heading. Or a pattern of the files' names with quantities in braces, like
+        ``run_k{K N/m}_v{V um/s}``.
+
+    Returns
+    -------
+    dict of Path to dict
+        By the fields of `asperity.questions.recording.Measurement`; numbers in SI, or texts.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read, or does not have one row for each recording, or a name does
+        not fit the pattern.
+    """
+    return _of_names(files, text) if "{" in text else _of_table(files, Path(text))
+
+
+def _of_names(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | str]]:
+    # Literal parts, then a name and its unit, in turn.
+    literal, *parts = re.split(r"\{\s*(\w+)\s*([^{}]*?)\s*\}", text)
+    names, units = parts[::3], parts[1::3]
+    pattern = re.escape(literal)
+    for following in parts[2::3]:
+        pattern += _NUMBER + re.escape(following)
+    for name in names or [text]:
+        if name not in MACHINE_FIELDS or names.count(name) > 1:
+            rule = f"name each of {', '.join(MACHINE_FIELDS)} once at most"
+            raise InputError(Argument(_LABEL), rule, f"'{name}'", _EXAMPLE)
+    result: dict[Path, dict[str, float | str]] = {}
+    for file in files:
+        # The whole name, or all of it but the ending.
+        match = re.fullmatch(pattern, file.name) or re.fullmatch(pattern, file.stem)
+        if match is None:
+            rule = "fit the names of all recordings"
+            raise InputError(Argument(_LABEL), rule, f"'{file.name}'", _EXAMPLE)
+        result[file] = {
+            MACHINE_FIELDS[name]: f"{value} {unit}".strip()
+            for name, value, unit in zip(names, match.groups(), units, strict=True)
+        }
+    return result
+
+
+def _of_table(files: Sequence[Path], path: Path) -> dict[Path, dict[str, float | str]]:
+    columns: Mapping[str, list[Any]] = read_headed_columns(
+        path, MACHINE_FIELDS, texts=("file",), label=_LABEL, row="a recording"
+    )
+    if "file" not in columns or len(columns) < 2:
+        raise InputError(
+            f"{path.name} must have the column file and some of {', '.join(MACHINE_FIELDS)}, got "
+            f"{', '.join(columns) or 'none'}; add them"
+        )
+    result = {}
+    for file in files:
+        rows = [
+            n for n, name in enumerate(columns["file"]) if Path(name).name in (file.name, file.stem)
+        ]
+        if len(rows) != 1:
+            names = [Path(name).name for name in columns["file"]]
+            advice = closest(file.name, names) if not rows else "leave one out"
+            raise InputError(
+                f"{path.name} must have one row for each recording, got {len(rows)} for "
+                f"'{file.name}'; {advice}"
+            )
+        result[file] = {
+            field: columns[name][rows[0]] for name, field in MACHINE_FIELDS.items()
+            if name in columns
+        }  # fmt: skip
+    return result

@@ -201,15 +201,9 @@ def _either(
 
 
 def _lock_in(question: Question) -> dict[str, Any]:
-    return {
-        "load": question.load,
-        "force": question.force,
-        "frequency": question.frequency,
-        "harmonics": question.harmonics,
-        "detrend": question.detrend,
-        "only_whole_periods": question.whole_periods,
-        "refine": not question.exact_frequency,
-    }
+    same = {"load", "force", "frequency", "harmonics", "detrend"}
+    own = {"only_whole_periods": question.whole_periods, "refine": not question.exact_frequency}
+    return question.model_dump(include=same) | own
 
 
 def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from asperity.arrays import Float
 from asperity.errors import ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
@@ -42,7 +43,6 @@ from asperity.parameters.parameter import Drawn, SummaryLine
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
-Array = NDArray[np.float64]
 
 #: A line this often above its background is a modulation.
 _LINE = 8.0
@@ -168,29 +168,18 @@ def measure(
         If channels, window or frequency do not fit the recording, or no modulation stands out and
         no frequency is given.
     """
-    recording = _prepared(trace, load, force, frequency, detrend, refine)
-    return _measured(
-        recording, None, harmonics, window, detrend, only_whole_periods=only_whole_periods
-    )
+    options = dict(locals())
+    del options["window"]
+    return _measured(_prepared(**options), None, window)
 
 
-def measure_amplitudes(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    frequency: float | None = None,
-    harmonics: int = 4,
-    detrend: str = "linear",
-    only_whole_periods: bool = False,
-    refine: bool = True,
-) -> list[Measurement | InputError]:
+def measure_amplitudes(trace: Trace, **options: Any) -> list[Measurement | InputError]:
     """Read every modulated stretch of a recording, in their order.
 
     Parameters
     ----------
-    trace, load, force, frequency, harmonics, detrend, only_whole_periods, refine
-        As in `measure`.
+    trace, **options
+        As in `measure`, all but the window.
 
     Returns
     -------
@@ -202,17 +191,13 @@ def measure_amplitudes(
     InputError
         As `measure` where the recording as a whole cannot be read.
     """
-    recording = _prepared(trace, load, force, frequency, detrend, refine)
+    recording = _prepared(trace, **options)
     measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
             continue
         try:
-            measurements.append(
-                _measured(
-                    recording, part, harmonics, None, detrend, only_whole_periods=only_whole_periods
-                )
-            )
+            measurements.append(_measured(recording, part, None))
         except InputError as error:
             measurements.append(error)
     return measurements
@@ -221,7 +206,7 @@ def measure_amplitudes(
 def modulation_of(trace: Trace) -> float | None:
     """Frequency (Hz) at which the recorded load is modulated; None of another recording."""
     try:
-        return _prepared(trace, "W", "F", None, "linear", refine=True).frequency
+        return _prepared(trace).frequency
     except InputError:
         return None
 
@@ -233,11 +218,19 @@ class _ModulatedRecording:
     samples: Samples
     parts: list[LoadInterval]
     frequency: float
-    refine: bool
+    only_whole_periods: bool
+    lock_in: Mapping[str, Any]
 
 
 def _prepared(
-    trace: Trace, load: str, force: str, frequency: float | None, detrend: str, refine: bool
+    trace: Trace,
+    load: str = "W",
+    force: str = "F",
+    frequency: float | None = None,
+    only_whole_periods: bool = False,
+    detrend: str = "linear",
+    refine: bool = True,
+    **lock_in: Any,
 ) -> _ModulatedRecording:
     rule = "be none, linear or quadratic"
     require(detrend in DRIFTS, "measure.detrend", rule, f"'{detrend}'", "choose one")
@@ -253,17 +246,13 @@ def _prepared(
             "give the frequency if you know it, or measure without modulation",
         )
     start = frequency if frequency is not None and not refine else line.frequency
-    return _ModulatedRecording(samples, _parts(samples, line, start), start, refine)
+    options = {**lock_in, "detrend": detrend, "refine": refine}
+    parts = _parts(samples, line, start)
+    return _ModulatedRecording(samples, parts, start, only_whole_periods, options)
 
 
 def _measured(
-    recording: _ModulatedRecording,
-    part: LoadInterval | None,
-    harmonics: int,
-    window: tuple[float, float] | None,
-    detrend: str,
-    *,
-    only_whole_periods: bool,
+    recording: _ModulatedRecording, part: LoadInterval | None, window: tuple[float, float] | None
 ) -> Measurement:
     """One stretch; the longest modulated one, or that of the window, if none is given."""
     samples, parts, start = recording.samples, recording.parts, recording.frequency
@@ -271,12 +260,12 @@ def _measured(
         chosen = part or max(
             (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
         )
-        first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
+        first, stop = _chosen(samples, chosen, start, DRIFTS[recording.lock_in["detrend"]])
     else:
         first, stop = _given(samples.time, window)
         # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
-    if only_whole_periods:
+    if recording.only_whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
     time, force_values = samples.time[cut], samples.force[cut]
@@ -285,10 +274,8 @@ def _measured(
         samples.load[cut],
         force_values,
         frequency=start,
-        harmonics=harmonics,
-        detrend=detrend,
-        refine=recording.refine,
         settles=True,
+        **recording.lock_in,
     )
     chosen_by = "program" if window is None else "user"
     before, after = _around(samples, parts, chosen, reading.W0)
@@ -351,7 +338,7 @@ def _measured(
     )
 
 
-def modulation_line(time: Array, load: Array, near: float | None = None) -> SpectralLine:
+def modulation_line(time: Float, load: Float, near: float | None = None) -> SpectralLine:
     """The modulation of a load, be it in only a part of the recording.
 
     Parameters
@@ -387,7 +374,7 @@ def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int)
     return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
 
 
-def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
+def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     start, end = window
     first, stop = np.searchsorted(time, [start, end], side="left")
     stop = int(np.searchsorted(time, end, side="right"))
@@ -431,12 +418,12 @@ def _around(
     return sides[0], sides[1]
 
 
-def _no_modulation(time: Array) -> float:
+def _no_modulation(time: Float) -> float:
     """A frequency (Hz) far above what is slow in a pause."""
     return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
-def _settled_level(time: Array, force: Array) -> MeanLevel | None:
+def _settled_level(time: Float, force: Float) -> MeanLevel | None:
     """The level that the force of a pause settles to; None if it is not determined."""
     settling = settling_from(time, force, _no_modulation(time), 1)
     if settling is None or not settling.possible:

@@ -8,7 +8,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from asperity.arrays import Bool, Float
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -26,8 +27,6 @@ SLIDING_CONVENTIONS = (
     "change = level after less level before, both extrapolated to the step; "
     "healing = peak after a hold less level before it; uncertainties are standard uncertainties"
 )
-
-Array = NDArray[np.float64]
 
 _BINS = 90
 #: Samples of the spectrum.
@@ -104,7 +103,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
     }
 
 
-def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], Float]:
     """Joint covariance of what fits compare: mean_friction, delta_mu, mu1, phase1, mu2, phase2.
 
     Parameters
@@ -211,10 +210,10 @@ class MeanCycle(NamedTuple):
         Sum of the fitted harmonics.
     """
 
-    phase: Array
-    measured: Array
-    fine_phase: Array
-    fitted: Array
+    phase: Float
+    measured: Float
+    fine_phase: Float
+    fitted: Float
 
 
 def mean_cycle(measurement: Measurement) -> MeanCycle:
@@ -240,7 +239,7 @@ def mean_cycle(measurement: Measurement) -> MeanCycle:
     return MeanCycle(middles[filled], (mean - reading.mean_friction)[filled], fine, fitted)
 
 
-def residual_spectrum(measurement: Measurement) -> tuple[Array, Array]:
+def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
     """Amplitudes of F/W0 without the fitted harmonics, up to the order after the last one.
 
     Parameters
@@ -280,7 +279,7 @@ def residual_spectrum(measurement: Measurement) -> tuple[Array, Array]:
 _CLOSE = 8
 
 
-def middle_events(measurement: StickSlipMeasurement) -> tuple[slice, NDArray[np.bool_]]:
+def middle_events(measurement: StickSlipMeasurement) -> tuple[slice, Bool]:
     """Some events in the middle of a recording, and the samples around them, for a picture."""
     time, events = measurement.time, measurement.events
     first = max((len(events) - _CLOSE) // 2, 0)

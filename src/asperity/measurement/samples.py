@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Channel, Trace
 
-Array = NDArray[np.float64]
 
 #: Medians of F/W and of a recorded friction that differ by more than this share contradict each
 #: other. Corrections for jackets, seals and changing areas are some percent; a wrong unit, column
@@ -31,7 +30,7 @@ _CONTRADICTS = 0.1
 #: Samples that a lock-in needs.
 _FEWEST = 16
 
-_NONE: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+_NONE: Index = np.empty(0, dtype=np.intp)
 
 #: Largest size of a value, and one over the smallest of a channel's largest: fits take squares of
 #: squares of ratios, which doubles must hold.
@@ -135,7 +134,7 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
     )
 
 
-def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Array) -> None:
+def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Float) -> None:
     """Refuse a recorded friction that is not F/W, where the user has chosen neither.
 
     Parameters
@@ -183,7 +182,7 @@ def _friction(trace: Trace) -> Channel | None:
         return None
 
 
-def compressive(load: Array, shear: Array) -> tuple[Array, Array, list[Finding]]:
+def compressive(load: Float, shear: Float) -> tuple[Float, Float, list[Finding]]:
     """Load and shear with the load positive in compression.
 
     A negative mean load is a convention of the recorder: contacts bear no tension. A shear that is
@@ -214,7 +213,7 @@ def compressive(load: Array, shear: Array) -> tuple[Array, Array, list[Finding]]
     return -load, shear, [Finding("sign", "warning", 1.0, "", sentence)]
 
 
-def _mean(values: Array) -> float:
+def _mean(values: Float) -> float:
     finite = values[np.isfinite(values)]
     with np.errstate(over="ignore"):
         return float(finite.mean()) if finite.size else 0.0
@@ -244,12 +243,12 @@ class Samples:
         The recording of these two channels, with what cannot be used.
     """
 
-    time: Array
-    load: Array
-    force: Array
+    time: Float
+    load: Float
+    force: Float
     unit: str
     names: tuple[str, str]
-    defects: NDArray[np.intp]
+    defects: Index
     findings: tuple[Finding, ...]
     dropped: int
     unread: int
@@ -305,7 +304,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
 
 
-def too_few(fewest: int, usable: int, time: Array, columns: Mapping[str, Array]) -> InputError:
+def too_few(fewest: int, usable: int, time: Float, columns: Mapping[str, Float]) -> InputError:
     """The error of a recording with too few usable samples: the columns without numbers, if any.
 
     Parameters
@@ -331,7 +330,7 @@ def too_few(fewest: int, usable: int, time: Array, columns: Mapping[str, Array])
     )
 
 
-def require_computable(**channels: Array) -> None:
+def require_computable(**channels: Float) -> None:
     """Refuse values whose squares are too large or too small to be computed with.
 
     Parameters

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-Array = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Cosine transforms from which the noise of a mean is estimated.
 _COSINES = 8
@@ -66,14 +65,14 @@ def rate_between(first: MeanLevel, second: MeanLevel) -> Rate:
     return Rate((second.value - first.value) / seconds, doubt, effective_dof(parts))
 
 
-def block_means(values: Array, blocks: int) -> Array:
+def block_means(values: Float, blocks: int) -> Float:
     """Means of about so many runs of equally many samples; a short run at the end is left out."""
     length = max(1, values.size // blocks)
     whole = values.size // length
     return values[: whole * length].reshape(whole, length).mean(1)
 
 
-def mean_level(time: Array, values: Array) -> MeanLevel:
+def mean_level(time: Float, values: Float) -> MeanLevel:
     """Mean of a stretch, correlated noise honoured.
 
     Parameters
@@ -98,7 +97,7 @@ def mean_level(time: Array, values: Array) -> MeanLevel:
     return MeanLevel(float(values.mean()), spread, float(cosines), float(time[0]), float(time[-1]))
 
 
-def steady_from(values: Array, degree: int) -> int:
+def steady_from(values: Float, degree: int) -> int:
     """Where a series has forgotten its beginning: index of the first value to keep.
 
     The start is cut where what is left determines its mean best, by the marginal standard error
@@ -157,13 +156,13 @@ class TrendFit:
         Degrees of freedom of `variance`.
     """
 
-    beta: Array
-    inverse: Array
+    beta: Float
+    inverse: Float
     variance: float
     dof: int
 
 
-def bin_means(at: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
+def bin_means(at: Float, values: Float, bins: int = BINS) -> tuple[Float, Float]:
     """Means over bins of equal width, without those that are empty.
 
     Parameters
@@ -185,14 +184,14 @@ def bin_means(at: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]
     )
 
 
-def columns(slip: Array, degree: int, decays: tuple[float, ...] = ()) -> Array:
+def columns(slip: Float, degree: int, decays: tuple[float, ...] = ()) -> Float:
     """Columns of a fit: powers of slip and exponentials that decay from zero slip, (n, p)."""
     made = [slip**power for power in range(degree + 1)]
     made += [np.exp(-np.abs(slip) / decay) for decay in decays]
     return np.stack(made, axis=1)
 
 
-def fit_trend(matrix: Array, values: Array) -> TrendFit:
+def fit_trend(matrix: Float, values: Float) -> TrendFit:
     """Fit a segment.
 
     Parameters
@@ -211,7 +210,7 @@ def fit_trend(matrix: Array, values: Array) -> TrendFit:
     return TrendFit(beta / scale, inverse / np.outer(scale, scale), variance, dof)
 
 
-def slow_variance(residual: Array, matrix: Array) -> tuple[float, int]:
+def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     """Variance per bin of white noise as strong as the slow noise, and its degrees of freedom.
 
     Parameters

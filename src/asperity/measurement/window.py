@@ -6,13 +6,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float, Index
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
-
-Array = NDArray[np.float64]
 
 #: Periods in a block of the envelope, blocks of a whole recording at most, and blocks of one period
 #: where there would be fewer: edges are the exception among so many. Samples in a block.
@@ -62,7 +60,7 @@ class LoadInterval(NamedTuple):
         return self.amplitude > 0
 
 
-def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
+def stretches(time: Float, load: Float, frequency: float) -> list[LoadInterval]:
     """Modulated and unmodulated parts of a load, in their order.
 
     Blocks at the edge of a part, which hold some of both, belong to none.
@@ -95,7 +93,7 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
     return intervals
 
 
-def envelope(time: Array, load: Array, frequency: float) -> tuple[Array, NDArray[np.intp]]:
+def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
     """Amplitude of the load at a frequency, block by block.
 
     Returns
@@ -115,14 +113,14 @@ def envelope(time: Array, load: Array, frequency: float) -> tuple[Array, NDArray
     return amplitude, edges
 
 
-def _scatter(series: Array) -> float:
+def _scatter(series: Float) -> float:
     """Standard deviation from neighbours, which steps hardly touch."""
     if series.size < 3:
         return 0.0
     return 1.4826 * float(np.median(np.abs(np.diff(series)))) / np.sqrt(2)
 
 
-def local(time: Array, channels: list[Array], frequency: float) -> BlockSums:
+def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:
     """Sums over short blocks of a period or some."""
     half = float(time[-1] - time[0]) / 2
     basis = Basis(2 * np.pi * frequency, 1, 1, float(time[0]) + half, half)
@@ -142,7 +140,7 @@ def merged(blocks: BlockSums, wanted: int) -> BlockSums:
     if edges.size > 1 and blocks.count[edges[-1] :].sum() < 0.5 * blocks.count[:together].sum():
         edges = edges[:-1]
 
-    def added(values: Array) -> Array:
+    def added(values: Float) -> Float:
         return np.add.reduceat(values, edges, axis=0)
 
     count = added(blocks.count)
@@ -150,7 +148,7 @@ def merged(blocks: BlockSums, wanted: int) -> BlockSums:
     return BlockSums(blocks.basis, added(blocks.gram), added(blocks.moments), count, middle)
 
 
-def settled(time: Array, force: Array, frequency: float, degree: int) -> int:
+def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
     """First sample at which the force has forgotten what was before this part of it.
 
     What is left out ends where the settling has fallen below the uncertainty of the mean, if that
@@ -187,7 +185,7 @@ def settled(time: Array, force: Array, frequency: float, degree: int) -> int:
     return latest
 
 
-def settling_from(time: Array, force: Array, frequency: float, degree: int) -> Settling | None:
+def settling_from(time: Float, force: Float, frequency: float, degree: int) -> Settling | None:
     """How the mean of a force settles, if it does.
 
     Parameters
@@ -207,7 +205,7 @@ def settling_from(time: Array, force: Array, frequency: float, degree: int) -> S
     return settling_of_mean(sums(basis, time, [force], blocks=_MOST_BLOCKS, step=step))
 
 
-def clean_run(first: int, stop: int, defects: NDArray[np.intp]) -> tuple[int, int]:
+def clean_run(first: int, stop: int, defects: Index) -> tuple[int, int]:
     """The longest run of samples between defects, if it is worth being read alone.
 
     Parameters
@@ -226,7 +224,7 @@ def clean_run(first: int, stop: int, defects: NDArray[np.intp]) -> tuple[int, in
     return begin, int(edges[longest + 1])
 
 
-def whole_periods(time: Array, frequency: float) -> int:
+def whole_periods(time: Float, frequency: float) -> int:
     """Number of samples in the largest whole number of periods from the start, ends included."""
     span = float(time[-1] - time[0])
     step = span / (time.size - 1)
@@ -234,7 +232,7 @@ def whole_periods(time: Array, frequency: float) -> int:
     return int(np.searchsorted(time, time[0] + whole - 0.5 * step, side="right"))
 
 
-def _solved(blocks: BlockSums) -> Array:
+def _solved(blocks: BlockSums) -> Float:
     linear = blocks.basis.linear
     gram = blocks.gram[:, :linear, :linear]
     # A block whose samples lie in a gap's edge may not tell its columns apart.
@@ -242,7 +240,7 @@ def _solved(blocks: BlockSums) -> Array:
 
 
 def under_the_same_load(
-    load: Array, first: int, stop: int, mean_load: float, *, before: bool
+    load: Float, first: int, stop: int, mean_load: float, *, before: bool
 ) -> tuple[int, int]:
     """Samples of a pause next to the modulated stretch whose load is that of the reading.
 

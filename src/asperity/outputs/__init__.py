@@ -5,38 +5,28 @@ completely or not at all, and `unfinished` keeps the finished blocks of a long c
 goes on from there after an interruption.
 """
 
+from asperity._lazy import public_names
 from asperity.outputs.targets import (
-    free_disk,
-    output_file,
-    output_files,
-    require_disk,
-    require_memory,
-    require_short,
-    size_text,
+    free_disk as free_disk,
+    output_file as output_file,
+    output_files as output_files,
+    require_disk as require_disk,
+    require_memory as require_memory,
+    require_short as require_short,
+    size_text as size_text,
 )
 from asperity.outputs.unfinished import (
-    Interrupted,
-    UnfinishedOutput,
-    UnfinishedText,
-    differences,
-    undisturbed,
+    Interrupted as Interrupted,
+    UnfinishedOutput as UnfinishedOutput,
+    UnfinishedText as UnfinishedText,
+    differences as differences,
+    undisturbed as undisturbed,
 )
-from asperity.outputs.written import require_folder, written_file, written_folder
+from asperity.outputs.written import (
+    require_folder as require_folder,
+    write_table as write_table,
+    written_file as written_file,
+    written_folder as written_folder,
+)
 
-__all__ = [
-    "Interrupted",
-    "UnfinishedOutput",
-    "UnfinishedText",
-    "differences",
-    "free_disk",
-    "output_file",
-    "output_files",
-    "require_disk",
-    "require_folder",
-    "require_memory",
-    "require_short",
-    "size_text",
-    "undisturbed",
-    "written_file",
-    "written_folder",
-]
+__all__ = public_names(globals())

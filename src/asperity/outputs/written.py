@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -191,3 +192,9 @@ def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
         f"{name} must be a folder that can be written, got '{folder}' ({why}); "
         "choose another folder"
     )
+
+
+def write_table(path: Path, names: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a table: a line of names, and a line for each row."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([names, *rows])

@@ -332,7 +332,7 @@ class Drawn(Displayed):
 def labelled(figure: Figure, names: Names) -> Figure:
     """The figure, its labels in a set of names."""
     if names == "geophysics":
-        in_symbols: Any = import_module("asperity.parameters.names").in_symbols
+        in_symbols: Any = import_module("asperity.parameters.table").in_symbols
         labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
         for text in labels:
             text.set_text(in_symbols(text.get_text()))

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.outputs import output_file, written_file
 
@@ -128,9 +128,9 @@ class RunOutline:
     law : str
     """
 
-    time: NDArray[np.float64]
-    low: dict[str, NDArray[np.float64]]
-    high: dict[str, NDArray[np.float64]]
+    time: Float
+    low: dict[str, Float]
+    high: dict[str, Float]
     events: list[tuple[float, str]]
     title: str
     law: str
@@ -203,7 +203,7 @@ def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     )
 
 
-def _blocks(run: Path, names: Iterable[str]) -> Iterator[dict[str, NDArray[np.float64]]]:
+def _blocks(run: Path, names: Iterable[str]) -> Iterator[dict[str, Float]]:
     import h5netcdf
 
     with h5netcdf.File(run, "r") as file:

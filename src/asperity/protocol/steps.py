@@ -31,7 +31,7 @@ from asperity.loads import (
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.parameters.arguments import shown
 from asperity.recording import read
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.units import to_si
 
 #: Quantities that a recording can prescribe: the role and the kind of the channel.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Names, Quantity, evaluate
@@ -18,7 +19,7 @@ from asperity.units import KINDS
 from asperity.units.scale import base_units, kind_of_dimension, unit_text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
@@ -93,7 +94,7 @@ def _with(
     return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 
-def _with_time(trace: Trace, time: NDArray[np.float64], field: Argument, text: str) -> Trace:
+def _with_time(trace: Trace, time: Float, field: Argument, text: str) -> Trace:
     require(np.isfinite(time).any(), field, "give times", "no finite one", "correct the expression")
     kept = [f for f in trace.findings if f.name not in CHECKED]
     moved = replace(trace, time=time, findings=())

@@ -17,12 +17,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, closest
 from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
-
-Array = NDArray[np.float64]
 
 #: Characters that a text may have.
 _LONGEST = 2000
@@ -49,7 +47,7 @@ _SECONDS: Dimension = (("second", 1.0),)
 class Quantity(NamedTuple):
     """Values in SI base units, an array or one number, and their dimension."""
 
-    values: Array | np.float64
+    values: Float | np.float64
     dimension: Dimension
 
 
@@ -68,16 +66,16 @@ class Names(NamedTuple):
 
     find: Callable[[str, bool], tuple[Quantity, str] | None]
     known: tuple[str, ...]
-    time: Array
+    time: Float
 
 
-def _trapezoids(values: Array, time: Array) -> Array:
+def _trapezoids(values: Float, time: Float) -> Float:
     return np.concatenate([[0.0], np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2)])
 
 
 #: Functions of a quantity: of its values and the times, and the powers of the quantity's dimension
 #: and of seconds in the dimension of the result.
-_FUNCTIONS: dict[str, tuple[Callable[[Any, Array], Any], float, float]] = {
+_FUNCTIONS: dict[str, tuple[Callable[[Any, Float], Any], float, float]] = {
     "abs": (lambda x, t: np.abs(x), 1, 0),
     "sqrt": (lambda x, t: np.sqrt(x), 0.5, 0),
     "cumulative": (lambda x, t: np.cumsum(np.broadcast_to(x, t.shape)), 1, 0),

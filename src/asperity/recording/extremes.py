@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from asperity.arrays import Float, Index
 
 
-def extremes(values: NDArray[np.float64], blocks: int) -> NDArray[np.intp]:
+def extremes(values: Float, blocks: int) -> Index:
     """Smallest and largest sample of each block, by their indices in the order of time.
 
     Parameters
@@ -28,3 +29,19 @@ def extremes(values: NDArray[np.float64], blocks: int) -> NDArray[np.intp]:
     low = first + np.argmin(np.where(absent, np.inf, table), axis=1)
     high = first + np.argmax(np.where(absent, -np.inf, table), axis=1)
     return np.sort(np.stack([low, high], axis=1), axis=1).ravel()
+
+
+def thinned(x: Float, y: Float, blocks: int) -> dict[str, Float]:
+    """The `asperity.recording.extremes` of a curve as ``x`` and ``y``."""
+    kept = extremes(y, blocks)
+    return {"x": _rounded(x[kept]), "y": _rounded(y[kept])}
+
+
+def _rounded(values: Float) -> Float:
+    """Values rounded to seven digits of the largest: more than a picture shows."""
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max()) if finite.size else 0.0
+    if not size:
+        return values
+    places = 7 - int(np.floor(np.log10(size)))
+    return np.round(values, places) if abs(places) < 300 else values

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, listed, require
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.defects.check import CHECKED, check, even_rate
@@ -19,7 +20,6 @@ from asperity.units import from_si, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Channel:
         As in the file; empty without one.
     """
 
-    values: NDArray[np.float64]
+    values: Float
     kind: str | None = None
     unit: str = ""
     recorded_name: str = ""
@@ -47,7 +47,7 @@ class Channel:
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", _column(self.values, "Channel.values"))
 
-    def to(self, unit: str) -> NDArray[np.float64]:
+    def to(self, unit: str) -> Float:
         """Values in another unit, such as ``"MPa"``; raises `InputError` if it does not fit."""
         if self.kind is None:
             got = f"'{self.recorded_unit}' for '{self.recorded_name}'"
@@ -74,7 +74,7 @@ class Trace(Displayed):
         Channels chosen for a role, such as ``{"F": "Shear"}``; other roles go by name.
     """
 
-    time: NDArray[np.float64]
+    time: Float
     channels: Mapping[str, Channel]
     findings: tuple[Finding, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -193,7 +193,7 @@ class Trace(Displayed):
         )
 
 
-def _column(values: Any, name: str) -> NDArray[np.float64]:
+def _column(values: Any, name: str) -> Float:
     """A read-only float64 view; the caller's array stays as it is."""
     column = np.asarray(values, dtype=np.float64).view()
     require(column.ndim == 1, name, "have one dimension", column.ndim, "give one array per channel")
@@ -201,7 +201,7 @@ def _column(values: Any, name: str) -> NDArray[np.float64]:
     return column
 
 
-def _extent(time: NDArray[np.float64]) -> str:
+def _extent(time: Float) -> str:
     if not np.isfinite(time).any():
         return "the trace has no finite time"
     return f"the trace runs from {np.nanmin(time):.10g} s to {np.nanmax(time):.10g} s"

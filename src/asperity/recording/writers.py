@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, closest
 from asperity.outputs import output_file, written_file
 from asperity.units import KINDS
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
 #: Unit and values of each channel in the file.
-_Columns = Mapping[str, tuple[str, NDArray[np.float64]]]
+_Columns = Mapping[str, tuple[str, Float]]
 
 #: Rows that are formatted at a time.
 _ROWS = 100_000

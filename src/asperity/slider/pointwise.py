@@ -15,15 +15,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import jacobian_columns
+from asperity.arrays import Float
 from asperity.loads import Excitation, Modulation
 from asperity.slider.motion import Motion
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 #: Phases in a call: the collocation points of 72 intervals.
 ROWS = 288
@@ -59,9 +57,7 @@ class PointValues(NamedTuple):
         return self.force_mean + self.force_rest
 
 
-@jax.jit
-def _excitation(load: Modulation, theta: Array) -> Excitation:
-    return load.at(theta)
+_excitation = jax.jit(lambda load, theta: load.at(theta))
 
 
 @cache

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
-from asperity.study.outcome import Answers
-from asperity.study.points import Float
+from asperity.arrays import Bool, Float, Index
+from asperity.study.points import Answers
 
 #: Accuracy of the position of a crossing, in fractions of an axis.
 TOLERANCE = 1e-6
@@ -43,7 +43,7 @@ class Crossings:
 
     where: Float
     points: Answers
-    located: NDArray[np.bool_]
+    located: Bool
     reason: NDArray[np.object_]
 
 
@@ -70,7 +70,7 @@ def find_crossings(
     length = np.hypot(*(end - start).T)
     failure = np.full(len(start), "no change of sign", dtype=object)
 
-    def at(s: Float, line: NDArray[np.intp]) -> Float:
+    def at(s: Float, line: Index) -> Float:
         return np.asarray(start[line] + (s / length[line])[:, None] * (end - start)[line])
 
     def log_multiplier(s: Float, index: Float) -> Float:

@@ -19,17 +19,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.arrays import Index
 from asperity.errors import InputError
 from asperity.outputs import differences
 from asperity.study.engine import DoneChunk
 from asperity.study.workers import ENVIRONMENT
 
 if TYPE_CHECKING:
-    from asperity.study.outcome import Answers
-    from asperity.study.points import Points
+    from asperity.study.points import Answers, Points
     from asperity.study.store.store import SweepStore
 
 #: Packages whose version may change the last digits of a number.
@@ -90,7 +89,7 @@ class Job:
         """
         store = _opened(self)
         from asperity._jax import spare_mappings
-        from asperity.study.outcome import Answers, SweepOutcome
+        from asperity.study.points import Answers, SweepOutcome
         from asperity.study.store.lock import current_token
 
         messages: list[str] = []
@@ -112,11 +111,9 @@ class Job:
         spare_mappings()
         return DoneChunk(size, answers.failed, seconds, tuple(messages), _largest_memory())
 
-    def _solve(
-        self, points: Points, answers: Answers, rows: NDArray[np.intp], messages: list[str]
-    ) -> None:
+    def _solve(self, points: Points, answers: Answers, rows: Index, messages: list[str]) -> None:
         """Solve the points `rows`; after an error find the failing points by bisection."""
-        from asperity.study.outcome import SweepOutcome
+        from asperity.study.points import SweepOutcome
         from asperity.study.solve import SOLVES
 
         record = _opened(self).record

@@ -1,21 +1,25 @@
-"""Operating points of a chunk, and the dimensionless ratios from which parameters may follow."""
+"""Operating points of a chunk and their answers: numbers, and an outcome as code and as words.
+
+Parameters may follow from dimensionless ratios.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float, Index
 from asperity.laws import get_law
+from asperity.loads.modulated import no_contact
+from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import Parameter, point_parameters
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
 #: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).
@@ -117,3 +121,175 @@ RATIOS: Mapping[str, Ratio] = MappingProxyType(
         ),
     }
 )
+
+
+class SweepOutcome(IntEnum):
+    """Outcomes of a sweep's points, in addition to those of `asperity.orbit.outcome.Outcome`."""
+
+    NOT_COMPUTED = -1
+    CONVERGED = 0
+    CONTACT_LOST = 50
+    SOLVER_ERROR = 51
+    WORKER_LOST = 52
+    STABLE_THROUGHOUT = 60
+    UNSTABLE_THROUGHOUT = 61
+    NO_CROSSING = 62
+    NO_RESPONSE = 63
+    STOPPED = 70
+    REFUSED = 71
+    FIT_FAILED = 80
+    NO_READINGS = 81
+
+
+_SENTENCES = {
+    SweepOutcome.NOT_COMPUTED: "not computed yet",
+    SweepOutcome.CONVERGED: "converged",
+    SweepOutcome.SOLVER_ERROR: (
+        "the solver stopped with an unexpected error; the log of the run has its message"
+    ),
+    SweepOutcome.WORKER_LOST: (
+        "the process that solved this point died at each attempt, perhaps for lack of memory; "
+        "repeat with --retry-failed and fewer workers"
+    ),
+    SweepOutcome.STABLE_THROUGHOUT: (
+        "no threshold: stable at every stiffness of the scan, from {detail:.4g} K_c; extend "
+        "threshold.between"
+    ),
+    SweepOutcome.UNSTABLE_THROUGHOUT: (
+        "no threshold: unstable at the stiffest spring of the scan, {detail:.4g} K_c; extend "
+        "threshold.between"
+    ),
+    SweepOutcome.NO_CROSSING: (
+        "stability changes between two neighbouring stiffnesses, near {detail:.6g} K_c, but no "
+        "multiplier crosses the unit circle there"
+    ),
+    SweepOutcome.NO_RESPONSE: (
+        "no periodic response at some of the stiffnesses of the scan, the first of them "
+        "{detail:.4g} K_c"
+    ),
+    SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
+    SweepOutcome.REFUSED: (
+        "the numbers or the data of this point are invalid; the log of the run gives the reason"
+    ),
+    SweepOutcome.FIT_FAILED: (
+        "the fit did not converge; asperity fit with the numbers of this point gives details"
+    ),
+    SweepOutcome.NO_READINGS: (
+        "no readings to fit: at the true values some row of the table has no periodic response"
+    ),
+}
+
+
+def words() -> dict[int, str]:
+    """The word of each outcome code, as in the attribute ``flag_meanings``."""
+    codes = {int(o): o.name.lower() for o in Outcome} | {
+        int(o): o.name.lower() for o in SweepOutcome
+    }
+    return dict(sorted(codes.items()))
+
+
+def reason(outcome: int, detail: float) -> str:
+    """The sentence of an outcome with its number."""
+    if outcome == SweepOutcome.CONTACT_LOST:
+        return no_contact(detail)
+    if outcome in _SENTENCES:
+        return _SENTENCES[SweepOutcome(outcome)].format(detail=detail)
+    return sentence(outcome, detail)
+
+
+def flag_attributes() -> dict[str, Any]:
+    """CF attributes of the variable ``outcome``: codes and their meanings."""
+    known = words()
+    return {
+        "units": "1",
+        "long_name": "outcome of the point",
+        "flag_values": list(known),
+        "flag_meanings": " ".join(known.values()),
+    }
+
+
+def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
+    """Outcomes of points as sentences.
+
+    Parameters
+    ----------
+    outcome, detail : array
+        Variables of a store, or parts of them.
+    """
+    outcome, detail = np.broadcast_arrays(np.asarray(outcome), np.asarray(detail))
+    texts = np.full(outcome.shape, "converged", dtype=object)
+    for i in map(tuple, np.argwhere(outcome != SweepOutcome.CONVERGED)):
+        texts[i] = reason(int(outcome[i]), float(detail[i]))
+    return texts
+
+
+@dataclass
+class Answers:
+    """Numbers and outcomes of points.
+
+    Attributes
+    ----------
+    numbers : dict of str to array, shape (points,)
+        Outputs by name; NaN where a point failed.
+    outcome : int16 array, shape (points,)
+        A `SweepOutcome`, or an `asperity.orbit.outcome.Outcome`.
+    detail : array, shape (points,)
+        The number in the sentence of the outcome; 0 where the sentence has no number.
+    """
+
+    numbers: dict[str, Float]
+    outcome: NDArray[np.int16]
+    detail: Float
+
+    @classmethod
+    def empty(cls, names: Sequence[str], count: int) -> Answers:
+        """Answers of `count` points that are not computed yet."""
+        return cls(
+            {name: np.full(count, np.nan) for name in names},
+            np.full(count, SweepOutcome.NOT_COMPUTED, dtype=np.int16),
+            np.zeros(count),
+        )
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    def __getitem__(self, name: str) -> Float:
+        return self.numbers[name]
+
+    def take(self, index: Any) -> Answers:
+        """The answers of the points `index`, which is an array of numbers, a mask or a slice."""
+        numbers = {name: values[index] for name, values in self.numbers.items()}
+        return Answers(numbers, self.outcome[index], self.detail[index])
+
+    def with_others(self, others: Answers) -> Answers:
+        """These answers, followed by others of the same outputs."""
+        numbers = {n: np.concatenate([v, others[n]]) for n, v in self.numbers.items()}
+        outcome = np.concatenate([self.outcome, others.outcome])
+        return Answers(numbers, outcome, np.concatenate([self.detail, others.detail]))
+
+    def put(self, index: Any, others: Answers) -> None:
+        """Replace the answers at `index` by `others`."""
+        for name, values in others.numbers.items():
+            self.numbers[name][index] = values
+        self.outcome[index], self.detail[index] = others.outcome, others.detail
+
+    def fail(self, index: Any, outcome: int, detail: Any = 0.0) -> None:
+        """Set an outcome at the points `index`, and their numbers to NaN."""
+        for values in self.numbers.values():
+            values[index] = np.nan
+        self.outcome[index], self.detail[index] = outcome, detail
+
+    @property
+    def converged(self) -> Bool:
+        """Points with an answer."""
+        return np.asarray(self.outcome == SweepOutcome.CONVERGED)
+
+    @property
+    def failed(self) -> int:
+        """Number of points without an answer."""
+        return int(np.count_nonzero(~self.converged))
+
+    @property
+    def result(self) -> NDArray[np.object_]:
+        """The word "converged", or the sentence of the outcome."""
+        return reasons(self.outcome, self.detail)

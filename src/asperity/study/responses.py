@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float, Index
 from asperity.laws import Law
 from asperity.operating_point import lowest_loads, motions, respond, without_mass
 from asperity.orbit import PeriodicResponse
@@ -14,8 +15,7 @@ from asperity.orbit.floquet import kind_of_crossing
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import RULES, point_parameters
 from asperity.parameters.arguments import increments
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import Float, Index
+from asperity.study.points import Answers, SweepOutcome
 
 
 def answers_of_law(
@@ -68,7 +68,7 @@ def solvable(law: type[Law], values: Mapping[str, Float], answers: Answers) -> I
     return sound[~lost]
 
 
-def is_stable(answers: Answers) -> NDArray[np.bool_]:
+def is_stable(answers: Answers) -> Bool:
     """Whether all multipliers are inside the unit circle; False where not converged."""
     return answers.converged & (answers["log_multiplier"] < 0)
 
@@ -86,7 +86,7 @@ def _answers_of(response: PeriodicResponse, outputs: Sequence[str]) -> Answers:
     return Answers(numbers, response.outcome.astype(np.int16), detail)
 
 
-def _output(response: PeriodicResponse, name: str) -> NDArray[np.float64]:
+def _output(response: PeriodicResponse, name: str) -> Float:
     if name not in ("log_multiplier", "multiplier_argument"):
         return np.asarray(getattr(response, name), dtype=float)
     logs = response.log_multipliers

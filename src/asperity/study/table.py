@@ -33,8 +33,7 @@ from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
 from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.study.engine import solve_here
-from asperity.study.outcome import Answers
-from asperity.study.points import Points
+from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
 
 Row = list[str]
@@ -110,7 +109,9 @@ def run_table(
         answers, results = _solved(table, rows, advance)
         header = None if start else [*table.header, *RESULT_COLUMNS]
         cells = zip(rows, _cells(answers, results), strict=True)
-        lines = [(*_of_width(row, len(table.header)), *answer) for row, answer in cells]
+        # Rows with as many cells as the header.
+        width = len(table.header)
+        lines = [(*(row + [""] * width)[:width], *answer) for row, answer in cells]
         output.append_rows(lines, table.delimiter, header, failed=answers.failed)
 
     with output.interruptible("rows", table.rows):
@@ -315,11 +316,6 @@ def _nearest(name: str, known: set[str]) -> str | None:
 
 
 # Rows to numbers
-
-
-def _of_width(row: Row, width: int) -> Row:
-    """The row with as many cells as the header."""
-    return (row + [""] * width)[:width]
 
 
 def _mistake_of_width(row: Row, width: int) -> str:

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.outputs import require_memory
@@ -21,8 +22,7 @@ from asperity.parameters.arguments import at_least, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import POINT_BYTES, Float
+from asperity.study.points import POINT_BYTES, Answers, SweepOutcome
 from asperity.study.responses import answers_of_law, bifurcation_kinds
 
 #: What happens at a threshold.

@@ -25,17 +25,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
+from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.loads import Excitation
 from asperity.parameters import obeying
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, QuasiStatic, Slider
-
-Float = NDArray[np.float64]
 
 #: Stiffnesses of the stability scan, over the scale of the law: decades and number of points.
 _DECADES, _POINTS = 8, 400
@@ -44,7 +42,7 @@ _DECADE = math.log(10)
 
 
 @typed
-def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
+def decay_rates(law: Law, velocity: float | str) -> Complex:
     """Rates per slip (1/m) at which states relax to steady sliding at imposed velocity.
 
     Parameters

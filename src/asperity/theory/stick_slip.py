@@ -19,11 +19,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from asperity.arrays import Float
 from asperity.parameters.parameter import obeying
-
-Array = NDArray[np.float64]
 
 #: Newton's steps; they converge from above in five.
 _STEPS = 40
@@ -44,12 +43,12 @@ class StickSlipCycle(NamedTuple):
         Of the slider (m/s).
     """
 
-    drop: Array
-    stick_duration: Array
-    slip_duration: Array
-    period: Array
-    slip: Array
-    peak_velocity: Array
+    drop: Float
+    stick_duration: Float
+    slip_duration: Float
+    period: Float
+    slip: Float
+    peak_velocity: Float
 
 
 def overshooting_cycle(
@@ -103,7 +102,7 @@ def healing_drop(
     W0: ArrayLike,
     V: ArrayLike,
     overshoot: ArrayLike = 2.0,
-) -> Array:
+) -> Float:
     """Drop of F/W0 of a cycle whose strength grows with the logarithm of the time of rest.
 
     Parameters
@@ -153,7 +152,7 @@ def healing_drop(
     return np.asarray(overshoot * B * u)
 
 
-def _machine(**numbers: Any) -> list[Array]:
+def _machine(**numbers: Any) -> list[Float]:
     kinds = {"K": "stiffness", "M": "mass", "W0": "force", "V": "velocity"}
     return [
         obeying(value, f"cycle.{name}", kinds[name], "positive") for name, value in numbers.items()

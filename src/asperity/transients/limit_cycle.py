@@ -30,8 +30,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.loads import Excitation, Programme, Slide
 from asperity.slider import Motion, Slider
 from asperity.slider.named import equation_parameters
@@ -39,8 +39,6 @@ from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
 from asperity.transients.variation import Variation
-
-Float = NDArray[np.float64]
 
 #: Velocities of the sliding before the first cycle, over that of the drive: the second where the
 #: first slip from the first is too large for the law.

@@ -247,6 +247,7 @@ def transient(
     segment, ringing below the velocity sqrt(lambda W0 / M) times the tolerated error of F_i/W is
     left out; `provenance` gives it as ``unresolved_ringing`` (m/s), 0 where all is resolved.
     """
+    arguments = dict(locals())
     rows = planned_rows(sampling, programme.duration)
     if rows is not None:
         # The factor 2: the blocks, and the joined trajectory.
@@ -256,20 +257,4 @@ def transient(
             "lower the rate, shorten the programme, or take it block by block with "
             "asperity.transients.integrate_blocks or asperity run",
         )  # fmt: skip
-    blocks = integrate_blocks(
-        slider,
-        programme,
-        initial=initial,
-        sampling=sampling,
-        inertia=inertia,
-        radiation_damping=radiation_damping,
-        rtol=rtol,
-        atol=atol,
-        slip_velocity=slip_velocity,
-        runaway_velocity=runaway_velocity,
-        steady_tolerance=steady_tolerance,
-        method=method,
-        most_steps=most_steps,
-        progress=progress,
-    )
-    return Trajectory.joined(list(blocks))
+    return Trajectory.joined(list(integrate_blocks(**arguments)))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws import LinkerDieterich, RiceRuina
 from asperity.loads.programme.programme import BREAK
@@ -25,7 +25,6 @@ from asperity.units import to_si
 if TYPE_CHECKING:
     import xarray
 
-Float = NDArray[np.float64]
 
 #: Rows that doubles can count.
 _MOST_ROWS = 2.0**53

@@ -24,17 +24,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import jacobian_columns
+from asperity.arrays import Float
 from asperity.loads import Excitation
 from asperity.slider import Motion
 from asperity.slider.named import equation_parameters, with_value
 from asperity.slider.problem import Problem
 from asperity.transients.implicit import STAGES
-
-Float = NDArray[np.float64]
 
 #: Fewest instants in a call of the compiled program; more are padded to a power of two.
 _FEWEST = 1024

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from asperity.arrays import Float
 from asperity.parameters.arguments import number
 from asperity.tribometer.sensors import Given
 from asperity.units import to_radians
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +30,12 @@ class DirectShear:
         area = number(self.area, f"{type(self).__name__}.area", "area", "positive")
         object.__setattr__(self, "area", area)
 
-    def stresses(self, shear_force: ArrayLike, normal_force: ArrayLike) -> tuple[Array, Array]:
+    def stresses(self, shear_force: ArrayLike, normal_force: ArrayLike) -> tuple[Float, Float]:
         """Shear and normal stress (Pa) of the machine's forces (N)."""
         shear, normal = (np.asarray(f, dtype=np.float64) for f in (shear_force, normal_force))
         return shear / (self.surfaces * self.area), normal / self.area
 
-    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Array, Array]:
+    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Float, Float]:
         """Shear and normal force of the machine (N) of the stresses (Pa)."""
         shear, normal = (np.asarray(s, dtype=np.float64) for s in (shear_stress, normal_stress))
         return shear * self.surfaces * self.area, normal * self.area
@@ -88,7 +87,7 @@ class Triaxial:
         axial_force: ArrayLike,
         confining_pressure: ArrayLike,
         pore_pressure: ArrayLike = 0.0,
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Float, Float]:
         """Shear and effective normal stress (Pa) on the cut.
 
         Parameters
@@ -103,7 +102,7 @@ class Triaxial:
         normal = np.asarray(confining_pressure) + difference * np.sin(self.angle) ** 2
         return shear, normal - np.asarray(pore_pressure)
 
-    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Array, Array]:
+    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Float, Float]:
         """Axial force (N) and effective confining pressure (Pa) of the stresses on the cut (Pa)."""
         difference = 2 * np.asarray(shear_stress, dtype=np.float64) / np.sin(2 * self.angle)
         confining = np.asarray(normal_stress) - difference * np.sin(self.angle) ** 2

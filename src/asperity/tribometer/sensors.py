@@ -19,10 +19,9 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.parameters.arguments import number
-
-Array = NDArray[np.float64]
 
 #: Nodes of the quadrature over an interval, sufficient for e^{ps} of the fastest poles.
 _NODES = 64
@@ -62,7 +61,7 @@ def resonant(frequency: float, damping: float) -> tuple[NDArray, NDArray]:
     return poles, residues
 
 
-def filtered(values: Array, rate: float, poles: NDArray, residues: NDArray) -> Array:
+def filtered(values: Float, rate: float, poles: NDArray, residues: NDArray) -> Float:
     """Output of a filter at the samples of its input, which was steady before the first.
 
     Parameters
@@ -114,7 +113,7 @@ def _weights(pole: complex, h: float) -> NDArray:
     return basis @ (w * np.exp(pole * (h - s))) * length / 2
 
 
-def between(values: Array, rate: float, times: Array) -> Array:
+def between(values: Float, rate: float, times: Float) -> Float:
     """Values at any times (s since the first sample), by the cubic through four samples.
 
     Before the first and after the last sample the signal is constant.
@@ -214,7 +213,7 @@ class Sensor:
                     "correct the value"
                 )
 
-    def read(self, values: Array, rate: float, random: np.random.Generator) -> Array:
+    def read(self, values: Float, rate: float, random: np.random.Generator) -> Float:
         """The sensor's output at the samples of a quantity; the recorder's clock adds the delay.
 
         Parameters
@@ -245,12 +244,12 @@ class Sensor:
             seen = self.resolution * np.rint(seen / self.resolution)
         return seen
 
-    def _responded(self, values: Array, rate: float) -> Array:
+    def _responded(self, values: Float, rate: float) -> Float:
         if self.resonance:
             values = filtered(values, rate, *resonant(self.resonance, self.damping))
         return filtered(values, rate, *low_pass(1, self.bandwidth))
 
-    def _noise(self, n: int, rate: float, random: np.random.Generator) -> Array:
+    def _noise(self, n: int, rate: float, random: np.random.Generator) -> Float:
         """Ornstein-Uhlenbeck process, exact at the samples, from its stationary distribution."""
         from scipy.signal import lfilter
 
@@ -279,7 +278,7 @@ class SpringGauge(Sensor):
 
     stiffness: Given
 
-    def read(self, values: Array, rate: float, random: np.random.Generator) -> Array:
+    def read(self, values: Float, rate: float, random: np.random.Generator) -> Float:
         """Shear force (N) from the elongation."""
         return self.stiffness * super().read(values / self.stiffness, rate, random)
 
@@ -318,7 +317,7 @@ class Accelerometer(Sensor):
     mean: Given
     high_pass: Given
 
-    def _responded(self, values: Array, rate: float) -> Array:
+    def _responded(self, values: Float, rate: float) -> Float:
         seen = super()._responded(values, rate)
         if self.high_pass > 0:
             seen = seen - filtered(seen, rate, *low_pass(1, self.high_pass))

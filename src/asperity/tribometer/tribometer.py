@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
 from asperity.parameters.arguments import number
 from asperity.recording.defects.check import check
@@ -28,8 +29,6 @@ from asperity.tribometer.sensors import (
     resonant,
 )
 from asperity.units import KINDS, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +159,7 @@ class Tribometer:
         trace = Trace(stamps, channels, provenance=origin)
         return Trace(stamps, channels, check(trace), origin)
 
-    def _clock(self, grid: Array, random: np.random.Generator) -> tuple[Array, Array]:
+    def _clock(self, grid: Float, random: np.random.Generator) -> tuple[Float, Float]:
         """Time stamps, and the true sampling instants since the first sample."""
         recorder = self.recorder
         length = grid[-1] - grid[0]
@@ -176,9 +175,9 @@ class Tribometer:
         self,
         name: str,
         sensor: Sensor,
-        values: Array,
+        values: Float,
         rate: float,
-        instants: Array,
+        instants: Float,
         random: np.random.Generator,
     ) -> Channel:
         recorder = self.recorder
@@ -194,9 +193,7 @@ class Tribometer:
         return Channel(sampled, sensor.reads, unit, name, unit)
 
 
-def channel_gain(
-    tribometer: Tribometer, channel: str, frequency: ArrayLike
-) -> NDArray[np.complex128]:
+def channel_gain(tribometer: Tribometer, channel: str, frequency: ArrayLike) -> Complex:
     """Recorded over true amplitude of a harmonic signal, e^{+i w t}.
 
     A laboratory knows the gain from calibration, and divides amplitudes by its modulus.

@@ -11,7 +11,7 @@ import pandas as pd
 
 import asperity as asp
 from asperity.ledger import FigureNumbers, PaperFigure, Section
-from asperity_papers.bureau2000 import harmonics, mean, motion, schematics, stability
+from asperity_papers.bureau2000 import motion, response_figures as curves, schematics, stability
 from asperity_papers.bureau2000.curves import WORDS
 from asperity_papers.bureau2000.machine import PAPER, Machine
 from asperity_papers.bureau2000.recordings import SimulatedPoints, experiment_in_background
@@ -28,10 +28,16 @@ if TYPE_CHECKING:
 
 #: Figures made of curves: those of the paper, and three that are not in it.
 _OF_THE_PAPER = (
-    *(mean.figure_2, mean.figure_3, mean.figure_5, mean.figure_6, mean.figure_7),
-    *(harmonics.figure_4, harmonics.figure_8, harmonics.figure_9, harmonics.figure_11),
+    *(
+        curves.figure_2,
+        curves.figure_3,
+        curves.figure_5,
+        curves.figure_6,
+        curves.figure_7,
+    ),
+    *(curves.figure_4, curves.figure_8, curves.figure_9, curves.figure_11),
 )
-_FURTHER = (stability.floquet_figure, harmonics.phase_figure, motion.resonance_figure)
+_FURTHER = (stability.floquet_figure, curves.phase_figure, motion.resonance_figure)
 #: What computes each figure.
 NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
     **{figure.name: figure for figure in (*_OF_THE_PAPER, *_FURTHER)},
@@ -41,8 +47,8 @@ NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
 CURVES = {figure.name: figure.curves for figure in sorted(_OF_THE_PAPER, key=lambda f: f.name)}
 #: Figures with more than their plot.
 DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
-    "figure-03": mean.draw_3,
-    "figure-07": mean.draw_7,
+    "figure-03": curves.draw_3,
+    "figure-07": curves.draw_7,
 }
 #: Figures without numbers.
 SCHEMATICS: Mapping[str, Callable[[], Figure]] = {

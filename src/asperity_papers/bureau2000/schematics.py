@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
@@ -48,11 +49,6 @@ def _plate(axis: Axes, corner: Point, size: Point, **look: Any) -> None:
     axis.add_patch(Rectangle(corner, *size, **({"edgecolor": _INK} | look)))
 
 
-def _ground(axis: Axes, corner: Point, size: Point) -> None:
-    """Something that does not move: hatched below its edge."""
-    _plate(axis, corner, size, facecolor="white", hatch="//////", linewidth=0)
-
-
 def _spring(axis: Axes, start: Point, end: Point, turns: int, width: float) -> None:
     """A zigzag between two points, straight over the first and last sixth."""
     a, b = np.array(start), np.array(end)
@@ -93,19 +89,16 @@ def _label(
     axis.text(*at, text, ha=ha, va="center", bbox=white)
 
 
-def _text(axis: Axes, at: Point, text: str, **look: Any) -> None:
-    """Words without a box."""
-    axis.text(*at, text, **look)
-
-
 _PARTS: Mapping[str, Callable[..., None]] = {
     "block": _block,
     "plate": _plate,
-    "ground": _ground,
+    # Something that does not move: hatched below its edge.
+    "ground": partial(_plate, facecolor="white", hatch="//////", linewidth=0),
     "spring": _spring,
     "leaf": _leaf,
     "line": _line,
     "arrow": _arrow,
     "label": _label,
-    "text": _text,
+    # Words without a box.
+    "text": lambda axis, at, text, **look: axis.text(*at, text, **look),
 }

@@ -13,7 +13,7 @@ import numpy as np
 from asperity import InputError, response_function
 from asperity.ledger import TabFigure, altered
 from asperity.materials import Material
-from asperity.orbit import Outcome, ResponseFunction
+from asperity.orbit import Outcome
 from asperity.parameters import law_parameters
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, solve_curves, variations
 from asperity_papers.bureau2000.figures import CURVES
@@ -77,9 +77,7 @@ def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@cache
-def _function(law: str) -> ResponseFunction:
-    return response_function(law, harmonics=2, multipliers=False, search=False)
+_function = cache(partial(response_function, harmonics=2, multipliers=False, search=False))
 
 
 def _check_share(curve: FigureCurve) -> None:

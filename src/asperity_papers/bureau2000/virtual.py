@@ -21,7 +21,6 @@ import asperity as asp
 from asperity.ledger import FigureNumbers, fill, rich, table
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
 from asperity_papers.bureau2000.machine import EXT, SLOW, SPEEDS, Float
-from asperity_papers.bureau2000.mean import AIR, VACUUM, velocity_axis
 from asperity_papers.bureau2000.recordings import (
     PRINTED,
     QUANTITIES,
@@ -31,6 +30,7 @@ from asperity_papers.bureau2000.recordings import (
     description,
     state_coefficient,
 )
+from asperity_papers.bureau2000.response_figures import AIR, VACUUM, velocity_axis
 
 #: Half a 95 % interval, in standard uncertainties.
 NORMAL = 1.96

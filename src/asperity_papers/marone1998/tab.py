@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 
 from asperity.ledger import TabFigure
@@ -19,12 +18,9 @@ print(NUMBERS["{name}"](Laboratory(numbers)).data)
 """
 
 
-def _python(name: str, changes: Mapping[str, float]) -> str:
-    return _PYTHON.format(name=name, changes=dict(changes))
-
-
 def _figure(name: str, x: str, y: str, *logarithmic: str) -> TabFigure:
-    return TabFigure(x, (y,), partial(moved_lines, name), partial(_python, name), logarithmic)
+    python = lambda changes: _PYTHON.format(name=name, changes=dict(changes))  # noqa: E731
+    return TabFigure(x, (y,), partial(moved_lines, name), python, logarithmic)
 
 
 FIGURES = {

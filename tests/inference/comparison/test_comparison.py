@@ -16,11 +16,9 @@ from asperity import Slider, periodic_response, samples
 from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.inference import answers, compare, fit, table_of
-from asperity.inference.comparison.compare import judge
-from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out
-from asperity.inference.comparison.record import laws_table
-from asperity.inference.comparison.support import support
-from asperity.inference.tables.outliers import outlying_rows
+from asperity.inference.comparison.compare import judge, laws_table
+from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
+from asperity.inference.tables.residuals import outlying_rows
 from asperity.recording.defects.autoregression import Autoregression
 from asperity.recording.writers import write
 from references.populations import draws, population

@@ -10,8 +10,7 @@ from scipy.stats import chi2
 import asperity as asp
 from asperity.errors import InputError
 from asperity.inference.answers import read_data
-from asperity.inference.cycles.cycle import averaged_cycle
-from asperity.inference.cycles.term import CycleTerm
+from asperity.inference.cycles.cycle import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.laws import RiceRuina
 from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip

@@ -1,4 +1,4 @@
-"""Several minima, and minima beyond the edge of the fast method, of residuals in closed form."""
+"""Minima of residuals in closed form: several, in narrow valleys, beyond the fast method."""
 
 import math
 from dataclasses import replace
@@ -10,6 +10,7 @@ from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.intervals import Profile
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.own_noise import with_noise
+from asperity.inference.levenberg_marquardt import minimised
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
@@ -493,3 +494,33 @@ def test_fits_of_special_cases_are_starts():
 )
 def test_laws_that_extend_others(law, other, whether):
     assert extends(get_law(law), get_law(other)) is whether
+
+
+@pytest.mark.parametrize("steepness", [1e2, 1e4])
+def test_a_curved_valley_is_followed_in_few_steps(steepness):
+    """Residuals (y - exp x) steepness, x - 3 from x = -1: the minimum is (3, e^3)."""
+    calls = 0
+
+    def residuals(u):
+        nonlocal calls
+        calls += 1
+        x, y = u
+        r = np.array([steepness * (y - np.exp(x)), x - 3.0])
+        return r, np.array([[-steepness * np.exp(x), steepness], [1.0, 0.0]])
+
+    low, high = np.full(2, -100.0), np.full(2, 100.0)
+    end = minimised(residuals, np.array([-1.0, np.exp(-1.0)]), low, high, 200)
+    # A decrease of 1e-4 is none: a hundredth of a standard error.
+    assert end == pytest.approx([3.0, np.exp(3.0)], abs=0.011 * np.exp(3.0))
+    assert calls < 120  # straight steps alone: 992, and more than 2000
+
+
+def test_bounds_and_places_without_residuals_are_kept_off():
+    def residuals(u):
+        r = np.array([u[0] + 2.0, u[1] - 1.0])
+        return (r if u[1] < 1.5 else np.array([np.nan])), np.eye(2)
+
+    end = minimised(
+        residuals, np.array([5.0, 0.0]), np.array([1.0, -9.0]), np.array([9.0, 9.0]), 50
+    )
+    np.testing.assert_allclose(end, [1.0, 1.0], atol=0.01)

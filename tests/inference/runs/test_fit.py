@@ -1,7 +1,8 @@
-"""Recordings computed by SciPy, with the noise of gauges: recovery, coverage, refusals."""
+"""Recordings by SciPy with the noise of gauges, and real ones: recovery, coverage, refusals."""
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -484,3 +485,22 @@ def test_jumps_and_spikes_of_the_user_take_the_place_of_those_found():
     assert named.jumps == pytest.approx((90.0,))
     with pytest.raises(InputError, match=r"jumps must lie inside the recording, got 500 s"):
         recorded_run(trace, steps=[45.0], velocities=[3e-6, 1e-5], jumps=[500.0])
+
+
+FOLDER = Path(__file__).resolve().parents[4] / "shared" / "data"
+BASALT = FOLDER / "velstep4_BRAVA_expb819_basalt.txt"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not BASALT.is_file(), reason="the recordings are not beside the repository")
+def test_basalt():
+    run = recorded_run(BASALT, window=(11640, 11700))
+    assert run.load_unit == "Pa"
+    found = fit(run, "rice-ruina", ["A", "B", "D0"], starts=4)
+    white = fit(run, "rice-ruina", ["A", "B", "D0"], starts=4, runs=RunOptions(order=0))
+    (term,) = found.objective.terms
+    assert found.converged
+    assert term.noise["effective_samples"] < 0.6 * run.time.size
+    # What the record shows by eye: steady friction rises by less than 1e-3 from 3 to 10 um/s.
+    assert abs(found.values["A"] - found.values["B"]) < 1e-3
+    assert found.parameters["D0"].se > 1.5 * white.parameters["D0"].se

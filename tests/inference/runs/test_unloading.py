@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from benchmarks.coverage import STIFFNESS, TRUTH, coloured
-from scipy.integrate import solve_ivp
 
 from asperity.errors import InputError
 from asperity.inference import measured_stiffness
 from asperity.recording import Channel, Trace
+from references.spring_slider import spring_slider
 
 #: Sliding, 60 um back at the same velocity, forth again, and on.
 TIMES, VELOCITIES = (0.0, 20.0, 26.0, 40.0), (1e-5, -1e-5, 1e-5)
@@ -25,22 +25,9 @@ def displacement(time):
 @pytest.fixture(scope="module")
 def exact():
     """Friction of the ageing law by SciPy, 20 samples a second."""
-    A, B, D0, V0, mu0 = (TRUTH[n] for n in ("A", "B", "D0", "V0", "mu0"))
     time = np.arange(0.0, 40.0, 0.05)
-
-    def rates(t, y, V):
-        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
-        return [STIFFNESS * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
-
-    first = np.log(VELOCITIES[0] / V0)
-    y, friction = [mu0 + (A - B) * first, -first], np.empty_like(time)
-    for a, b, V in zip(TIMES[:-1], TIMES[1:], VELOCITIES, strict=True):
-        here = (time >= a) & (time < b)
-        found = solve_ivp(
-            rates, (a, b), y, "Radau", [*time[here], b], args=(V,), rtol=1e-10, atol=1e-12
-        )
-        friction[here], y = found.y[0, :-1], found.y[:, -1]
-    return time, friction
+    law = {name: TRUTH[name] for name in ("A", "B", "D0", "V0", "mu0")}
+    return time, spring_slider(VELOCITIES, TIMES, time, **law, k=STIFFNESS, rtol=1e-10)
 
 
 def recorded(exact, seed=None, *, load=None, blur=0.0, sign=1.0):

@@ -8,9 +8,10 @@ import jax
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.algebra import cyclic, small_systems
-from asperity.laws import RiceRuina, get_law
-from asperity.loads import Harmonic
+from asperity.laws import ElastoPlastic, RiceRuina, get_law
+from asperity.loads import Harmonic, modulated
 from asperity.orbit.mesh import equations
 from asperity.orbit.mesh.equations import read_orbit
 from asperity.orbit.mesh.mesh import (
@@ -364,3 +365,37 @@ def test_newton_keeps_to_the_plane_of_its_guess():
     np.testing.assert_allclose(distance, 0.0, atol=1e-10)
     again = solve(line(result.t)[0], result.orbit, 3)
     np.testing.assert_allclose(again.orbit.nodes, result.orbit.nodes, atol=1e-10)
+
+
+SLIDER = asp.Slider(
+    ElastoPlastic(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6, lambda_=7e-7), spring=2e5, load=7.0
+)
+#: One batch, and so one program a method: all three and even; a load that is not; a pull alone.
+LOADS = modulated(
+    epsilon=0.1,
+    load={2: ([0.03, 0.03, 0.0], [0.0, 0.5, 0.0])},
+    tilt=np.radians([5.0, 0.0, 0.0]),
+    pull=[0.2, 0.0, 0.2],
+    pull_phase=[0.0, 0.0, 1.0],
+)
+
+
+def test_load_shear_and_pull_even_or_not():
+    fast, robust = (
+        asp.periodic_response(
+            SLIDER,
+            velocity=[[1e-6], [1e-5]],
+            modulation=LOADS,
+            frequency=120.0,
+            methods=(method,),
+            waveform=16,
+        )
+        for method in ("fourier", "collocation")
+    )
+    assert fast.converged.shape == (2, 3)
+    assert fast.converged.all()
+    assert robust.converged.all()
+    np.testing.assert_allclose(fast.mean_friction, robust.mean_friction, rtol=1e-9)
+    np.testing.assert_allclose(fast.harmonics[..., :2], robust.harmonics[..., :2], rtol=1e-8)
+    np.testing.assert_allclose(fast.multipliers, robust.multipliers, rtol=1e-8)
+    np.testing.assert_allclose(fast.waveform, robust.waveform, atol=1e-5)

@@ -1,12 +1,22 @@
-"""Jumps of the level under noise of a known correlation: false alarms by design, and power."""
+"""Values that repeat or stand out, and jumps of the level under correlated noise."""
 
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from scipy.stats import multivariate_normal
 
-from asperity.recording.defects.autoregression import Autoregression
+from asperity.recording.defects.autoregression import (
+    Autoregression,
+    _reflections,
+    _reflections_of_smooth,
+    fitted,
+)
+from asperity.recording.defects.check import rows_to_avoid, usable_rows
 from asperity.recording.defects.jumps import _impulses, find_jumps
+from asperity.recording.defects.levels import coarsely_rounded, saturated
+from asperity.recording.defects.sampling import rate_stretches
+from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
 
 def ar1(random, n, correlation, size=4e-4):
@@ -81,3 +91,139 @@ def test_a_stretch_keeps_to_itself():
     assert [jump.sample for jump in find_jumps(values, [(0, 500), (500, 1000)])] == [700]
     # Too short to say anything.
     assert find_jumps(values, [(680, 720)]) == []
+
+
+def process(order_two=(1.2, -0.5), n=4000, seed=0):
+    """An AR(2) of innovations of unit variance, started long before."""
+    steps = np.random.default_rng(seed).normal(size=n + 500)
+    return lfilter([1.0], [1.0, -order_two[0], -order_two[1]], steps)[500:]
+
+
+def test_coefficients_and_variance_of_a_known_process():
+    found = fitted([process()], order=2)
+    # Standard errors of the coefficients: sqrt((1 - a2^2)/n) = 0.014.
+    np.testing.assert_allclose(found.coefficients[-1], [1.2, -0.5], atol=0.05)
+    assert found.innovation == pytest.approx(1.0, abs=0.04)
+
+
+def test_sums_of_products_and_prediction_errors_give_the_same_process():
+    random = np.random.default_rng(5)
+    stretches = [lfilter([1.0], [1.0, -0.99], random.normal(size=(4, n))) for n in (700, 90)]
+    quick, direct = (f(stretches, 40) for f in (_reflections, _reflections_of_smooth))
+    np.testing.assert_allclose(quick, direct, atol=1e-12)
+    # Of a trend hardly anything is left to predict, less than the rounding of the sums.
+    smooth = [np.linspace(0, 1, 400)[None] ** 3]
+    assert _reflections(smooth, 40) == _reflections_of_smooth(smooth, 40)
+
+
+def test_the_likelihood_is_that_of_the_whole_covariance():
+    noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
+    x = np.random.default_rng(1).normal(size=9)
+    # Autocovariance of the process from its spectrum.
+    frequency = np.arange(4096) / 4096
+    spectrum = noise.spectrum(frequency)
+    covariance = np.fft.ifft(spectrum).real[:9]
+    assert covariance[0] == pytest.approx(2.5, rel=1e-9)
+    expected = multivariate_normal(np.zeros(9), toeplitz(covariance)).logpdf(x)
+    white = noise.whiten(x[:, None])[:, 0]
+    found = -0.5 * (white @ white + 9 * np.log(2 * np.pi)) - noise.log_scale(9)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_effective_samples_are_those_of_the_mean():
+    # A mean of n samples of an AR(1) has the variance s^2/n (1 + a)/(1 - a) for large n.
+    noise = Autoregression(np.array([0.9]), 1.0)
+    assert noise.effective_samples(1000) == pytest.approx(1000 * 0.1 / 1.9)
+    assert Autoregression(np.zeros(0), 1.0).effective_samples(50) == 50
+
+
+def test_a_single_sample_that_is_off_is_measured_as_by_generalised_least_squares():
+    noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
+    x = np.random.default_rng(4).normal(size=40)
+    covariance = toeplitz(np.fft.ifft(noise.spectrum(np.arange(4096) / 4096)).real[:40])
+    inverse = np.linalg.inv(covariance)
+    found = noise.departures_of_single_samples(noise.whiten(x[:, None])[:, 0])
+    # The first samples are predicted by lower orders, which the formula leaves out.
+    for k in (5, 20, 38, 39):
+        spike = inverse[k]
+        assert found[k] == pytest.approx(spike @ x / np.sqrt(inverse[k, k]), rel=1e-9)
+
+
+def test_a_signal_at_the_end_of_its_range_is_seen_on_its_side():
+    random = np.random.default_rng(0)
+    values = np.sin(np.arange(3000) / 100) + 0.01 * random.normal(size=3000)
+    assert saturated(values) == []
+    (top,) = saturated(np.minimum(values, 0.9))
+    assert (top.side, top.value, top.usual) == ("largest", 0.9, 1)
+    np.testing.assert_array_equal(top.rows, np.flatnonzero(values >= 0.9))
+    sides = [level.side for level in saturated(np.clip(values, -0.8, 0.9))]
+    assert sides == ["largest", "smallest"]
+    # Three equal samples in a row do not happen where no others are equal.
+    values[[500, 501, 502]] = 2.0
+    assert [level.rows.tolist() for level in saturated(values)] == [[500, 501, 502]]
+    values[501] = 1.9
+    assert saturated(values) == []
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1])
+def test_the_top_of_a_quantised_sine_is_not_saturated(step):
+    values = np.round(np.sin(np.arange(5000) / 150) / step) * step
+    assert saturated(values) == []
+    assert len(saturated(np.minimum(values, 0.5))) == 1
+
+
+def test_rounding_is_coarse_where_the_noise_is_finer():
+    random = np.random.default_rng(1)
+    values = np.cumsum(0.002 * random.normal(size=2000))
+    share, step = coarsely_rounded(np.round(values, 2))
+    assert share > 0.5
+    assert step == pytest.approx(0.01)
+    assert coarsely_rounded(np.round(values, 4)) is None
+    assert coarsely_rounded(np.repeat(values, 3)) is None
+
+
+def test_spikes_give_way_to_the_line_between_their_neighbours():
+    random = np.random.default_rng(2)
+    values = np.linspace(0, 1, 4000) + 0.01 * random.normal(size=4000)
+    spoiled = values.copy()
+    spoiled[[100, 2000, 2001, 3990]] += [1.0, 0.5, 0.5, -0.7]
+    rows = spikes(spoiled)
+    assert rows.tolist() == [100, 2000, 2001, 3990]
+    right = without(spoiled, rows)
+    np.testing.assert_array_equal(np.delete(right, rows), np.delete(values, rows))
+    assert right[100] == pytest.approx((values[99] + values[101]) / 2)
+    assert right[2000] == pytest.approx(values[1999] + (values[2002] - values[1999]) / 3)
+
+
+def test_a_peak_at_a_change_is_a_spike_if_it_is_beyond_all_others():
+    random = np.random.default_rng(3)
+    values = 0.01 * random.normal(size=2000)
+    changes = [500, 1200]
+    values[[501, 1201]] += [1.0, 0.8]
+    rows = spikes(values)
+    assert rows.tolist() == [501, 1201]
+    assert away_from_changes(values, rows, []).tolist() == [501, 1201]
+    assert away_from_changes(values, rows, changes).tolist() == []
+    values[501] += 2.0
+    assert away_from_changes(values, rows, changes).tolist() == [501]
+
+
+def test_rows_that_cannot_be_used_and_those_to_avoid():
+    time = np.arange(1000) / 100.0
+    values = np.sin(time) + 1e-3 * np.random.default_rng(4).normal(size=1000)
+    time[400:] += 0.5
+    time[700] = time[699]
+    values[[100, 101]] = np.nan
+    use = usable_rows(time, [values])
+    assert np.flatnonzero(~use).tolist() == [100, 101, 700]
+    values[300] += 1.0
+    avoided = rows_to_avoid(time[use], [values[use]], use)
+    # Counted without the rows that are left out: after a loss, the spike, the gap, a loss.
+    assert avoided.tolist() == [100, 298, 398, 698]
+
+
+def test_stretches_of_one_rate_are_told_apart():
+    steps = np.concatenate([np.full(500, 0.1), np.full(300, 0.01), np.full(200, 0.1)])
+    steps[250] = 3.0
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    assert rate_stretches(time) == ((0, 500), (500, 800), (800, 1001))

@@ -9,7 +9,7 @@ from asperity.inference.runs.run import recorded_run
 from asperity.measurement.measure import measure
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Channel, Trace, check, read
-from asperity.recording.defects.rounded_time import even_times, rounded_grid
+from asperity.recording.defects.sampling import even_times, rounded_grid
 
 SEEDS = range(6)
 

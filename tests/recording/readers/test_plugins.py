@@ -15,7 +15,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.recording import read
-from asperity.recording.readers.formats import reader_points
+from asperity.recording.readers.from_file import reader_points
 
 ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "lab_reader.py"

@@ -8,7 +8,7 @@ import pytest
 from asperity import materials
 from asperity.study.map import Axis
 from asperity.study.map.plane import OUTPUTS
-from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.points import Answers, SweepOutcome
 
 
 @pytest.fixture(scope="session")

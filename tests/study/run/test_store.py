@@ -1,4 +1,4 @@
-"""The store: what is in it, what survives, and what is refused."""
+"""The store: what is in it, what survives, what is refused, and a slice of it as a picture."""
 
 import errno
 import json
@@ -14,6 +14,7 @@ import pytest
 import xarray
 
 from asperity.errors import InputError
+from asperity.figures.slice import plot_slice
 from asperity.study import (
     export_store,
     open_store,
@@ -465,3 +466,18 @@ def test_every_run_is_on_record(tmp_path: Path, closed_form: ClosedForm) -> None
     # The law has its source, the numbers of the material theirs.
     assert all(name in "".join(attributes["references"]) for name in ("Ruina", "Bureau"))
     assert json.loads(attributes["plan"])["numbers"]["W0"] == 7.0
+
+
+def test_a_plane_and_a_curve(tmp_path: Path, closed_form: ClosedForm) -> None:
+    run_sweep(plan_of(), tmp_path / "s.zarr", workers=ThisProcess())
+    values = open_store(tmp_path / "s.zarr")["mu1"].values
+    plane = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", y="K")
+    (mesh,) = plane.axes[0].collections
+    drawn = np.ma.filled(mesh.get_array(), np.nan).reshape(values.shape)
+    assert np.array_equal(drawn, values, equal_nan=True)
+    curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"K": 2.1})
+    assert np.array_equal(curve.axes[0].lines[0].get_ydata(), values[1], equal_nan=True)
+    with pytest.raises(InputError, match="did you mean 'epsilon'"):
+        plot_slice(tmp_path / "s.zarr", "mu1", x="epsilom")
+    with pytest.raises(InputError, match="show must be an output"):
+        plot_slice(tmp_path / "s.zarr", "mu9", x="epsilon")

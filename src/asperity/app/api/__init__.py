@@ -5,4 +5,4 @@ Such a module has ``ENDPOINTS``, a tuple of `asperity.app.endpoints.Answer` and 
 """
 
 #: Modules of this package with endpoints, in the order of the tabs.
-TABS = ("explore", "motion", "map", "data", "by_hand", "paper")
+TABS = ("explore", "motion", "map", "data", "paper")

@@ -16,7 +16,7 @@ from asperity._version import __version__
 from asperity.errors import closest, require
 from asperity.laws import registered
 from asperity.materials import Material
-from asperity.materials.loader import packaged
+from asperity.materials.record import packaged
 from asperity.operating_point import known_parameters
 from asperity.outputs.json import to_json
 from asperity.parameters import (
@@ -95,7 +95,7 @@ def _law(name: str) -> dict[str, Any]:
     law = registered()[name]
     known = point_parameters(law)
     return {
-        "title": _title(law.__doc__ or name),
+        "title": (law.__doc__ or name).strip().splitlines()[0].split(";")[0].rstrip("."),
         # Of the class itself: a law derived from another law states different equations.
         "equations": [mathml(e, display=True) for e in vars(law).get("equations", ())],
         "source": [key.strip() for key in law.source.split(",") if key.strip()],
@@ -103,11 +103,6 @@ def _law(name: str) -> dict[str, Any]:
         "required": required(law),
         "parameters": [_parameter(p) for p in known.values() if p.name not in MODULATION],
     }
-
-
-def _title(docstring: str) -> str:
-    """The part of a docstring that names the law."""
-    return docstring.strip().splitlines()[0].split(";")[0].rstrip(".")
 
 
 def _parameter(parameter: Parameter) -> dict[str, Any]:

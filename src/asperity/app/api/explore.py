@@ -27,7 +27,6 @@ from asperity.laws import get_law, registered
 from asperity.orbit import (
     Outcome,
     PeriodicResponse,
-    ResponseFunction,
     over_a_period,
     response_function,
 )
@@ -93,7 +92,7 @@ def explore(question: Explored) -> dict[str, Any]:
         "epsilon": epsilon,
         "air": _air(question, values),
     }
-    waiting = [name for name in laws if not _prepared(name)]
+    waiting = [n for n in laws if _preparation is not None and not _preparation.want(n)]
     if waiting:
         answer["preparing"] = waiting[0]
     if question.law in waiting:
@@ -144,9 +143,7 @@ def _curve(
     }
 
 
-@cache
-def _function(name: str) -> ResponseFunction:
-    return response_function(name, harmonics=2, multipliers=False, search=False)
+_function = cache(partial(response_function, harmonics=2, multipliers=False, search=False))
 
 
 def point_record(response: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
@@ -265,10 +262,6 @@ def _prepare(name: str, amplitudes: tuple[float, ...]) -> None:
     for epsilon in amplitudes:
         solve(name, values, epsilon, methods=_FAST, **_KEPT)
     _fast_curve(question, name, question.amplitudes())
-
-
-def _prepared(name: str) -> bool:
-    return _preparation is None or _preparation.want(name)
 
 
 assert set(_CURVES) <= set(OUTPUTS)

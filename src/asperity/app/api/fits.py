@@ -15,22 +15,22 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
-from asperity.app.decimation import thinned
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
+from asperity.arrays import Float
 from asperity.errors import naming, require
 from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
 from asperity.questions.record import Seconds, Span
+from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.
@@ -38,8 +38,6 @@ _BLOCKS = 700
 #: Transients that are shown enlarged, samples that one has, and the share of its largest departure
 #: from the line after it below which it counts as settled.
 _MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
-
-Array = NDArray[np.float64]
 
 
 class Table(Question):
@@ -136,8 +134,9 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     ``bands``, ``residuals`` and ``runs``; and, if requested, ``posterior`` and ``report``, the
     folder as a ZIP file in base64.
     """
+    from asperity.inference import sample_posterior
     from asperity.inference.answers import answer_comparison, answer_fit
-    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import comparison_report, fit_report, posterior_sections
     from asperity.laws import get_law
@@ -179,7 +178,13 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     posterior = None
     if best is not None and best.converged:
         if question.posterior:
-            posterior = _sampled(best, question, report)
+            posterior = sample_posterior(
+                best,
+                chains=question.chains,
+                draws=question.draws,
+                seed=question.seed,
+                progress=lambda done, total: report(draws=done, of=total),
+            )
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
             record["sections"] += described(posterior_sections(posterior), best.law)
         report(stage="figures")
@@ -219,19 +224,6 @@ def _read(data: Any) -> Any:
     """A recording for a fit; files are read within the limits of all readers of the page."""
     with named(data.file, data.name), limited(LIMITS):
         return read_source(data.file, data.source)
-
-
-def _sampled(result: Any, question: Fitted, report: Callable[..., None]) -> Any:
-    """The posterior; finished draws are reported, and the sampler asks twice a second to go on."""
-    from asperity.inference import sample_posterior
-
-    return sample_posterior(
-        result,
-        chains=question.chains,
-        draws=question.draws,
-        seed=question.seed,
-        progress=lambda done, total: report(draws=done, of=total),
-    )
 
 
 def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
@@ -330,7 +322,7 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _around(time: Array, fitted: Array, begin: float, end: float) -> slice:
+def _around(time: Float, fitted: Float, begin: float, end: float) -> slice:
     """Samples around a change of the drive until the fitted friction is steady again."""
     a, b = np.searchsorted(time, (begin, end))
     after = fitted[a:b]

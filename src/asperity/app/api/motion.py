@@ -12,18 +12,16 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
-from asperity.app.decimation import thinned
 from asperity.app.endpoints import Job
+from asperity.arrays import Float
 from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads import Modulate, Programme, Slide
+from asperity.recording.extremes import thinned
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, integrate_blocks
-
-Array = NDArray[np.float64]
 
 #: Velocity before the motion, over V: what disturbs steady sliding.
 _BEFORE = 0.7
@@ -70,7 +68,7 @@ class Cycles(NamedTuple):
         Mean range of F/W0 over a cycle.
     """
 
-    onsets: Array
+    onsets: Float
     period: float
     slip: float
     drop: float

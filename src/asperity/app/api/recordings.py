@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import field_validator
 
-from asperity.app.decimation import thinned
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming, printable
 from asperity.outputs.tables import Section
 from asperity.parameters import NAMES, OUTPUTS, Names, in_names
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
+from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 from asperity.recording.roles import ROLES, candidates
 

@@ -101,7 +101,8 @@ class Jobs:
                 try:
                     message = await asyncio.wait_for(worker.read(), end - clock())
                 except TimeoutError:
-                    yield {"error": _too_long(seconds), "done": True}
+                    text = f"the computation took longer than {seconds:.0f} s and was ended"
+                    yield {"error": f"{text}; ask for less", "done": True}
                     return
                 finished = message is None or bool(message.get("done"))
                 yield message or {"error": _why_it_ended(limits), "done": True}
@@ -247,10 +248,6 @@ class _Worker:
         """End the process at once."""
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
-
-
-def _too_long(seconds: float) -> str:
-    return f"the computation took longer than {seconds:.0f} s and was ended; ask for less"
 
 
 def _why_it_ended(limits: Mapping[str, int] | None) -> str:

@@ -1,4 +1,4 @@
-"""Second opinions on a law: its evidence, and how well other runs predict each run.
+"""Second opinions on a law: its evidence, how well other runs predict each run, and its support.
 
 Evidence is the probability of the data under a law, averaged over its prior: the integral of
 likelihood times prior over the parameters by importance sampling from Student's t about the mode in
@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import log_density
 from asperity.inference.posterior.density import Whitened
+from asperity.inference.runs.noise import innovations
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
-
-Float = NDArray[np.float64]
 
 #: Degrees of freedom of the distribution that samples come from.
 _TAILS = 5.0
@@ -181,7 +181,7 @@ def leave_one_run_out(fit: Fit) -> CrossValidation:
     return CrossValidation(sum(runs.values()), runs)
 
 
-def _predictive(fit: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
+def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
     """Log density of the rows left out, given the others."""
     objective = fit.objective
     rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))
@@ -202,3 +202,161 @@ def _predictive(fit: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> floa
         -0.5 * (distance + np.linalg.slogdet(spread)[1] + r_out.size * math.log(2 * math.pi))
         - log_scale
     )
+
+
+#: Parts of a recording, share of the difference of two laws that a stretch of them must hold, and
+#: share of the recording up to which such a stretch is named.
+_PARTS, _MOST, _SHORT = 200, 0.8, 0.1
+#: Probability below which the noise is not the process that was fitted.
+_NOT_WHITE = 1e-3
+
+
+def support(best: Fit, other: Fit) -> tuple[str, str]:
+    """Doubts about what decides between two laws, and a stretch that decides, as sentences.
+
+    Two of the doubts are about the window. The difference of AICc is a sum over the recording, in
+    the proportion of the squared innovations: the verdict rests on a short stretch without which it
+    would not exclude the other law; and it changes with the window where one half is for the other
+    law by as much as excludes. With the better law true that has a probability below exp(-5), by
+    Markov's inequality for the ratio of likelihoods.
+
+    Parameters
+    ----------
+    best, other : Fit
+        Converged, to the same data.
+
+    Returns
+    -------
+    doubts, stretches : str
+        Empty where there is nothing to say.
+    """
+    doubts, stretches = [], []
+    pairs = zip(best.objective.terms_of(RunTerm), other.objective.terms_of(RunTerm), strict=True)
+    for first, second in pairs:
+        name, time = first.name, first.run.time
+        edges, total = _gains(first, best, second, other)
+        begin, end, _ = _shortest(edges, total, _MOST, time)
+        span = f"{begin:.4g} to {end:.4g} s of {name}"
+        whole, behind = float(time[-1] - time[0]), other.aicc - best.aicc
+        a, b, share = _shortest(edges, total, 1 - EXCLUDED / max(behind, EXCLUDED), time)
+        if behind >= EXCLUDED and b - a <= _SHORT * whole:
+            doubts.append(
+                f"it rests on {a:.4g} to {b:.4g} s of {name}, {(b - a) / whole:.1%} of the "
+                f"recording: without that stretch the AICc of {other.law} is "
+                f"{behind * (1 - share):.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
+                "(compare with a --window that leaves it out)"
+            )
+        elif end - begin <= _SHORT * whole:
+            stretches.append(
+                f"Most of what tells {best.law} from {other.law} lies in {span}, "
+                f"{(end - begin) / whole:.1%} of it"
+            )
+        middle = len(edges) // 2
+        halves = {"first": behind * total[middle], "second": behind * (1 - total[middle])}
+        doubts += [
+            f"it changes with the window: the {half} half of {name} alone is for {other.law}, by "
+            f"{-gain:.3g} in AICc"
+            for half, gain in halves.items()
+            if gain <= -EXCLUDED
+        ]
+        inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
+        if inside:
+            doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
+        if first.law_fails_after_changes:
+            doubts.append(f"even {best.law} misses what follows the velocity changes")
+        if first.noise["whiteness_p"] < _NOT_WHITE:
+            doubts.append(f"the noise of {name} is not the process that was fitted")
+    doubt = f"This verdict is doubtful: {'; '.join(doubts)}. " if doubts else ""
+    return doubt, "".join(f" {sentence}." for sentence in stretches)
+
+
+def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Float, Float]:
+    """Edges of the parts of a recording, as samples, and the share of the gain up to each.
+
+    The gain is that of `best` in the sum of squared innovations. Both laws are judged by the noise
+    that the better one leaves.
+    """
+    run = first.run
+    noise = [model.whitening for model in first.models]
+    squares = [
+        innovations(run.friction - term.fitted_friction(fit.values), noise, run.stretches) ** 2
+        for term, fit in ((first, best), (second, other))
+    ]
+    edges = np.linspace(0, run.time.size, min(_PARTS, run.time.size) + 1).astype(int)
+    gains = np.add.reduceat(squares[1] - squares[0], edges[:-1])
+    total = np.concatenate([[0.0], np.cumsum(gains)])
+    return edges, total / total[-1]
+
+
+def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[float, float, float]:
+    """Ends (s) of the shortest stretch with so much of the gain, and how much it has.
+
+    The whole recording where no stretch does.
+    """
+    within = total[None, :] - total[:, None] >= share
+    within[0, -1] = True
+    length = np.where(np.triu(within, 1), edges[None, :] - edges[:, None], edges[-1] + 1)
+    i, j = np.unravel_index(np.argmin(length), length.shape)
+    return float(time[edges[i]]), float(time[edges[j] - 1]), float(total[j] - total[i])
+
+
+#: A law is excluded by its misfit below this probability of chi-squared, if another law is not.
+IMPOSSIBLE = 1e-3
+#: Differences of AICc from which a law is disfavoured (weight 1/7) and excluded (1/150).
+DISFAVOURED, EXCLUDED = 4.0, 10.0
+#: Factor of the evidence from which a law is disfavoured: strong evidence.
+FACTOR = 20.0
+
+Word = Literal["excluded", "disfavoured", "cannot tell", "no fit"]
+
+
+class Standing(NamedTuple):
+    """Where a law stands relative to the best one.
+
+    Attributes
+    ----------
+    word : {"excluded", "disfavoured", "cannot tell", "no fit"}
+    number : str
+        The number that decides, with its thresholds.
+    """
+
+    word: Word
+    number: str
+
+
+def standing(
+    *, excluded: str, behind: float, evidence_behind: float, p_value: float | None
+) -> Standing:
+    """The standing of a law by the scale.
+
+    Parameters
+    ----------
+    excluded : str
+        Why the data exclude it by the rule of `asperity.inference.compare`; empty if they do not.
+    behind : float
+        AICc above the lowest; NaN without a fit.
+    evidence_behind : float
+        Natural logarithm of the factor by which its evidence is below that of the best law; NaN
+        where it is unknown or unreliable.
+    p_value : float or None
+        Of chi-squared, where that judges the law.
+    """
+    if math.isnan(behind):
+        return Standing("no fit", "")
+    by_aicc = (
+        f"AICc {behind:.3g} above the lowest (from {DISFAVOURED:g} disfavoured, from {EXCLUDED:g} "
+        "excluded)"
+    )
+    if excluded:
+        if p_value is not None and p_value < IMPOSSIBLE and behind < EXCLUDED:
+            return Standing("excluded", f"p = {p_value:.2g} (excluded below {IMPOSSIBLE:g})")
+        return Standing("excluded", by_aicc)
+    if behind >= DISFAVOURED:
+        return Standing("disfavoured", by_aicc)
+    if evidence_behind >= math.log(FACTOR):
+        factor = math.exp(min(evidence_behind, 700.0))
+        return Standing(
+            "disfavoured",
+            f"evidence lower by a factor of {factor:.2g} (from {FACTOR:g} disfavoured)",
+        )
+    return Standing("cannot tell", by_aicc)

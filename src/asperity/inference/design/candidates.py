@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from asperity.arrays import Bool, Float, Index
 from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.objective import Objective
 from asperity.inference.tables.residuals import Prediction, residuals_of, weights_of
@@ -25,8 +26,6 @@ from asperity.orbit import Outcome, periodic_response
 from asperity.parameters.parameter import RULES
 from asperity.slider.named import slider_from
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 Progress = Callable[[int, int, str], None]
 
 #: Points per call of a solver: between two calls progress is reported.
@@ -57,7 +56,7 @@ class Candidates:
     """
 
     points: Mapping[str, Float]
-    index: NDArray[np.intp]
+    index: Index
     total: int
     left_out: Mapping[str, int]
     draws: tuple[Mapping[str, float], ...]

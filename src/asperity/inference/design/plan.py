@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, closest, require
 from asperity.inference.fitting.inputs import (
     fixed_values,
@@ -32,8 +32,6 @@ from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Noise, Range
 from asperity.questions.record import require_unit as with_unit, units_required
 from asperity.units import to_radians, to_si
-
-Float = NDArray[np.float64]
 
 #: Ranges of these are divided by equal factors unless the plan says otherwise.
 _LOGARITHMIC = ("V", "frequency")

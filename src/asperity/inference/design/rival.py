@@ -15,15 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison.scale import EXCLUDED
+from asperity.arrays import Bool, Float
+from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import differences, predicted, with_readings
 from asperity.inference.design.plan import DesignPlan, expected_values
 from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import LockInTable
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 _ROUNDS = 15
 #: Efficiency at which the search ends.

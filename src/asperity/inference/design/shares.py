@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float, Index
 
 #: Added to the diagonal of an information matrix, relative to its scale, so that it has an inverse.
 _RIDGE = 1e-11
@@ -98,7 +98,7 @@ class Determinant:
         """Of the s-th root of the determinant, which is inverse to a variance."""
         return float(np.exp(-max(gap, 0.0) / len(self.interest)))
 
-    def restricted(self, rows: NDArray[np.intp]) -> Determinant:
+    def restricted(self, rows: Index) -> Determinant:
         """The same for some of the candidates."""
         part = Determinant(self.information[:, rows], self.prior, self.interest)
         part._ridge = self._ridge
@@ -175,7 +175,7 @@ class Misfit:
         """Of chi-squared."""
         return float(value / (value + max(gap, 0.0))) if value > 0 else 0.0
 
-    def restricted(self, rows: NDArray[np.intp]) -> Misfit:
+    def restricted(self, rows: Index) -> Misfit:
         """The same for some of the candidates."""
         part = Misfit(
             self.residual[rows], self.jacobian[rows], self.prior_residual, self.prior_jacobian
@@ -348,7 +348,7 @@ class EvenGrid:
     """
 
     levels: tuple[int, ...]
-    rows: NDArray[np.intp]
+    rows: Index
     size: int
 
     def readings(self, cost: Float, total: float) -> Float:
@@ -358,9 +358,7 @@ class EvenGrid:
         return n
 
 
-def even_grid(
-    shape: tuple[int, ...], index: NDArray[np.intp], cost: Float, total: float
-) -> EvenGrid:
+def even_grid(shape: tuple[int, ...], index: Index, cost: Float, total: float) -> EvenGrid:
     """The grid whose usable points come nearest to the budget with one reading each.
 
     Parameters

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
+from asperity.arrays import Float
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -24,12 +24,10 @@ from asperity.inference.fitting.intervals import (
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
-from asperity.inference.tables.outliers import outlying_rows
+from asperity.inference.tables.residuals import outlying_rows
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 from asperity.units import quantity_text
-
-Float = NDArray[np.float64]
 
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 RIVAL = 9.0

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.errors import InputError, require
-from asperity.inference.cycles.cycle import AveragedCycle
-from asperity.inference.cycles.term import CycleTerm
+from asperity.inference.cycles.cycle import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.inputs import (
     fixed_values,
@@ -36,8 +35,7 @@ from asperity.inference.fitting.plausibility import (
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
-from asperity.inference.holds.table import HealingTable, joined_holds
-from asperity.inference.holds.term import HoldTerm
+from asperity.inference.holds.table import HealingTable, HoldTerm, joined_holds
 from asperity.inference.objective import DataTerm, Minimum, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,

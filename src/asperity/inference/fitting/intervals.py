@@ -11,10 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import chdtrc, ndtr, ndtri
 
+from asperity.arrays import Bool, Float
 from asperity.inference.objective import Objective, Residuals
 
 Interval = tuple[float, float]
@@ -105,8 +105,6 @@ def _above(estimate: float, sd: float, level: float, bound: float) -> Interval:
     return bound + sd * low, bound + sd * high
 
 
-Float = NDArray[np.float64]
-
 #: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
 UNDETERMINED = 1.0
 #: A delay that is nearer to its bound, as a share of its range, is there.
@@ -150,7 +148,7 @@ class Parabola:
     chi2: float
     data: tuple[Residuals, ...]
     covariance: Float
-    missing: NDArray[np.bool_]
+    missing: Bool
     total: Float
     freedom: Float
     unbounded: Float
@@ -223,7 +221,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     )
 
 
-def _held(objective: Objective, u: Float) -> NDArray[np.bool_]:
+def _held(objective: Objective, u: Float) -> Bool:
     """Delays and offsets at a bound, which others do not follow beyond it.
 
     A stiffness at its bound is none: the data bound it on the other side.
@@ -248,7 +246,7 @@ def _pressure(objective: Objective, u: Float, covariance: Float, gradient: Float
 
 
 def _with_estimated_noise(
-    objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
+    objective: Objective, u: Float, covariance: Float, missing: Bool
 ) -> tuple[Float, Float]:
     """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
     known = np.where(missing[:, None] | missing, 0.0, covariance)
@@ -274,7 +272,7 @@ def nowhere_negative(added: Float, covariance: Float) -> Float:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(sd, sd))
 
 
-def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
+def inverse_information(information: Float) -> tuple[Float, Bool]:
     """Inverse of an information matrix, and which coordinates it leaves without bound."""
     if not information.size:
         return information, np.zeros(0, bool)

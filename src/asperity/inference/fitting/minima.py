@@ -12,15 +12,13 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from asperity.arrays import Float
 from asperity.inference.objective import Minimum, Objective
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
-
-Float = NDArray[np.float64]
 
 #: What minima are ordered by.
 _CHI2 = attrgetter("chi2")

@@ -9,13 +9,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.inference.fitting.description import RIVAL
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import RunTerm
-
-Float = NDArray[np.float64]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03

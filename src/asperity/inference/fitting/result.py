@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.arrays import Float
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
@@ -21,9 +21,7 @@ from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit
 
-Float = NDArray[np.float64]
 T = TypeVar("T")
-
 
 #: Of a parameter whose numbers say nothing.
 NOT_DETERMINED = "not determined"

@@ -23,15 +23,13 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtr
 
+from asperity.arrays import Float
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import CompiledResiduals, Objective
 from asperity.inference.unknowns import Unknown
-
-Float = NDArray[np.float64]
 
 #: The mode is reached where the gradient of the log density is smaller, by standard deviations: a
 #: step gains half its square, near what the accuracy of orbits and motions leaves. Steps at most.

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.arrays import Bool, Float
 from asperity.inference.fitting.intervals import LEVELS, Interval
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.outputs.json import plain
-
-Float = NDArray[np.float64]
 
 #: Chains agree below this R-hat (Vehtari et al., 2021).
 _AGREE = 1.01
@@ -113,8 +112,8 @@ class Posterior:
     acceptance: Float
     energy: Float
     steps: NDArray[np.int64]
-    diverging: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
+    diverging: Bool
+    failed: Bool
     seed: int
     prior: Mapping[str, Any]
     warnings: tuple[str, ...]

@@ -17,9 +17,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
@@ -27,7 +27,6 @@ from asperity.inference.posterior.posterior import Posterior, Transitions, poste
 from asperity.orbit.search import available_cores
 from asperity.outputs import Interrupted
 
-Float = NDArray[np.float64]
 #: Logarithm of a density, of z and of arrays.
 LogDensity = Callable[[Array, Any], Array]
 
@@ -43,7 +42,6 @@ _MOST_DRAWS = 4_000_000
 _ASK = 0.5
 #: One thread for XLA and for linear algebra in each process.
 _ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-
 
 #: Where a chain is, all as arrays: data of the key of the next block, position with its density and
 #: gradient, step size, and inverse mass matrix.

@@ -13,8 +13,8 @@ from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
@@ -398,7 +398,7 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
         raise InputError(second.name, "hold samples of its own", got, advice)
 
 
-def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:
+def _shared(x: Float, y: Float) -> tuple[int, int] | None:
     """Where the first samples of x that are also in y begin in both."""
     rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
     various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT

@@ -20,15 +20,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from asperity.arrays import Float
 from asperity.errors import require
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
 from asperity.recording.defects.lines import find_lines, take_off
 from asperity.units import to_si
-
-Float = NDArray[np.float64]
 
 #: Blocks of a recording, at least and at most.
 _FEWEST, _MOST = 2_000, 100_000

@@ -12,15 +12,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.inference.runs.blocks import reduced
 from asperity.inference.runs.run import RecordedRun
 from asperity.recording.defects.jumps import find_jumps
 from asperity.recording.defects.sampling import gap_rows
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
-
-Float = NDArray[np.float64]
 
 #: Changes of the load are few if there are so many samples to each.
 _FEW_CHANGES = 100

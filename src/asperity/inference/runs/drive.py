@@ -1,22 +1,24 @@
 """Drive of a recording: pulling velocity and load over time.
 
 Both are linear in each of a few pieces. Derivatives to the delays of the changes are exact: a
-change moves the pieces on either side of it.
+change moves the pieces on either side of it. The velocities are measured, or those of the caller.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
+from asperity.errors import Argument, InputError, require
 from asperity.loads import Excitation
-
-Float = NDArray[np.float64]
+from asperity.measurement.sliding.segments import Cut, Partition, partition, partition_at
+from asperity.measurement.sliding.signals import SlidingSignals
 
 
 class Drive(NamedTuple):
@@ -87,3 +89,126 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
         w_slope=ratio * drive.load_slope[piece],
         pull=drive.pull[piece] + drive.pull_slope[piece] * since,
     )
+
+
+#: Fewest samples between two steps, or a step and an end: a velocity needs them.
+_SAMPLES = 3
+#: A given velocity that differs by this share from that of the displacement is contradicted.
+_OTHER_VELOCITY = 0.05
+
+
+class ConstantVelocities(NamedTuple):
+    """Segments of a recording in which the drive moves steadily, or rests.
+
+    Attributes
+    ----------
+    cuts : list of Cut
+        Between the segments.
+    speeds : list of float
+        m/s, positive, 0 in a hold; one more than cuts.
+    doubts : list of str
+        Sentences on other ways to cut the recording, or on velocities that it contradicts.
+    """
+
+    cuts: list[Cut]
+    speeds: list[float]
+    doubts: list[str]
+
+
+def constant_velocities(
+    signals: SlidingSignals,
+    name: str,
+    steps: Sequence[float] | None,
+    velocities: Sequence[float] | None,
+) -> ConstantVelocities:
+    """Segments of a recording; parameters as in `recorded_run`.
+
+    Raises
+    ------
+    InputError
+        If there are not as many velocities as segments, nothing says how the drive moves, the
+        recording begins with a hold, or the direction turns.
+    """
+    result, speeds, holds = _given_or_measured(signals, name, steps, velocities)
+    moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
+    if not moving or holds[0]:
+        raise InputError(
+            f"{name} must begin with sliding at a constant velocity, got "
+            f"{'no sliding' if not moving else 'a hold'}; give a window that does"
+        )
+    sign = float(np.sign(moving[0]))
+    advice = "give another channel of the displacement, or a window that slides"
+    require(sign != 0, f"the displacement of {name}", "move", "noise alone", advice)
+    if any(sign * v <= 0 for v in moving):
+        raise InputError(
+            f"{name} must slide in one direction, got a reversal; give a window without"
+        )
+    speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
+    # A hold that was cut in two is one.
+    kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
+    doubts = list(result.doubts)
+    if velocities is not None and signals.displacement is not None:
+        measured = partition_at(signals.time, signals.displacement, np.array(steps)).velocities
+        doubts += contradicted_velocities(velocities, measured)
+    return ConstantVelocities(
+        [result.cuts[k] for k in kept], [speeds[0], *(speeds[k + 1] for k in kept)], doubts
+    )
+
+
+def _given_or_measured(
+    signals: SlidingSignals,
+    name: str,
+    steps: Sequence[float] | None,
+    velocities: Sequence[float] | None,
+) -> tuple[Partition, list[float], list[bool]]:
+    """The cuts, the signed velocities between them, and which segments are holds."""
+    time, displacement = signals.time, signals.displacement
+    if steps is not None:
+        _require_segments(time, steps, name)
+    if velocities is not None:
+        if steps is None or len(velocities) != len(steps) + 1:
+            got = f"{len(velocities)} for {len(steps or ())}"
+            raise InputError(f"{name}.velocities", "be one more than the steps", got, "give both")
+        speeds = [float(v) for v in velocities]
+        return partition_at(time, None, np.array(steps)), speeds, [v == 0 for v in speeds]
+    if displacement is None:
+        raise InputError(
+            f"{name} must have the displacement or velocity of the drive, got none: "
+            f"{signals.no_motion}; name a channel, like "
+            f"{Argument('columns', 'displacement', 'x')}, or give {Argument('steps')} and "
+            f"{Argument('velocities')}"
+        )
+    result = (
+        partition(time, displacement)
+        if steps is None
+        else partition_at(time, displacement, np.array(steps))
+    )
+    return result, list(result.velocities), list(result.holds)
+
+
+def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:
+    """Refuse steps that leave no samples between them.
+
+    Raises
+    ------
+    InputError
+    """
+    edges = [float(time[0]), *map(float, steps), float(time[-1])]
+    for begin, end in pairwise(edges):
+        count = int(np.sum((time >= begin) & (time <= end))) if end > begin else 0
+        if count < _SAMPLES:
+            raise InputError(
+                f"{name}.steps must rise, with {_SAMPLES} samples or more between them and the "
+                f"ends of the recording ({edges[0]:.6g} to {edges[-1]:.6g} s), got {count} between "
+                f"{begin:.6g} and {end:.6g} s; correct the steps, or the window"
+            )
+
+
+def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:
+    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
+    return [
+        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
+        f"{abs(v):.4g} m/s; correct one of them"
+        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
+        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
+    ]

@@ -17,8 +17,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
 from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.reading import GAIN, Reading
@@ -35,8 +35,6 @@ from asperity.recording.defects.autoregression import Whitening
 from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
-
-Float = NDArray[np.float64]
 
 #: Room for steps: the last where no start is computed in the first. A motion that needs more is
 #: taken to slip in events that no fit of smooth sliding can follow.

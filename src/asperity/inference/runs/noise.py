@@ -17,13 +17,11 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 from scipy.special import chdtrc
 
+from asperity.arrays import Float
 from asperity.recording.defects.autoregression import Autoregression, LaggedProducts, Whitening
-
-Float = NDArray[np.float64]
 
 #: Lags of the test of whiteness, at least.
 _LAGS = 20

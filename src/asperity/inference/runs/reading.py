@@ -14,12 +14,10 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
+from asperity.arrays import Float
 from asperity.tribometer.sensors import between, filtered, low_pass
-
-Float = NDArray[np.float64]
 
 #: Name of the gauge's gain in the motion of a run, and of that of every run in priors.
 GAIN = "gain"

@@ -10,24 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtri
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
-from asperity.inference.runs.drive import Drive
-from asperity.inference.runs.velocities import constant_velocities
+from asperity.inference.runs.drive import Drive, constant_velocities
 from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
-from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.sampling import rate_stretches
+from asperity.recording.defects.sampling import even_times, rate_stretches
 from asperity.recording.readers import read
-
-Float = NDArray[np.float64]
 
 #: A load that varies by less than this share of its mean is taken as constant.
 _CONSTANT_LOAD = 1e-3

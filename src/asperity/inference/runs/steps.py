@@ -18,15 +18,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import dormand_prince_5
+from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, shifted
 from asperity.inference.runs.reading import GAIN
 from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
-
-Float = NDArray[np.float64]
 
 #: Relative and absolute local error of a step, of states of order 1.
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-9

@@ -10,8 +10,8 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
@@ -34,8 +34,6 @@ from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
 from asperity.recording.defects.autoregression import Autoregression, fitted
-
-Float = NDArray[np.float64]
 
 #: Below this probability the innovations are not white: the model of the noise fails.
 _NOT_WHITE = 1e-3

@@ -11,8 +11,8 @@ import os
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.errors import InputError, require
 from asperity.inference.runs.run import recorded_load
 from asperity.inference.unknowns import Prior
@@ -20,10 +20,8 @@ from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.readers import read
-
-Float = NDArray[np.float64]
 
 #: Samples that a line needs, and to which longer spans are averaged.
 _FEWEST, _MOST = 32, 2000
@@ -180,7 +178,7 @@ def measured_stiffness(
     )
 
 
-def _direction(x: Float, here: NDArray[np.bool_], length: float) -> float:
+def _direction(x: Float, here: Bool, length: float) -> float:
     """Sign of the displacement in which the slider is pulled outside the span; 0 if unknown."""
     outside = ~(here[1:] & here[:-1])
     net = float(np.diff(x)[outside].sum())

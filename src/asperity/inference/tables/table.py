@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr
 
+from asperity.arrays import Bool, Float, Index
 from asperity.errors import InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
@@ -24,8 +25,6 @@ from asperity.parameters import MODULATION, all_parameters, canonical_name
 from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_radians, to_si
-
-Float = NDArray[np.float64]
 
 #: What a row may report, in the order of residuals. Convention: F/W0 = mean_friction + sum of
 #: mu_n cos(n w t + phase_n), delta_mu = mean_friction - mu_ss(V).
@@ -112,7 +111,7 @@ class LockInTable:
             result[:, i, j] = result[:, j, i] = value
         return result
 
-    def without(self, rows: NDArray[np.bool_]) -> LockInTable:
+    def without(self, rows: Bool) -> LockInTable:
         """The table without some of its rows."""
         keep = ~rows
 
@@ -440,9 +439,7 @@ def _known() -> Mapping[str, Any]:
     return all_parameters(registered().values())
 
 
-def _require(
-    good: NDArray[np.bool_], table: str, column: str, values: Float, rule: str, advice: str
-) -> None:
+def _require(good: Bool, table: str, column: str, values: Float, rule: str, advice: str) -> None:
     """Refuse a column with the first row that breaks a rule."""
     if not good.all():
         row = int(np.argmin(good))
@@ -590,7 +587,7 @@ def _refuse_copies(first: LockInTable, second: LockInTable, sentence: str) -> No
             )
 
 
-def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, NDArray[np.intp]]:
+def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
     """Several tables as one, and the number of the table of each row.
 
     A parameter that only some tables have must have a fixed value for the others, which is not

@@ -16,13 +16,14 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from asperity.arrays import Bool, Float
 from asperity.inference.objective import CompiledResiduals, DataTerm, Residuals
-from asperity.inference.tables.outliers import standardised
 from asperity.inference.tables.residuals import (
     Prediction,
     Weights,
     columns_of,
     residuals_of,
+    standardised,
     weights_of,
 )
 from asperity.inference.tables.table import LockInTable
@@ -36,8 +37,6 @@ from asperity.orbit import (
 )
 from asperity.parameters import law_parameters
 from asperity.slider.named import law_from
-
-Float = NDArray[np.float64]
 
 #: Rows whose orbits are remembered, of some ten kilobytes each.
 _REMEMBERED = 2048
@@ -145,7 +144,7 @@ class LockInTerm(DataTerm):
         way = tuple(self.motion.items())
         return _CompiledResiduals(self.law, way, self.searches), (self.fixed, self.weights)
 
-    def with_rows(self, kept: NDArray[np.bool_], *, coarse: bool = False) -> LockInTerm:
+    def with_rows(self, kept: Bool, *, coarse: bool = False) -> LockInTerm:
         """The same for some of the rows with their orbits, by the coarse model on request."""
         part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
         part.fixed = {n: v[kept] for n, v in self.fixed.items()}
@@ -272,7 +271,7 @@ class LockInTerm(DataTerm):
         values, slopes = function.value_and_jacobian(given, known, every=every, names=wanted)
         if known is not None and np.mean(values.outcome == Outcome.CONVERGED) >= self.least:
             self._visited.append((dict(free), known))
-            del self._visited[: -self._most_visited]
+            del self._visited[: -max(4, _REMEMBERED // self.table.rows)]
         mu_ss, mu_slopes = _steady(self.law, given, function.compiled_points(self.table.rows))
         predicted = Prediction(
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
@@ -328,11 +327,6 @@ class LockInTerm(DataTerm):
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
         )
         return Prediction(mean, steady, harmonics), outcome
-
-    @property
-    def _most_visited(self) -> int:
-        """Calls of which the orbits are remembered."""
-        return max(4, _REMEMBERED // self.table.rows)
 
     def _nearest(self, free: Mapping[str, float]) -> KnownOrbits:
         """Orbits of the earlier call with the most similar parameters, to begin with and replace.

@@ -8,7 +8,6 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import require
@@ -140,16 +139,6 @@ class Programme:
         return values
 
 
-@jax.jit
-def _load(segment: ProgrammeSegment, t: Array) -> Array:
-    return segment.load(t)[0]
-
-
-@jax.jit
-def _pull(segment: ProgrammeSegment, t: Array) -> Array:
-    return segment.pull(t)
-
-
-@jax.jit
-def _position(segment: ProgrammeSegment, t: Array) -> Array:
-    return segment.position(t)
+_load = jax.jit(lambda segment, t: segment.load(t)[0])
+_pull = jax.jit(lambda segment, t: segment.pull(t))
+_position = jax.jit(lambda segment, t: segment.position(t))

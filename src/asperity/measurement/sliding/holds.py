@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from asperity.arrays import Float
 from asperity.measurement.series import bin_means, columns, fit_trend
-
-Array = NDArray[np.float64]
 
 #: Share of the sliding before a hold that may still be settling from the hold before it.
 _SETTLING = 0.3
@@ -98,9 +96,9 @@ class HealingRate:
 
 
 def read_hold(
-    time: Array,
-    friction: Array,
-    displacement: Array | None,
+    time: Float,
+    friction: Float,
+    displacement: Float | None,
     bounds: tuple[int, int, int, int],
     edges: tuple[float, float],
     velocity: float,
@@ -191,7 +189,7 @@ def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
     )
 
 
-def _quick_noise(values: Array) -> float:
+def _quick_noise(values: Float) -> float:
     """Standard deviation of what changes from sample to sample."""
     if values.size < 3:
         return 0.0
@@ -199,7 +197,7 @@ def _quick_noise(values: Array) -> float:
 
 
 def _peak(
-    time: Array, friction: Array, again: int, stop: int, level: float, quick: float
+    time: Float, friction: Float, again: int, stop: int, level: float, quick: float
 ) -> tuple[float, float, int]:
     """Top of the peak after a hold, its uncertainty, and its sample.
 
@@ -254,7 +252,7 @@ def _peak(
     )
 
 
-def _inflation(residual: Array) -> float:
+def _inflation(residual: Float) -> float:
     """Inflation of a variance by neighbours that resemble each other."""
     power = float(residual @ residual)
     if power <= 0:
@@ -263,7 +261,7 @@ def _inflation(residual: Array) -> float:
     return (1 + min(max(share, 0.0), 0.95)) / (1 - min(max(share, 0.0), 0.95))
 
 
-def _smoothed(values: Array, wide: int) -> Array:
+def _smoothed(values: Float, wide: int) -> Float:
     if wide <= 1:
         return values
     padded = np.pad(values, wide // 2, mode="edge")
@@ -271,9 +269,9 @@ def _smoothed(values: Array, wide: int) -> Array:
 
 
 def _reload(
-    time: Array,
-    friction: Array,
-    displacement: Array | None,
+    time: Float,
+    friction: Float,
+    displacement: Float | None,
     again: int,
     top: int,
     resumed: float,

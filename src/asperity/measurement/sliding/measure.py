@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from asperity.recording.trace import Trace
 
-Array = NDArray[np.float64]
 
 #: Where suspicious and bad begin.
 LIMITS = {
@@ -115,8 +114,8 @@ class SlidingMeasurement(Drawn):
     holds: tuple[HoldReading, ...]
     healing: HealingRate | None
     rates: tuple[tuple[float, float], ...]
-    time: Array
-    values: Array
+    time: Float
+    values: Float
     velocity_from: str
     detrend: str
     chosen_by: str
@@ -226,7 +225,7 @@ def measure_sliding(
 
 
 def _given_cuts(
-    time: Array,
+    time: Float,
     steps: Sequence[float] | None,
     holds: Sequence[tuple[float, float]] | None,
 ) -> list[float] | None:
@@ -263,7 +262,7 @@ def _given_cuts(
 
 
 def _with_holds(
-    cut: Partition, time: Array, holds: Sequence[tuple[float, float]] | None
+    cut: Partition, time: Float, holds: Sequence[tuple[float, float]] | None
 ) -> Partition:
     """The same cuts, with the user's holds as the only ones."""
     if holds is None:
@@ -273,7 +272,7 @@ def _with_holds(
     return Partition(cut.cuts, cut.velocities, tuple(e in starts for e in edges), cut.doubts)
 
 
-def _segment(time: Array, friction: Array, velocity: float, hold: bool) -> SlidingSegment:
+def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> SlidingSegment:
     means = block_means(friction, 100)
     begin = steady_from(means, 1) * max(1, friction.size // 100)
     late, values = time[begin:], friction[begin:]
@@ -359,7 +358,7 @@ def _holds(
     return holds
 
 
-def _rates(time: Array) -> tuple[tuple[float, float], ...]:
+def _rates(time: Float) -> tuple[tuple[float, float], ...]:
     """Sampling rates in use, commonest first."""
     steps = np.diff(time)
     # Two figures tell rates apart, and jitter not.

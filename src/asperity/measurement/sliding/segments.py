@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from asperity.arrays import Float, Index
+
 #: First sample of a piece, and the one after its last.
 Piece = tuple[int, int]
 
@@ -101,14 +101,14 @@ class _Motion:
         Of a coarse recorder (m); 0 of a fine one.
     """
 
-    time: Array
-    displacement: Array
+    time: Float
+    displacement: Float
     noise: float
     slow_noise: float
     step: float
 
 
-def partition(time: Array, displacement: Array | None) -> Partition:
+def partition(time: Float, displacement: Float | None) -> Partition:
     """Cut a recording where its velocity changes.
 
     Parameters
@@ -128,7 +128,7 @@ def partition(time: Array, displacement: Array | None) -> Partition:
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
 
-def partition_at(time: Array, displacement: Array | None, times: Array) -> Partition:
+def partition_at(time: Float, displacement: Float | None, times: Float) -> Partition:
     """Cut a recording at given times.
 
     Parameters
@@ -147,7 +147,7 @@ def partition_at(time: Array, displacement: Array | None, times: Array) -> Parti
     return Partition(cuts, speeds, holds)
 
 
-def displacement_noise(time: Array, displacement: Array) -> float:
+def displacement_noise(time: Float, displacement: Float) -> float:
     """Standard deviation of a displacement's noise (m), its resolution included.
 
     Parameters
@@ -157,7 +157,7 @@ def displacement_noise(time: Array, displacement: Array) -> float:
     return _motion(time, displacement).noise
 
 
-def _motion(time: Array, displacement: Array) -> _Motion:
+def _motion(time: Float, displacement: Float) -> _Motion:
     """The noise of a displacement, from second differences of means over 1, 2, 4, ... samples.
 
     Velocity does not touch them, and its changes hardly in the quietest parts of a recording.
@@ -204,7 +204,7 @@ def _pieces(motion: _Motion) -> list[Piece]:
     return kept or [(0, motion.time.size)]
 
 
-def _blocks(motion: _Motion) -> NDArray[np.intp]:
+def _blocks(motion: _Motion) -> Index:
     """Samples that bound blocks, the number of samples among them."""
     n = motion.time.size
     m = max(1, n // 20_000)
@@ -220,7 +220,7 @@ def _blocks(motion: _Motion) -> NDArray[np.intp]:
     return np.unique(np.concatenate(edges))
 
 
-def _change_points(motion: _Motion, edges: NDArray[np.intp]) -> list[int]:
+def _change_points(motion: _Motion, edges: Index) -> list[int]:
     """Bounds of the pieces, as places in edges: the least sum of squares and penalties."""
     size = np.diff(edges)
     t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
@@ -256,7 +256,7 @@ def _change_points(motion: _Motion, edges: NDArray[np.intp]) -> list[int]:
     return bounds[::-1]
 
 
-def _misfits(sums: Array) -> tuple[Array, Array]:
+def _misfits(sums: Float) -> tuple[Float, Float]:
     """Sums of squares that a line and a parabola leave, by orthogonal polynomials."""
     s0, s1, s2, s3, s4, y0, y1, y2, yy = sums
     first = s2 - s1 * s1 / s0

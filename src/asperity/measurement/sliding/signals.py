@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError
 from asperity.measurement.samples import (
     compressive,
@@ -20,14 +20,13 @@ from asperity.measurement.samples import (
     too_few,
 )
 from asperity.recording.defects.check import usable_rows
-from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import even_times
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
     from asperity.recording.finding import Finding
     from asperity.recording.trace import Channel, Trace
 
-Array = NDArray[np.float64]
 
 _FEWEST = 32
 #: Names of a force divided by the weight, and what its unit measures if one is known.
@@ -67,10 +66,10 @@ class SlidingSignals:
         Samples within the window at which something is no number or time does not go on.
     """
 
-    time: Array
-    friction: Array
-    displacement: Array | None
-    load: Array | None
+    time: Float
+    friction: Float
+    displacement: Float | None
+    load: Float | None
     load_unit: str
     motion: str
     no_motion: str
@@ -170,7 +169,7 @@ def _check_window(window: tuple[float, float], trace: Trace) -> None:
 
 def _friction(
     trace: Trace, load: str, force: str
-) -> tuple[Array, Array | None, str, list[Channel], list[Finding]]:
+) -> tuple[Float, Float | None, str, list[Channel], list[Finding]]:
     """Friction, load, the load's unit, the channels that they come from, and what was turned."""
     W = load_channel(trace, load)
     F, is_friction = shear_channel(trace, force, W)

@@ -13,12 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from asperity.arrays import Float
 from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend
-
-Array = NDArray[np.float64]
 
 #: Windows, in slips of the shorter side.
 _WINDOWS = (1.0, 1.5, 2.25)
@@ -116,14 +114,14 @@ class VelocityStep:
 class _Side:
     """Bin means on one side of a step over slip from the step."""
 
-    slip: Array
-    friction: Array
+    slip: Float
+    friction: Float
 
 
 def read_step(
     time: float,
-    before: tuple[Array, Array, float],
-    after: tuple[Array, Array, float],
+    before: tuple[Float, Float, float],
+    after: tuple[Float, Float, float],
     *,
     degree: int,
     first_settling: float = 0.0,
@@ -198,7 +196,7 @@ def _transient(
     powers = [slip**power for power in range(degree + 1)]
     base = np.linalg.qr(np.stack([p / max(np.abs(p).max(), 1e-300) for p in powers], axis=1))[0]
 
-    def free(values: Array) -> Array:
+    def free(values: Float) -> Float:
         return np.asarray(values - base @ (base.T @ values))
 
     free_friction = free(friction)
@@ -245,8 +243,8 @@ def _combined(
 
 def _result(
     time: float,
-    before: tuple[Array, Array, float],
-    after: tuple[Array, Array, float],
+    before: tuple[Float, Float, float],
+    after: tuple[Float, Float, float],
     readings: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]],
     settling: float,
     known: bool,
@@ -305,7 +303,7 @@ def _result(
 
 
 def _peak(
-    times: Array, friction: Array, step: float, lever: float, settling: float, speed: float
+    times: Float, friction: Float, step: float, lever: float, settling: float, speed: float
 ) -> float:
     """Extreme of friction, smoothed over five samples, until the transient has settled."""
     if not np.isfinite(lever) or lever == 0:

@@ -7,15 +7,13 @@ mistaken.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import slow_line
 from asperity.measurement.verdicts.verdict import Check, judged, percent
 from asperity.recording.finding import Finding
-
-Array = NDArray[np.float64]
 
 #: Where suspicious and bad begin; friction has a lower and an upper side.
 LIMITS: dict[str, tuple[float, float]] = {
@@ -167,7 +165,7 @@ def drift_rate(reading: LockInReading) -> Rate:
     return Rate(float(change / length), float(doubt / length), float(reading.dof[0]))
 
 
-def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
+def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
     """Whether the force oscillates slowly, by itself."""
     line = slow_line(reading, time, force)
     number, sentence, seen = 0.0, "no slow oscillation stands out", False
@@ -182,7 +180,7 @@ def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
     return judged("stick-slip", number, LIMITS["stick-slip"], sentence, significant=seen)
 
 
-def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
+def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
     """Whether the steps of the recorder are small against the first harmonics.
 
     Noise of half a step smooths them; without it a harmonic below a step is no harmonic.

@@ -12,15 +12,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import Check, judged
 from asperity.measurement.window import LoadInterval
 from asperity.recording.defects.levels import held_length
-
-Array = NDArray[np.float64]
 
 #: Where suspicious and bad begin; of a made force, small numbers are suspicious and none is bad; a
 #: mains line is judged by epsilon, small being bad.
@@ -65,7 +63,7 @@ _SHARES = (0.05, 0.55)
 _MARGIN = 12.0
 
 
-def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
+def held_samples(reading: LockInReading, load: Float, force: Float) -> Check:
     """Whether a channel repeats samples, as one does that is converted slower than recorded.
 
     The value of each run of k equal samples belongs to its beginning: a harmonic of frequency f
@@ -88,7 +86,7 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
 
 
 def made_force(
-    reading: LockInReading, samples: Samples, time: Array, load: Array, force: Array
+    reading: LockInReading, samples: Samples, time: Float, load: Float, force: Float
 ) -> tuple[Check, ...]:
     """That the force was made of a friction coefficient, if it was, and whether it can be right.
 
@@ -196,7 +194,7 @@ def lines_in_the_pauses(
     return (judged("lines in the pauses", number, limits, sentence, significant=seen),)
 
 
-def hum(reading: LockInReading, time: Array, force: Array) -> Check:
+def hum(reading: LockInReading, time: Float, force: Float) -> Check:
     """Whether hum at other harmonics of the mains says that there is some at the modulation too."""
     f = reading.frequency
     number, sentence, seen = 0.0, "no hum is to be expected at the modulation or its double", False
@@ -225,7 +223,7 @@ def hum(reading: LockInReading, time: Array, force: Array) -> Check:
     return judged("hum", number, LIMITS["hum"], sentence, significant=seen)
 
 
-def _line(time: Array, values: Array, frequency: float) -> tuple[float, float]:
+def _line(time: Float, values: Float, frequency: float) -> tuple[float, float]:
     """Amplitude of a line and its scatter from pieces; infinite where there are too few periods."""
     span = float(time[-1] - time[0])
     if time.size < 16 * _LINE_PIECES or span * frequency < _LINE_PIECES * _LINE_PERIODS:
@@ -249,9 +247,9 @@ def _line(time: Array, values: Array, frequency: float) -> tuple[float, float]:
 class _Cycle(NamedTuple):
     """Mean cycle: phases (periods), values and their standard deviations, each (phases,)."""
 
-    phase: Array
-    value: Array
-    doubt: Array
+    phase: Float
+    value: Float
+    doubt: Float
 
 
 class _Level(NamedTuple):
@@ -262,7 +260,7 @@ class _Level(NamedTuple):
     side: str
 
 
-def flat_top(reading: LockInReading, time: Array, load: Array, force: Array) -> Check:
+def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> Check:
     """Whether load or force is cut off flat.
 
     Parameters
@@ -295,7 +293,7 @@ def flat_top(reading: LockInReading, time: Array, load: Array, force: Array) -> 
     return judged("flat top", number, LIMITS["flat top"], sentence)
 
 
-def _mean_cycle(reading: LockInReading, time: Array, values: Array, channel: int) -> _Cycle | None:
+def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int) -> _Cycle | None:
     """Values folded by the phase of the load, without what is slower than a period."""
     middle = (reading.start + reading.end) / 2
     cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
@@ -357,7 +355,7 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
     return least - best.criterion, best
 
 
-def _cut_off(cycle: _Cycle, columns: Array, side: str, share: float) -> _Level:
+def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float) -> _Level:
     """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns."""
     value, weight = cycle.value, 1 / cycle.doubt
     sides = [s for s, word in ((1, "top"), (-1, "bottom")) if word in side]

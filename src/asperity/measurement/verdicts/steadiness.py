@@ -7,15 +7,13 @@ window.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.lock_in.normal_equations import Basis, solved
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
 from asperity.measurement.verdicts.verdict import Check, judged, percent
-
-Array = NDArray[np.float64]
 
 #: Samples of the piece in the middle that is searched for what is nearly as fast as the modulation.
 _PIECE = 1 << 16
@@ -40,7 +38,7 @@ _PIECES, _FEWEST_PERIODS = 8, 3
 _BEYOND = 6.0
 
 
-def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine | None:
+def slow_line(reading: LockInReading, time: Float, force: Float) -> SpectralLine | None:
     """The strongest line of the force's residual below the modulation, or below 20 Hz.
 
     Parameters
@@ -76,14 +74,14 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
     return max(lines, key=lambda line: line.amplitude / max(line.background, 1e-300), default=None)
 
 
-def left_of_piece(reading: LockInReading, time: Array, values: Array) -> tuple[slice, Array]:
+def left_of_piece(reading: LockInReading, time: Float, values: Float) -> tuple[slice, Float]:
     """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
     return piece, _residual(reading.blocks.basis, time[piece], values[piece])
 
 
-def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
+def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
     """The strongest line between drift and a frequency; None where there is no room for one."""
     if time.size < 32 or (time[-1] - time[0]) * highest < 3 or not values.any():
         return None
@@ -91,7 +89,7 @@ def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
     return strongest_line(time, values, between=(lowest, highest))
 
 
-def _residual(basis: Basis, time: Array, force: Array) -> Array:
+def _residual(basis: Basis, time: Float, force: Float) -> Float:
     """Residual of a separate fit to a piece."""
     piece = Basis(
         basis.omega,
@@ -133,7 +131,7 @@ def steady_response(reading: LockInReading) -> Check:
     )
 
 
-def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
+def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
     """Whether the load's mean stays where it is."""
     slow, seen = _wander(reading, time, load)
     drift = float(reading.drift[0].sum())
@@ -167,7 +165,7 @@ def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[fl
     return number, float(power[near].mean() / max(float(power[~near].mean()), 1e-300))
 
 
-def _wander(reading: LockInReading, time: Array, load: Array) -> tuple[float, bool]:
+def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bool]:
     """Amplitude of slow motion of the load, and whether noise does not explain it."""
     white = float(reading.noise.spectra[1, 0, 0].real)
     count, sums = reading.blocks.count, reading.residual[:, 0, 0].real
@@ -188,7 +186,7 @@ def _wander(reading: LockInReading, time: Array, load: Array) -> tuple[float, bo
     return worst, seen
 
 
-def shifting_response(reading: LockInReading, time: Array, force: Array) -> Check:
+def shifting_response(reading: LockInReading, time: Float, force: Float) -> Check:
     """Whether mu1 and its phase shift within the window: range of the pieces over the mean.
 
     Parameters

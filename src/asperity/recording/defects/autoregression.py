@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Highest order, as a number and as a share of the samples.
 _HIGHEST, _SHARE = 60, 0.05
@@ -198,18 +197,15 @@ def fitted(
         criteria.append(n * math.log(max(innovation_power, smallest)) + penalty)
     best = len(reflection)
     if order is None:
-        best = min(best, max(int(np.argmin(criteria)), _lowest_order(n)))
+        # A lower order smooths the spectrum of slow noise too much.
+        lowest = round(_ORDERS_PER_DECADE * math.log10(n))
+        best = min(best, max(int(np.argmin(criteria)), lowest))
     chosen = np.array(reflection[:best])
     result = Autoregression(chosen, variance)
     # The variance of the likelihood: innovations of unit mean square.
     white = np.concatenate([result.whiten(s) for s in stretches])
     left = max(n - parameters - best, 1)
     return Autoregression(chosen, max(variance * float(white @ white) / left, smallest))
-
-
-def _lowest_order(n: int) -> int:
-    """Lowest order for n samples; a lower order smooths the spectrum of slow noise too much."""
-    return round(_ORDERS_PER_DECADE * math.log10(n))
 
 
 def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:

@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.arrays import Bool, Float, Index
 from asperity.recording.defects.levels import CROWDED, saturated
 from asperity.recording.defects.sampling import check_sampling, even_rate, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from asperity.recording.trace import Trace
 
-    Array = NDArray[np.float64]
 
 __all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "saturation", "usable_rows"]
 
@@ -75,7 +73,7 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _missing(values: Array, time: Array, name: str) -> list[Finding]:
+def _missing(values: Float, time: Float, name: str) -> list[Finding]:
     # A finite sum means that all values are finite; this takes one pass without a copy.
     if np.isfinite(values.sum()):
         return []
@@ -99,7 +97,7 @@ def _missing(values: Array, time: Array, name: str) -> list[Finding]:
     return findings
 
 
-def saturation(values: Array, time: Array, name: str, crowded: float = CROWDED) -> list[Finding]:
+def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) -> list[Finding]:
     """Findings ``"saturation"`` for the top and the bottom, or ``"constant"``.
 
     Parameters
@@ -137,7 +135,7 @@ def saturation(values: Array, time: Array, name: str, crowded: float = CROWDED) 
     ]
 
 
-def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
+def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
     """Finding ``"spike"``, for samples that stand out of the samples before and behind them.
 
     A step, a slip event or a change of the amplitude has a new level on one side; it is no spike.
@@ -159,7 +157,7 @@ def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
     ]
 
 
-def usable_rows(time: Array, columns: Sequence[Array]) -> NDArray[np.bool_]:
+def usable_rows(time: Float, columns: Sequence[Float]) -> Bool:
     """Whether all columns are finite and time is later than in every usable row before.
 
     Parameters
@@ -176,9 +174,7 @@ def usable_rows(time: Array, columns: Sequence[Array]) -> NDArray[np.bool_]:
     return use
 
 
-def rows_to_avoid(
-    time: Array, columns: Sequence[Array], kept: NDArray[np.bool_] | None = None
-) -> NDArray[np.intp]:
+def rows_to_avoid(time: Float, columns: Sequence[Float], kept: Bool | None = None) -> Index:
     """Rows that are saturated, stand out, or follow a gap or a row that was left out.
 
     Parameters

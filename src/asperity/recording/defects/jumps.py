@@ -14,12 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from asperity.arrays import Float
 from asperity.recording.defects.autoregression import Autoregression, fitted
-
-Float = NDArray[np.float64]
 
 #: Probability that noise is taken for a jump, anywhere in a recording.
 CHANCE = 1e-3

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from asperity.arrays import Float, Index
 
 #: Number of levels next to the extreme that show the usual number of samples at a level.
 _LEVELS = 3
@@ -45,11 +42,11 @@ class Saturated(NamedTuple):
 
     side: str
     value: float
-    rows: NDArray[np.intp]
+    rows: Index
     usual: int
 
 
-def saturated(values: Array, crowded: float = CROWDED) -> list[Saturated]:
+def saturated(values: Float, crowded: float = CROWDED) -> list[Saturated]:
     """Extremes at which the channel has more samples than an unsaturated signal.
 
     Parameters
@@ -81,7 +78,7 @@ def saturated(values: Array, crowded: float = CROWDED) -> list[Saturated]:
     return result
 
 
-def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
+def _most_at_a_level(values: Float, extreme: float, side: str) -> int | None:
     """Samples at the most frequent level next to the extreme; None with too few levels."""
     left, most = values, 0
     level = extreme
@@ -94,7 +91,7 @@ def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
     return most
 
 
-def coarsely_rounded(values: Array) -> tuple[float, float] | None:
+def coarsely_rounded(values: Float) -> tuple[float, float] | None:
     """Share of values equal to the value before, and the usual step of the other values.
 
     None where values were not rounded, or no more coarsely than their noise.
@@ -118,7 +115,7 @@ def coarsely_rounded(values: Array) -> tuple[float, float] | None:
     return 1 - moved.size / steps.size, float(np.median(moved))
 
 
-def held_length(values: Array) -> float | None:
+def held_length(values: Float) -> float | None:
     """Mean number of equal samples in a row, where a converter is slower than the recorder.
 
     None where the resolution of the channel explains the equal samples.

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-Float = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Resolution of the spectrum (Hz), height over the spectrum about it, spectral values that are
 #: compared, how many lines, and periods in a piece that is fitted.

@@ -1,19 +1,20 @@
-"""The clock of a recording: even or not, gaps, stamps that stand still or run backward."""
+"""The clock of a recording: even or not, gaps, stamps that stand still or run backward.
+
+Rounded stamps are an even grid, cut by gaps, plus a rounding error. A clock that is stored in
+single precision, or written with few digits, has steps that alternate though the samples are
+evenly spaced. Without correction such stamps lower an amplitude by the share (2 pi f q)^2/24 for a
+quantum q; where q exceeds the sampling step, several samples share a stamp.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.recording.defects.rounded_time import RoundedGrid, rounded_grid
+from asperity.arrays import Float, Index
 from asperity.recording.finding import Finding
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -28,7 +29,7 @@ _CHUNK = 100_000
 _SHORTEST, _OTHER_RATE = 16, 1.5
 
 
-def even_rate(time: Array) -> float | None:
+def even_rate(time: Float) -> float | None:
     """Samples per second where all steps agree within 1 % or are even but for rounding, else None.
 
     Parameters
@@ -51,7 +52,7 @@ def even_rate(time: Array) -> float | None:
     return None if grid is None or grid.gaps else 1 / grid.step
 
 
-def check_sampling(time: Array) -> list[Finding]:
+def check_sampling(time: Float) -> list[Finding]:
     """Findings on the clock: backward and repeated stamps, gaps, uneven steps."""
     clean = time if np.isfinite(time.sum()) else time[np.isfinite(time)]
     if clean.size < 2:
@@ -94,7 +95,7 @@ def check_sampling(time: Array) -> list[Finding]:
     return findings
 
 
-def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) -> list[Finding]:
+def _backward_and_repeated(steps: Float, time: Float, rows: Index) -> list[Finding]:
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
@@ -124,7 +125,7 @@ def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) ->
     return findings
 
 
-def gap_rows(time: Array) -> NDArray[np.intp]:
+def gap_rows(time: Float) -> Index:
     """Samples that follow a gap, in rising order.
 
     Parameters
@@ -135,7 +136,7 @@ def gap_rows(time: Array) -> NDArray[np.intp]:
     return _gaps(np.diff(time), time)[0] + 1
 
 
-def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
+def rate_stretches(time: Float) -> tuple[tuple[int, int], ...]:
     """Start and stop (exclusive) of each stretch with a constant sampling rate.
 
     Parameters
@@ -163,7 +164,7 @@ def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
     return tuple(pairwise([*bounds, time.size]))
 
 
-def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
+def _gaps(steps: Float, time: Float) -> tuple[Index, Float]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
@@ -180,7 +181,7 @@ def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
     return np.concatenate(gaps), np.concatenate(missing)
 
 
-def _usual(steps: Array, window: NDArray[np.intp]) -> tuple[Array, Array]:
+def _usual(steps: Float, window: Index) -> tuple[Float, Float]:
     """Median step of each window and the longest usual step; NaN for an empty window."""
     if not window.size:
         return np.empty(0), np.empty(0)
@@ -196,7 +197,7 @@ def _usual(steps: Array, window: NDArray[np.intp]) -> tuple[Array, Array]:
     return middle, np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
 
 
-def _uneven(steps: Array, starts: NDArray[np.intp], time: Array) -> Finding:
+def _uneven(steps: Float, starts: Index, time: Float) -> Finding:
     median = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - median)))
     row = int(starts[worst])
@@ -221,20 +222,20 @@ def _rounded(grid: RoundedGrid) -> Finding:
     )
 
 
-def _are_even(steps: Array, time: Array) -> bool:
+def _are_even(steps: Float, time: Float) -> bool:
     median = float(np.median(steps))
     allowed = _EVEN * median + _slack(time, median)
     return bool(steps.max() - median <= allowed and median - steps.min() <= allowed)
 
 
-def _slack(time: Array, step: float) -> float:
+def _slack(time: Float, step: float) -> float:
     """Tolerance for a step, from the last digit of the time stamps."""
     digit = _digit(time)
     # Digits coarser than half a step give no tolerance: stamps of 1 ms at 1 kHz are exact.
     return 1.01 * digit if digit <= step / 2 else 0.0
 
 
-def _digit(time: Array) -> float:
+def _digit(time: Float) -> float:
     """The last decimal of the time stamps, s; the rounding error if they are not decimal."""
     rounding = 4 * np.spacing(np.abs(time[[0, -1]]).max())
     sample = time[:: max(1, time.size // 1000)]
@@ -247,3 +248,126 @@ def _digit(time: Array) -> float:
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+#: Smallest mean number of samples between gaps.
+_FEWEST = 16
+#: Samples from which the quantum is estimated; in single precision the quantum grows with time.
+_WINDOW = 64
+#: Largest ratio of the quantum in the last part of a recording to that in most of it.
+_DOUBLED = 2.1
+#: Smallest number of steps that differ from the most common one. Fewer such steps may be lost
+#: samples: of 3,500 recordings that lost 8 to 39 samples at random, 3 were taken for rounded with
+#: 16 here, and none with 24.
+_EVENTS = 24
+#: Largest range of the deviations from the least-squares line, in quanta. Rounded grids have at
+#: most 1.09 (11,400 grids of 24 to 20,000 samples); stamps with a jitter of 0.03 to 0.5 steps,
+#: rounded to that or finer, have at least 1.96 (3,280 cases).
+_WITHIN = 1.25
+#: A gap is longer than a step by a quantum and by this share of a step.
+_LONG_STEP = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedGrid:
+    """The even grid of rounded time stamps.
+
+    Attributes
+    ----------
+    time : array, (n,)
+        Seconds.
+    step : float
+        Seconds between samples.
+    quantum : float
+        Quantum of the rounding, s; the largest quantum in single precision.
+    gaps : int
+    """
+
+    time: Float
+    step: float
+    quantum: float
+    gaps: int
+
+
+def even_times(time: Float) -> Float:
+    """Times of the samples: the grid if the stamps are a rounded grid, else the stamps.
+
+    Parameters
+    ----------
+    time : array, (n,)
+        Seconds.
+
+    Returns
+    -------
+    array, (n,)
+        Where the stamps are no rounded grid, `time` itself.
+    """
+    grid = rounded_grid(time)
+    return time if grid is None else grid.time
+
+
+def rounded_grid(time: Float) -> RoundedGrid | None:
+    """The even grid that explains the stamps by rounding; None if there is no such grid.
+
+    Between gaps all steps of the grid are equal; where the sampling begins anew after a gap, the
+    samples there say.
+
+    Parameters
+    ----------
+    time : array, (n,)
+        Seconds.
+    """
+    if time.size < _FEWEST:
+        return None
+    steps = np.diff(time)
+    low, high = float(steps.min()), float(steps.max())
+    # NaN fails this test, too.
+    if not (low >= 0 and np.isfinite(high)):
+        return None
+    exact = 8 * float(np.spacing(np.abs(time[[0, -1]]).max()))
+    if high - low <= exact:
+        return None
+    lag = min(_WINDOW, time.size // 4)
+    step = float(np.median(time[lag:] - time[:-lag])) / lag
+    quantum = _quantum(steps, exact)
+    if quantum is None or not step > 0:
+        return None
+    gaps = np.flatnonzero(steps > (1 + _LONG_STEP) * step + 1.25 * quantum)
+    if gaps.size * _FEWEST > time.size:
+        return None
+    starts = np.concatenate([[0], gaps + 1])
+    counts = np.diff([*starts, time.size])
+    index = np.arange(time.size) - np.repeat(starts, counts)
+    # From the first stamp, so that long times keep their digits.
+    since = time - time[0]
+    middle, level = (np.add.reduceat(x, starts) / counts for x in (index.astype(float), since))
+    away = index - np.repeat(middle, counts)
+    step = float(away @ (since - np.repeat(level, counts)) / (away @ away))
+    made = np.repeat(level, counts) + step * away
+    off = since - made
+    spread = np.maximum.reduceat(off, starts) - np.minimum.reduceat(off, starts)
+    if not spread.max() <= _WITHIN * quantum or not np.diff(made).min() > 0:
+        return None
+    return RoundedGrid(time[0] + made, step, quantum, int(gaps.size))
+
+
+def _quantum(steps: Float, exact: float) -> float | None:
+    """What stamps may have been rounded to: steps of a rounded grid take two values, one apart.
+
+    A quantum is no longer than a step; where it is longer than the sampling step, so that stamps
+    repeat, it is what the others rise by. What changes by more is a gap.
+    """
+    change = np.abs(np.diff(steps))
+    low = float(steps.min())
+    longest = low if low > exact else _DOUBLED * float(np.median(steps[steps > exact]))
+    usual = np.median(steps)
+    if np.count_nonzero(np.abs(steps - usual) > exact) < _EVENTS:
+        return None
+    change[(change <= exact) | (change > longest + exact)] = np.inf
+    edges = np.arange(0, change.size, _WINDOW)
+    # The last, short window says less.
+    least = np.minimum.reduceat(change, edges[:-1] if edges.size > 1 else edges)
+    least = least[np.isfinite(least)]
+    if not least.size:
+        return None
+    return float(least[least <= _DOUBLED * np.median(least)].max())

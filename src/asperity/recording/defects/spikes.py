@@ -9,14 +9,10 @@ of neighbouring samples elsewhere in the recording.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from asperity.arrays import Bool, Float, Index
 
 #: A spike stands out of both samples at these distances. Next neighbours detect it next to a
 #: fast modulation; more distant samples detect spikes longer than a sample.
@@ -36,7 +32,7 @@ _EVERY = 8
 _AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 
-def spikes(values: Array) -> NDArray[np.intp]:
+def spikes(values: Float) -> Index:
     """Samples that are spikes, in rising order."""
     parts = [np.empty(0, dtype=np.intp)]
     most = max(_DISTANCES)
@@ -48,7 +44,7 @@ def spikes(values: Array) -> NDArray[np.intp]:
     return np.unique(np.concatenate(parts))
 
 
-def _standing_out(piece: Array, distance: int) -> NDArray[np.intp]:
+def _standing_out(piece: Float, distance: int) -> Index:
     steps = piece[distance:] - piece[:-distance]
     limit = _OUT * _usual(steps)
     if not limit > 0:
@@ -64,7 +60,7 @@ def _standing_out(piece: Array, distance: int) -> NDArray[np.intp]:
     return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, distance)]
 
 
-def _locally(sizes: Array, at: NDArray[np.intp], distance: int) -> NDArray[np.bool_]:
+def _locally(sizes: Float, at: Index, distance: int) -> Bool:
     """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
     jump = np.minimum(sizes[at - distance], sizes[at])
     out = np.ones(at.size, dtype=bool)
@@ -78,7 +74,7 @@ def _locally(sizes: Array, at: NDArray[np.intp], distance: int) -> NDArray[np.bo
     return out
 
 
-def _usual(steps: Array) -> float:
+def _usual(steps: Float) -> float:
     """The usual size of a difference, which a few spikes hardly change."""
     size = np.abs(steps[::_EVERY])
     size = size[np.isfinite(size)]
@@ -95,9 +91,7 @@ def _usual(steps: Array) -> float:
     return float(moving.min()) if moving.size else 0.0
 
 
-def away_from_changes(
-    values: Array, rows: NDArray[np.intp], changes: Sequence[int]
-) -> NDArray[np.intp]:
+def away_from_changes(values: Float, rows: Index, changes: Sequence[int]) -> Index:
     """Spikes without the peaks that friction itself may have at changes of the drive.
 
     Parameters
@@ -126,7 +120,7 @@ def away_from_changes(
     return np.sort(np.array(kept, np.intp))
 
 
-def without(values: Array, rows: NDArray[np.intp]) -> Array:
+def without(values: Float, rows: Index) -> Float:
     """Values with linear interpolation in place of the samples `rows`.
 
     Parameters

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, listed
 from asperity.parameters.arguments import number
 from asperity.recording.finding import Finding
@@ -44,7 +45,7 @@ class Clock:
         Assumptions about the clock.
     """
 
-    time: NDArray[np.float64]
+    time: Float
     source: str
     column: str | None = None
     findings: list[Finding] = field(default_factory=list)
@@ -144,7 +145,7 @@ def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
     return Clock(stamps[0], f"column '{name}', since {stamps[1]}", name)
 
 
-def _elapsed(raw: NDArray[Any]) -> tuple[NDArray[np.float64], str] | None:
+def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
     """Seconds since the first time stamp, and this stamp; None if the texts are no time stamps.
 
     ISO 8601, days before or behind months, hours:minutes:seconds, which go on beyond midnight, and
@@ -197,5 +198,5 @@ def _by_order(texts: pd.Series[str]) -> pd.Series[Any] | None:
     return best[1] if best else None
 
 
-def _seconds(times: pd.Series[Any]) -> NDArray[np.float64]:
+def _seconds(times: pd.Series[Any]) -> Float:
     return np.asarray(times.dt.total_seconds().to_numpy(dtype=np.float64))

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError
 from asperity.recording.roles import ROLES, candidates
 from asperity.units import KINDS
@@ -172,7 +173,7 @@ def required(text: str, name: str) -> Unit:
     return Unit(unit.kind, factor)
 
 
-def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
+def in_si(values: NDArray[Any], unit: Unit | None) -> Float:
     """Values times the factor of the unit, rounded once."""
     values = np.asarray(values, dtype=np.float64)
     if unit is None or unit.factor == 1:

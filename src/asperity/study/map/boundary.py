@@ -16,10 +16,10 @@ import numpy as np
 from contourpy import contour_generator
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float, Index
 from asperity.study.crossings import Crossings, find_crossings
 from asperity.study.map.plane import OUTPUTS, MapPlane
-from asperity.study.outcome import Answers
-from asperity.study.points import Float, Index
+from asperity.study.points import Answers
 
 #: Largest distance of the boundary from the chord between two neighbouring points, in fractions of
 #: the axes.
@@ -168,9 +168,7 @@ def _refined(
     return where, points, line, place, unresolved
 
 
-def _bent(
-    plane: MapPlane, where: Float, chords: Index
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Crossings]:
+def _bent(plane: MapPlane, where: Float, chords: Index) -> tuple[Bool, Bool, Crossings]:
     """Chords further than `CHORD` from the boundary, chords of unknown distance, and crossings.
 
     The distance is measured from the middle of the chord along its perpendicular. The crossings

@@ -12,7 +12,7 @@ from asperity._version import __version__
 from asperity.parameters import OUTPUTS, point_parameters
 from asperity.study.map.boundary import MapBoundary
 from asperity.study.map.plane import SHOWN, MapPlane
-from asperity.study.outcome import Answers
+from asperity.study.points import Answers
 from asperity.study.responses import bifurcation_kinds, is_stable
 from asperity.theory import closed_forms as cf
 

@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
 from asperity.parameters.arguments import at_least, number, shown, typed
 from asperity.study.crossings import STABILITY
-from asperity.study.outcome import Answers
-from asperity.study.points import Float
+from asperity.study.points import Answers
 from asperity.study.responses import answers_of_law
 
 #: Names of the numbers on the grid that a figure can show.

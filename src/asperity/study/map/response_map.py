@@ -22,7 +22,7 @@ from asperity.study.engine import solve_here
 from asperity.study.map.boundary import MapBoundary, trace_boundary
 from asperity.study.map.dataset import as_dataset
 from asperity.study.map.plane import OUTPUTS, Axis, MapPlane
-from asperity.study.outcome import Answers
+from asperity.study.points import Answers
 from asperity.units import KINDS
 
 if TYPE_CHECKING:

@@ -1,8 +1,7 @@
 """Kinds of solve: what a sweep solves at each of its points."""
 
 from asperity.study.solve.fit import FitSolve
-from asperity.study.solve.kind import SolveKind
-from asperity.study.solve.periodic import PeriodicSolve
+from asperity.study.solve.kind import PeriodicSolve, SolveKind
 from asperity.study.solve.threshold import ThresholdSolve
 from asperity.study.solve.transient import TransientSolve
 

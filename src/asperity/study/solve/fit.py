@@ -26,8 +26,7 @@ from asperity.parameters.arguments import one_of
 from asperity.parameters.columns import readable
 from asperity.parameters.toml_file import file_content
 from asperity.questions.sweep import FitTable, Sweep
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import Points
+from asperity.study.points import Answers, Points, SweepOutcome
 from asperity.study.solve.kind import SolveKind
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from asperity.errors import require
 from asperity.laws import Law
 from asperity.parameters import Output
 from asperity.questions.sweep import Sweep
-from asperity.study.outcome import Answers
-from asperity.study.points import Points
+from asperity.study.points import Answers, Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds

@@ -17,8 +17,7 @@ from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
 from asperity.questions.sweep import NumberTable, Sweep, TransientTable
 from asperity.slider.named import slider_from
-from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.points import Points
+from asperity.study.points import Answers, Points, SweepOutcome
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.transients import Trajectory, transient

@@ -21,9 +21,8 @@ from zarr.storage import MemoryStore
 
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
-from asperity.study.outcome import SweepOutcome, flag_attributes
 from asperity.study.plan import OF_CHUNKS, OF_POINTS
-from asperity.study.points import RATIOS
+from asperity.study.points import RATIOS, SweepOutcome, flag_attributes
 from asperity.study.solve import SOLVES
 from asperity.study.store.root import FORMAT, KIND, Root, put, sync_folder, write_root
 
