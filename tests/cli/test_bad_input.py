@@ -118,12 +118,12 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
         (
             "measure",
             "time (s),shear stress (MPa),normal force (N)",
-            ["got 'Pa' for 'F' and 'N' for 'W'; give the area", 'like --area "25 cm^2"'],
+            ["got 'Pa' for 'shear stress (MPa)' and 'N' for 'normal force (N)'; give the area", 'like --area "25 cm^2"'],
         ),
         (
             "measure",
             "time (s),shear force,normal force (N)",
-            ["got no known unit for 'F'", 'like --unit "shear force=N"'],
+            ["got no known unit for 'shear force'", 'like --unit "shear force=N"'],
         ),
         (
             "fit",

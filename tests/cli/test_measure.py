@@ -239,7 +239,12 @@ def test_a_constant_load_is_told_what_to_do(asperity, tmp_path) -> None:
     path.write_text("time (s),W (N),F (N)\n" + "\n".join(rows))
     result = asperity("measure", path)
     assert result.exit_code == 2
-    assert "must be modulated" in result.stderr
+    assert "got a constant load, and velocity steps cannot be seen: neither" in result.stderr
+    assert result.stderr.partition("; --stick-slip reads")[0].endswith("--steps and --velocities")
+    result = asperity("measure", path, "-f", "3 Hz", "--velocities", "1 um/s")
+    assert "--velocities must be one more than the steps, got 1 for 0" in result.stderr
+    path.write_text("time (s),W,mu\n" + "\n".join(rows))
+    assert asperity("measure", path).stderr == asperity("measure", path, "--unit", "W=N").stderr
 
 
 def test_a_file_without_times_of_stresses_in_groups(asperity, tmp_path) -> None:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import ConstantLoadError, InputError, require
+from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def require_modulated(line: SpectralLine, load: Array) -> None:
             "lock_in.load",
             "be modulated",
             f"a constant of {float(load[0]):.6g}",
-            "name another column, or measure without modulation",
+            f"name another column, or choose {Argument('modulated', value='False')}",
         )
 
 
