@@ -118,7 +118,10 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
         (
             "measure",
             "time (s),shear stress (MPa),normal force (N)",
-            ["got 'Pa' for 'shear stress (MPa)' and 'N' for 'normal force (N)'; give the area", 'like --area "25 cm^2"'],
+            [
+                "got 'Pa' for 'shear stress (MPa)' and 'N' for 'normal force (N)'; give the area",
+                'like --area "25 cm^2"',
+            ],
         ),
         (
             "measure",

@@ -251,7 +251,9 @@ def _without_motion(
     measurement: SlidingMeasurement, events: StickSlipMeasurement | None
 ) -> InputError:
     (cut,) = (check for check in measurement.checks if check.name == "segments")
-    got = f"{'friction alone' if measurement.load is None else 'a constant load'}, and {cut.sentence}"
+    got = (
+        f"{'friction alone' if measurement.load is None else 'a constant load'}, and {cut.sentence}"
+    )
     name = Argument("columns", "displacement", "x")
     steps, velocities = Argument("measure.steps"), Argument("measure.velocities")
     advice = f"name a displacement, like {name}, or give {steps} and {velocities}"

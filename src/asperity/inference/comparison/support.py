@@ -12,8 +12,6 @@ from asperity.inference.runs.term import RunTerm
 #: Parts of a recording, share of the difference of two laws that a stretch of them must hold, and
 #: share of the recording up to which such a stretch is named.
 _PARTS, _MOST, _SHORT = 200, 0.8, 0.1
-#: Probability below which the noise is not the process that was fitted.
-_NOT_WHITE = 1e-3
 
 
 def support(best: Fit, other: Fit) -> tuple[str, str]:
@@ -67,10 +65,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
         inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
-        if first.law_fails_after_changes:
-            doubts.append(f"even {best.law} misses what follows the velocity changes")
-        if first.noise["whiteness_p"] < _NOT_WHITE:
-            doubts.append(f"the noise of {name} is not the process that was fitted")
+        doubts += [f"even under {best.law} {doubt}" for doubt in first.doubts]
     doubt = f"This verdict is doubtful: {'; '.join(doubts)}. " if doubts else ""
     return doubt, "".join(f" {sentence}." for sentence in stretches)
 

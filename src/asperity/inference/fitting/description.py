@@ -478,8 +478,8 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     outliers = _outliers(fit)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         said += term.warnings(residuals, information, outliers)
-    for name in fit.undetermined:
-        said.append(_why_undetermined(fit, name))
+    because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
+    said += because.values()
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
             said.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
@@ -492,7 +492,7 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(fit, warnings=tuple(said), outliers=outliers)
+    return replace(fit, warnings=tuple(said), because=because, outliers=outliers)
 
 
 def _outliers(fit: Fit) -> tuple[int, ...]:

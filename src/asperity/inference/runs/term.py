@@ -273,6 +273,18 @@ class RunTerm(DataTerm):
         """Whether innovations after changes of the drive are too large for the law."""
         return self._after_changes[0] < _LAW_FAILS
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why intervals of this recording do not hold, in a few words each."""
+        doubts = []
+        if self.law_fails_after_changes:
+            doubts.append(
+                f"the computed motion misses what follows the velocity changes of {self.name}"
+            )
+        if self._whiteness < _NOT_WHITE:
+            doubts.append(f"the noise of {self.name} is not the process that was fitted")
+        return tuple(doubts)
+
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
