@@ -154,7 +154,7 @@ def test_friction_without_motion_says_which_options_give_it(asperity, tmp_path: 
         for i, change in enumerate([0.0] * 2500 + after)
     ]
     path.write_text("\n".join(["time (s),position,friction", *rows]) + "\n", encoding="utf-8")
-    advice = ('like --column "displacement=x"', 'like --unit "x=um"', "or give --steps")
+    advice = ('like --column "displacement=x"', 'like --unit "position=um"', "or give --steps")
     refused(asperity("measure", path), *advice)
 
 

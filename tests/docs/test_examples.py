@@ -8,8 +8,8 @@ import pytest
 
 import asperity as asp
 
-#: What needs a browser, or another function's result, and what no one calls.
-OTHERS = {"InputError", "doubled_branch", "explore"}
+#: What starts a server, which `tests/app/test_notebook.py` calls, and what no one calls.
+OTHERS = {"InputError", "explore"}
 FUNCTIONS = [n for n in asp.__all__ if callable(getattr(asp, n)) and n not in OTHERS]
 
 

@@ -54,7 +54,7 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
     write(trace, target)
     numbers = {key: number.value for key, number in truth.numbers.items()}
     numbers["V"] = truth.programme.level.velocity
-    kinds = known_parameters(truth.law) | DRIVE
+    kinds = {**known_parameters(truth.law), **DRIVE}
     rows = tuple((key, format_si(value, kinds[key].kind)) for key, value in numbers.items())
     made = f"{target}: {len(trace)} samples of {', '.join(trace.channels)}"
     output.answer(

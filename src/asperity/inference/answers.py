@@ -325,8 +325,8 @@ def fit(
     free : sequence of str, optional
         Free parameters; by default all that the data may show.
     **options
-        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``material``,
-        ``prior``, ``start``, ``inertia`` and ``profile``.
+        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``material``, also by its
+        name, ``prior``, ``start``, ``inertia`` and ``profile``.
 
     Raises
     ------
@@ -341,7 +341,8 @@ def fit(
     >>> print(asp.fit(steps, free=["A", "B"], fixed={"D0": "5 um"}))
     """
     loaded = _loaded(data, options.get("fixed"))
-    return fit_loaded(loaded, default_law(loaded) if law is None else law, free, **options)
+    law = default_law(loaded) if law is None else law
+    return fit_loaded(loaded, law, free, **_with_material(options))
 
 
 @typed
@@ -376,7 +377,15 @@ def compare(
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
     names = compared_laws([law.strip() for law in listed])
-    return compare_loaded(_loaded(data, options.get("fixed")), names, free, **options)
+    loaded = _loaded(data, options.get("fixed"))
+    return compare_loaded(loaded, names, free, **_with_material(options))
+
+
+def _with_material(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options with the material where its name is given."""
+    material = options.get("material")
+    loaded = {"material": materials.load(material)} if isinstance(material, str) else {}
+    return {**options, **loaded}
 
 
 def compared_laws(names: Sequence[str]) -> list[str]:

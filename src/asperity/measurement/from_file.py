@@ -184,7 +184,7 @@ def _either(
         if known or (not constant and trace.has(question.load)):
             raise
         reason = error
-    what = "The normal load is constant" if constant else "No channel is the normal load"
+    what = "The normal load is not modulated" if constant else "No channel is the normal load"
     events, unread = None, None
     try:
         events = slips() if question.stick_slip is None else None
@@ -198,9 +198,9 @@ def _either(
         raise error from None
     changes = len(measurement.steps) + len(measurement.holds)
     if events is not None and _rather_events(events, changes):
-        return events, f"{what}: {events.kind} is read, not a modulation."
+        return events, f"{what}: {events.kind} is read."
     if changes:
-        return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+        return measurement, f"{what}: velocity steps and holds are read."
     steady = events is not None and events.kind == "steady sliding"
     if not (plain or steady):
         if measurement.velocity_from:
@@ -208,7 +208,7 @@ def _either(
         if unread is not None and not constant:
             raise unread
         raise _without_motion(measurement, events)
-    return measurement, f"{what}: steady sliding is read, not a modulation."
+    return measurement, f"{what}: steady sliding is read."
 
 
 def _lock_in(question: Question) -> dict[str, Any]:

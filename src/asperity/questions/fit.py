@@ -46,7 +46,7 @@ class Data(Record):
     source: Source = Field(default_factory=Source)
     window: Span | None = None
     steps: tuple[Seconds, ...] | None = None
-    velocities: tuple[Pulling, ...] | None = None
+    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
 
 
 class NormalPrior(Record):

@@ -21,7 +21,7 @@ def _hold(value: Any) -> Any:
 
 
 #: Velocity of the drive between two steps (m/s), 0 in a hold.
-Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]
+Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]  # type: ignore[valid-type]
 
 
 class ReadingRecipe(Question):
@@ -137,7 +137,7 @@ class Measurement(Question):
     whole_periods: bool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
     steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
-    velocities: tuple[Pulling, ...] | None = None
+    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: bool | None = None
     stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]

@@ -85,9 +85,9 @@ ROLES: Mapping[str, Role] = {
         "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
         "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
         "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
-        "shear shr shearstress shearforce ft tangential tangentiel tangentielle tangenziale tangencial lateral laterale "
-        "traction tau τ reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
-        "tangentialkraft cisaillement taglio cizalla cortante",
+        "shear shr shearstress shearforce ft tangential tangentiel tangentielle tangenziale "
+        "tangencial lateral laterale traction tau τ reibkraft reibungskraft scherkraft schubkraft "
+        "schubspannung scherspannung tangentialkraft cisaillement taglio cizalla cortante",
         weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
         "reibung",
         without=_MOTION + " nor norm normal normale coefficient coeff coef angle koeffizient "

@@ -192,7 +192,7 @@ def _record(
     if cycles is None:
         return record
     # The last whole cycle, which the drawing repeats, against the motion at V.
-    grid = np.linspace(*cycles.onsets[-2:], _FRAMES)
+    grid = np.linspace(cycles.onsets[-2], cycles.onsets[-1], _FRAMES)
     behind = np.interp(grid, time, whole.displacement) - V * grid
     frames = {
         "duration": grid[-1] - grid[0],
