@@ -237,7 +237,7 @@ def fit(
     if report is not None and result.converged:
         from asperity.fit_report import write_report
 
-        write_report(report, result, sampled)
+        write_report(report, result, sampled, output.names)
     more = {"posterior": sampled.record()} if sampled else {}
     more |= {"windows": over.record()} if over else {}
     output.answer(
@@ -349,7 +349,7 @@ def compare(
     if report is not None and comparison.best:
         from asperity.fit_report import write_comparison
 
-        write_comparison(report, comparison)
+        write_comparison(report, comparison, output.names)
         _say_written(report)
     if comparison.best:
         output.draw(comparison)

@@ -18,6 +18,7 @@ from asperity.fit_report.folder import (
     figure,
     material_text,
     provenance,
+    worded_html,
 )
 from asperity.fit_report.pictures import Float, laws_figure, run_figure, svg
 from asperity.inference import Fit, LockInTable
@@ -27,14 +28,14 @@ from asperity.inference.report import comparison_report, estimates
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
-from asperity.outputs.tables import as_html
 from asperity.outputs.written import written_folder
+from asperity.parameters import NAMES, Names
 
 #: Columns of panels that are legible in half the width of the page.
 _MOST_NARROW = 2
 
 
-def write_comparison(folder: Path, comparison: Comparison) -> None:
+def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[0]) -> None:
     """Write the report of a comparison into a folder, completely or not at all.
 
     Parameters
@@ -42,6 +43,8 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     folder : Path
     comparison : Comparison
         With one converged fit at least.
+    names : {"friction", "geophysics"}
+        Of the page; files keep the names of friction.
 
     Raises
     ------
@@ -54,12 +57,12 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     with written_folder(folder, "report") as staging:
         record = json.dumps(comparison_record(comparison), indent=2)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
-        (staging / "report.html").write_text(page(comparison, fits), encoding="utf-8")
+        (staging / "report.html").write_text(page(comparison, fits, names), encoding="utf-8")
         for name, fit in fits.items():
             (staging / f"{name}.toml").write_text(material_text(fit), encoding="utf-8")
 
 
-def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
+def page(comparison: Comparison, fits: Mapping[str, Fit], names: Names) -> str:
     """The page as text, with embedded figures and without external resources.
 
     Parameters
@@ -67,21 +70,23 @@ def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
     comparison : Comparison
     fits : mapping of str to Fit
         The converged fits.
+    names : {"friction", "geophysics"}
     """
     first = next(iter(fits.values()))
-    names = " and ".join(term.name for term in first.objective.terms)
+    data = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": as_html(comparison_report(comparison, reasons=True)),
-        "Data and laws": _figures(fits),
+        "Verdict": worded_html(comparison_report(comparison, reasons=True), first, names),
+        "Data and laws": _figures(fits, names),
         "Estimates": "".join(
-            f"<h3>{escape(name)}</h3>{as_html([estimates(fit)])}" for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{worded_html([estimates(fit)], fit, names)}"
+            for name, fit in fits.items()
         ),
         "Data": data_tables(first),
         "Provenance": "".join(
-            f"<h3>{escape(name)}</h3>{provenance(fit)}" for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{provenance(fit, names)}" for name, fit in fits.items()
         ),
     }
-    return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
+    return document(f"Laws compared on {data}", "A comparison", f"Laws on {data}", sections)
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
@@ -121,7 +126,7 @@ def _motions(fits: Mapping[str, Fit], i: int) -> tuple[RecordedRun, dict[str, Fl
     return run, {name: terms[name].fitted_friction(fit.values) for name, fit in fits.items()}
 
 
-def _figures(fits: Mapping[str, Fit]) -> str:
+def _figures(fits: Mapping[str, Fit], names: Names) -> str:
     first = next(iter(fits.values()))
     parts = []
     for i in range(len(first.objective.terms_of(LockInTerm))):
@@ -131,7 +136,7 @@ def _figures(fits: Mapping[str, Fit]) -> str:
             "each law, by the normal approximation."
         )
         many = len(next(iter(predicted.values()))) > _MOST_NARROW
-        parts.append(figure(svg(laws_figure(table, predicted)), caption, wide=many))
+        parts.append(figure(svg(laws_figure(table, predicted), names), caption, wide=many))
     for i in range(len(first.objective.terms_of(RunTerm))):
-        parts.append(figure(svg(run_figure(*_motions(fits, i))), RUN_CAPTION))
+        parts.append(figure(svg(run_figure(*_motions(fits, i)), names), RUN_CAPTION))
     return "\n".join(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from asperity.errors import Argument
 from asperity.inference.comparison.scale import EXCLUDED
 from asperity.inference.fitting.result import Fit, Float
 from asperity.inference.runs.noise import innovations
@@ -47,7 +48,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
                 f"it rests on {a:.4g} to {b:.4g} s of {name}, {(b - a) / whole:.1%} of the "
                 f"recording: without that stretch the AICc of {other.law} is "
                 f"{behind * (1 - share):.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
-                "(compare with a --window that leaves it out)"
+                f"(compare without it: {Argument('window')})"
             )
         elif end - begin <= _SHORT * whole:
             stretches.append(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
+from asperity.errors import Argument
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -152,7 +153,7 @@ def described_fit(
                 "standard errors"
                 if profiled
                 else "intervals of the normal approximation are wrong there, and those by profile "
-                "likelihood (--profile) take minutes for a recording"
+                f"likelihood ({Argument('profile')}) take minutes for a recording"
             )
         )
     return _with_warnings(_fit_with(objective, at, estimates, rivals), said)
@@ -170,8 +171,8 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
     ]
     return (
         f"{', '.join(e for e in ends if e)}: their profile likelihood runs where the law hardly "
-        "has periodic orbits, which takes minutes; ask for it (--profile), fix a parameter or give "
-        "a prior"
+        f"has periodic orbits, which takes minutes; ask for it ({Argument('profile')}), fix a "
+        "parameter or give a prior"
     )
 
 

@@ -12,6 +12,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
@@ -330,7 +331,7 @@ class RunTerm(DataTerm):
             said.append(
                 f"the noise of {self.name} is so slow that its {self.run.time.size} samples say as "
                 f"much as {max(effective, 1):.2g} with white noise: the intervals are rough; a "
-                "longer window would help, or a drift (--drift) if friction drifts with time"
+                f"longer window would help, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:
             said.append(self._said_of_spikes())
@@ -346,8 +347,8 @@ class RunTerm(DataTerm):
             said.append(
                 f"what {self.name} shows just after changes of its drive is {size:.2g} times "
                 f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
-                "(--gauge), the drive or its times are not those of the recording, or a sample "
-                "there is wrong, and intervals do not hold"
+                f"({Argument('gauge')}), the drive or its times are not those of the recording, or "
+                "a sample there is wrong, and intervals do not hold"
             )
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
