@@ -50,7 +50,7 @@ def in_python(argument: Argument) -> str:
         return f"{name}['{key}']" if key else name
     if name == "numbers" and key:
         return f"'{key}={value}'"
-    shown = value if value.isdigit() or value == "..." else f"'{value}'"
+    shown = value if value.isdigit() or value in ("...", "False") else f"'{value}'"
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
 
 

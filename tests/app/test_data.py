@@ -318,12 +318,12 @@ TABLE = """V,epsilon,frequency,mean_friction,mean_friction_err
 
 
 def test_the_report_of_a_fit_is_packed_whole(monkeypatch):
-    def written(folder, found, posterior):
+    def written(folder, found, posterior, names):
         folder.mkdir()
         (folder / "fit.json").write_text(f"{found} fitted")
 
     monkeypatch.setattr("asperity.fit_report.write_report", written)
-    packed = fits._report("a law")
+    packed = fits._report("a law", None, "friction")
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))) as folder:
         texts = {name: folder.read(name).decode() for name in folder.namelist()}
     assert texts == {"report/fit.json": "a law fitted"}
@@ -360,7 +360,9 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
     monkeypatch.setattr("asperity.inference.sample_posterior", sampled)
     monkeypatch.setattr(
         "asperity.fit_report.write_report",
-        lambda folder, found, posterior: folder.mkdir() or posterior.to_netcdf(folder / "a.nc"),
+        lambda folder, found, posterior, names: (
+            folder.mkdir() or posterior.to_netcdf(folder / "a.nc")
+        ),
     )
     said = Section("posterior", ("A is larger than B",))
     monkeypatch.setattr("asperity.inference.report.posterior_sections", lambda posterior: [said])

@@ -7,6 +7,7 @@ import pytest
 
 import asperity as asp
 from asperity.app.api import map as map_tab
+from asperity.experiment import stick_slip_response
 from asperity.study import map as maps
 from asperity.study.map import Axis
 
@@ -37,6 +38,19 @@ def test_the_motion_below_the_threshold_is_stick_slip(ask):
     assert found["slip"] / found["period"] == pytest.approx(1e-5, rel=0.15)
     assert found["drop"] * 7.0 / 5e4 == pytest.approx(found["slip"], rel=0.15)
     assert len(motion["frames"]["place"]) == len(motion["frames"]["force"])
+
+
+def test_stick_slip_that_grows_is_told_by_its_last_cycle(ask):
+    """Just below the threshold the first cycles are small; Newton's method has the limit cycle."""
+    numbers = {"V": 1e-6, "epsilon": 0.0, "frequency": 120.0, "K": 2e5, "W0": 7.0}
+    question = {"law": "rice-ruina", "numbers": numbers, "growth_rate": 0.149}
+    motion = ask("explore/motion", question).lines[-1]["result"]
+    pmma = asp.materials.load("bureau2000")
+    slider = asp.Slider(pmma.law("rice-ruina"), spring=2e5, mass=pmma.M, load=7.0)
+    limit = stick_slip_response(slider, velocity=1e-6)
+    found = motion["stick_slip"]
+    assert found["period"] == pytest.approx(float(limit.period), rel=0.05)
+    assert found["drop"] == pytest.approx(float(limit.drop), rel=0.05)
 
 
 def test_the_motion_above_the_threshold_settles_to_the_orbit(ask, explored):

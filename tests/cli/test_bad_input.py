@@ -95,12 +95,15 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
         (
             "measure",
             "time (s),shear stress (MPa),normal force (N)",
-            ["got 'Pa' for 'F' and 'N' for 'W'; give the area", 'like --area "25 cm^2"'],
+            [
+                "got 'Pa' for 'shear stress (MPa)' and 'N' for 'normal force (N)'; give the area",
+                'like --area "25 cm^2"',
+            ],
         ),
         (
             "measure",
             "time (s),shear force,normal force (N)",
-            ["got no known unit for 'F'", 'like --unit "shear force=N"'],
+            ["got no known unit for 'shear force'", 'like --unit "shear force=N"'],
         ),
         (
             "fit",
@@ -128,7 +131,7 @@ def test_friction_without_motion_says_which_options_give_it(asperity, tmp_path: 
         for i, change in enumerate([0.0] * 2500 + after)
     ]
     path.write_text("\n".join(["time (s),position,friction", *rows]) + "\n", encoding="utf-8")
-    advice = ('like --column "displacement=x"', 'like --unit "x=um"', "or give --steps")
+    advice = ('like --column "displacement=x"', 'like --unit "position=um"', "or give --steps")
     refused(asperity("measure", path), *advice)
 
 

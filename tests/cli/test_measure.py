@@ -184,7 +184,7 @@ def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
     assert len(record(chosen)["steps"]) == 1
     assert (noticed.stdout, noticed.exit_code) == (chosen.stdout, chosen.exit_code)
     extra = noticed.stderr.removesuffix(chosen.stderr)
-    assert extra.endswith(": velocity steps and holds are read, not a modulation.\n")
+    assert extra.endswith(": velocity steps and holds are read.\n")
     assert extra.count("\n") == 1
     assert asp.measure(path).steps == asp.measure(path, modulated=False).steps
     # What the user says of it is not set aside.
@@ -214,7 +214,14 @@ def test_a_constant_load_is_told_what_to_do(asperity, tmp_path) -> None:
     path = tmp_path / "constant.csv"
     rows = [f"{i * 1e-3:.3f},7,{2.8 + 0.01 * (i % 7)}" for i in range(500)]
     path.write_text("time (s),W (N),F (N)\n" + "\n".join(rows))
-    refused(asperity("measure", path), "must be modulated")
+    result = asperity("measure", path)
+    assert result.exit_code == 2
+    assert "got a constant load, and velocity steps cannot be seen: neither" in result.stderr
+    assert result.stderr.partition("; --stick-slip reads")[0].endswith("--steps and --velocities")
+    result = asperity("measure", path, "-f", "3 Hz", "--velocities", "1 um/s")
+    assert "--velocities must be one more than the steps, got 1 for 0" in result.stderr
+    path.write_text("time (s),W,mu\n" + "\n".join(rows))
+    assert asperity("measure", path).stderr == asperity("measure", path, "--unit", "W=N").stderr
 
 
 def test_a_file_without_times_of_stresses_in_groups(asperity, tmp_path) -> None:

@@ -48,7 +48,7 @@ def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
         "run", protocol, "--out", out, "--csv", "--plot", out.with_suffix(".png"), "--json"
     )
     assert result.exit_code == 0, result.output
-    assert result.stderr.startswith("asperity: writing 1001 rows, about 214 kB, to ")
+    assert result.stderr.startswith("asperity: writing 1001 rows, about 232 kB, to ")
     assert result.stderr.count("\n") == 1
     summary = json.loads(result.stdout)
     assert summary == {

@@ -241,8 +241,8 @@ def test_outside_the_repository_the_readme_has_no_links_into_it() -> None:
     assert "getting started" in text.lower()
 
 
-#: What needs a browser, or another function's result, and what no one calls.
-OTHERS = {"InputError", "doubled_branch", "explore"}
+#: What starts a server, which `tests/app/test_notebook.py` calls, and what no one calls.
+OTHERS = {"InputError", "explore"}
 FUNCTIONS = [n for n in asp.__all__ if callable(getattr(asp, n)) and n not in OTHERS]
 
 

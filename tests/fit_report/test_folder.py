@@ -132,6 +132,15 @@ def test_recordings_are_shown_with_the_motion(tmp_path):
         assert page.count("<svg") == 1
         assert "AR(" in page
         assert nothing_is_fetched(page)
+    # Names are those of the screen, and files keep theirs.
+    compared = judge({"rice-ruina": own, "the same": own})
+    write_report(tmp_path / "faults", own, names="geophysics")
+    write_comparison(tmp_path / "other laws", compared, "geophysics")
+    for folder in ("faults", "other laws"):
+        page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
+        assert "<td>D_c</td>" in page
+        assert "<td>D0</td>" not in page
+    assert '"D0"' in (tmp_path / "faults" / "fit.json").read_text(encoding="utf-8")
     # A stiffness under a stress is none of a material, whose springs are in N/m.
     material = (tmp_path / "fit" / "material.toml").read_text(encoding="utf-8")
     assert "[numbers.D0]" in material

@@ -262,7 +262,7 @@ def test_a_recording_without_modulation_is_told(truth, trace) -> None:
     time = np.arange(8000) * 1e-3
     load = 7 + 1e-2 * rng.standard_normal(time.size)
     force = 2.8 + 1e-2 * rng.standard_normal(time.size)
-    with pytest.raises(InputError, match=r"must be modulated.*measure without modulation"):
+    with pytest.raises(InputError, match=r"must be modulated.*choose modulated=False"):
         measure(trace(time, load, force))
     # The verdict says so to a user who knows better.
     assert verdicts(measure(trace(time, load, force), frequency=60.0))["modulation"] == "bad"

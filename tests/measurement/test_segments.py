@@ -187,6 +187,17 @@ def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
     blind = measure_sliding(sliding_trace(time, friction), steps=[truth])
     assert np.isnan(blind.steps[0].rate_dependence)
     assert np.isfinite(blind.steps[0].change)
+    # The velocities of the user stand for those of the displacement, and are compared with them.
+    same = {"steps": [truth], "velocities": [3 * UM, 10 * UM]}
+    seen = measure_sliding(trace, steps=[truth]).steps[0]
+    for known in (sliding_trace(time, friction), trace):
+        step = measure_sliding(known, **same).steps[0]
+        assert step.rate_dependence == pytest.approx(seen.rate_dependence, rel=0.02)
+        assert step.slope_after == pytest.approx(seen.slope_after, rel=0.02)
+    other = measure_sliding(trace, steps=[truth], velocities=[3 * UM, 20 * UM])
+    assert "the recorded displacement has 1" in next(
+        c.sentence for c in other.checks if c.name == "segments" and c.verdict == "suspicious"
+    )
     for steps in ([-5.0], [1e6]):
         with pytest.raises(InputError, match="steps must lie inside the recording"):
             measure_sliding(trace, steps=steps)

@@ -9,6 +9,7 @@ import xarray
 from asperity.errors import InputError
 from asperity.figures.style import style
 from asperity.figures.trajectory import draw_run
+from asperity.measurement.sliding.signals import sliding_signals
 from asperity.outputs import Interrupted
 from asperity.protocol import (
     Protocol,
@@ -19,6 +20,7 @@ from asperity.protocol import (
     run_protocol,
     write_csv,
 )
+from asperity.recording.readers import read
 
 ROWS = 300
 
@@ -184,6 +186,9 @@ def test_text_has_the_same_rows(whole, tmp_path) -> None:
     with xarray.open_dataset(whole) as run:
         for name, column in (("time (s)", "time"), ("shear force (N)", "force")):
             np.testing.assert_allclose(rows[:, heading.index(name)], run[column], rtol=1e-11)
+        # What a drive moves is read, and not the slider.
+        motion = sliding_signals(read(path), "W", "F", None).displacement
+        np.testing.assert_allclose(motion, run.load_point_displacement, rtol=1e-11)
     with pytest.raises(InputError, match="--csv"):
         write_csv(whole, tmp_path / "nowhere" / "run.csv")
 

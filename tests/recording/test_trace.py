@@ -195,6 +195,7 @@ def test_channels_go_by_name_by_heading_and_by_role(rng):
         ("W", "Fn", "force", True),
         ("W", "Normal_stress", "pressure", True),
         ("W", "NormalStress", None, True),
+        ("W", "EffectiveNormalstress", "pressure", True),
         ("W", "Nor_stress", "pressure", True),
         ("W", "Normal displacement", None, False),
         ("W", "Load point displacement", "length", False),

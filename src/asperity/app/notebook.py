@@ -74,6 +74,15 @@ def explore(
     ------
     InputError
         If the extra ``app`` is not installed, or a value breaks its rule.
+
+    Examples
+    --------
+    The last line of a cell is ``page``.
+
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring=pmma.K, mass=pmma.M, load=pmma.W0)
+    >>> page = asp.explore(slider, velocity="1 um/s", epsilon=0.24, frequency="120 Hz")
     """
     values: dict[str, Any] = {}
     if slider is not None:

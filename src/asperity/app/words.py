@@ -34,6 +34,8 @@ _LABELS: Mapping[str, str] = {
     "fixed": "Fixed numbers",
     "laws": "Laws",
     "gauge": "Low-pass of the force gauge",
+    "drift": "Friction also drifts over time",
+    "profile": "Intervals by profile likelihood",
     "fit_rate": "Mean values per second for long recordings",
     "velocities": "Velocities between the steps",
 }

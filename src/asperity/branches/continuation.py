@@ -302,6 +302,15 @@ def doubled_branch(
     InputError
         If the bifurcation is no period doubling, the branch has a doubled period already,
         or there is no doubled orbit next to it.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> pmma = asp.materials.load("bureau2000")
+    >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.24 N/um", load=pmma.W0)
+    >>> at = {"velocity": "1 um/s", "frequency": "0.8 Hz"}
+    >>> branch = asp.continuation(slider, parameter="epsilon", span=(0, 0.03), **at)
+    >>> print(asp.doubled_branch(branch, branch.bifurcations[0]))
     """
     rule, got = "be a period doubling", f"a {bifurcation.kind}"
     require(bifurcation.kind == "period doubling", "bifurcation", rule, got, "choose another one")

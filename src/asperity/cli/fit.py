@@ -18,7 +18,7 @@ from asperity.cli.options import (
     settings_of,
     switch,
 )
-from asperity.cli.recording import listed_times, source_options
+from asperity.cli.recording import listed_times, source_options, velocities_option
 from asperity.cli.report import Output, say
 from asperity.cli.words import fields_as_options
 from asperity.errors import InputError, require
@@ -116,9 +116,7 @@ _THEN = (
         "TIMES|FILE",
         "Times (s) at which the velocity of the drive changes, where no channel has it.",
     ),
-    option(
-        "--velocities", "VALUES", 'Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.'
-    ),
+    velocities_option,
     *(_field(n) for n in ("stiffness_from", "trend", "drift", "initial", "gauge", "gauge_order")),
     *(_field(name) for name in ("fit_rate", "profile", "inertia", "radiation_damping")),
 )
@@ -236,7 +234,7 @@ def fit(
     if report is not None and result.converged:
         from asperity.fit_report import write_report
 
-        write_report(report, result, sampled)
+        write_report(report, result, sampled, output.names)
     more = {"posterior": sampled.record()} if sampled else {}
     more |= {"windows": over.record()} if over else {}
     output.answer(
@@ -348,7 +346,7 @@ def compare(
     if report is not None and comparison.best:
         from asperity.fit_report import write_comparison
 
-        write_comparison(report, comparison)
+        write_comparison(report, comparison, output.names)
         _say_written(report)
     if comparison.best:
         output.draw(comparison)

@@ -20,7 +20,7 @@ from asperity.cli.options import (
     settings_of,
     switch,
 )
-from asperity.cli.recording import listed_times, source_options
+from asperity.cli.recording import listed_times, source_options, velocities_option
 from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require
@@ -148,6 +148,7 @@ in place of numbers; 2: bad input.
     "TIMES|FILE",
     "Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
 )
+@velocities_option
 @option(
     "--holds",
     "TIMES|FILE",
@@ -204,6 +205,7 @@ def measure(
     source: Source,
     no_modulation: bool,
     steps: str | None,
+    velocities: str | None,
     holds: str | None,
     stick_slip: bool,
     settings: tuple[str, ...],
@@ -232,6 +234,7 @@ def measure(
     fields |= {
         "modulated": False if no_modulation else None,
         "steps": None if steps is None else listed_times(steps, "--steps"),
+        "velocities": None if velocities is None else velocities.split(","),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
     }

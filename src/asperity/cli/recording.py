@@ -14,6 +14,12 @@ from asperity.errors import InputError, require
 Command = Callable[..., Any]
 
 
+#: Where no channel has the motion of the drive.
+velocities_option = option(
+    "--velocities", "VALUES", 'Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.'
+)
+
+
 def listed_times(text: str, option: str) -> list[str]:
     """Parts of a list like ``12.5,60`` or ``100:110,200:300``, or of a file with one a line.
 

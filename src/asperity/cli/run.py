@@ -151,12 +151,15 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
     from asperity.outputs import require_disk, require_memory, size_text
 
     if wanted.rows is None:
-        say(f"writing the integrator's steps to {out}")
+        say(
+            f"writing the integrator's steps to {out}; to measure or fit it, give the protocol a "
+            '[solver] sampling, like "50 Hz"'
+        )
         return
     way_out = "lower solver.sampling, shorten the steps or leave the option out"
     rows, size = f"{wanted.rows:.6g} rows", wanted.rows * wanted.row_bytes
     if text is not None:
-        size += 7 * _TEXT_BYTES * wanted.rows
+        size += 8 * _TEXT_BYTES * wanted.rows
         require_disk(size, text.resolve().parent, "--csv", rows, way_out)
     if record is not None:
         # A recording is made of whole signals: those of the motion and those of its channels.

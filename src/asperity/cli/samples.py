@@ -30,13 +30,14 @@ Examples:
 def samples(name: str | None, out: Path | None, seed: int, output: Output) -> None:
     """List the sample recordings, or make one of them.
 
-    NAME is one of the list. Law and numbers of the simulated slider are printed: what a fit of the
-    recording should give back.
+    NAME is one of the list. Law and numbers of the simulated slider are printed, V as it is at the
+    start: what a fit of the recording should give back, as far as gauges and recorder let it.
     """
     from asperity import samples as known
     from asperity.operating_point import known_parameters
     from asperity.outputs import output_file
     from asperity.outputs.tables import Section
+    from asperity.parameters import DRIVE
     from asperity.recording.writers import check_path, write
     from asperity.units import format_si
 
@@ -52,7 +53,8 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
     trace = known.record(name, seed)
     write(trace, target)
     numbers = {key: number.value for key, number in truth.numbers.items()}
-    kinds = known_parameters(truth.law)
+    numbers["V"] = truth.programme.level.velocity
+    kinds = {**known_parameters(truth.law), **DRIVE}
     rows = tuple((key, format_si(value, kinds[key].kind)) for key, value in numbers.items())
     made = f"{target}: {len(trace)} samples of {', '.join(trace.channels)}"
     output.answer(

@@ -14,6 +14,7 @@ _OPTIONS: Mapping[str, str] = {
     "measure.trace": "the recording",
     "measure.steps and holds": "--steps and --holds",
     "measure.events": "--events",
+    "modulated": "--no-modulation",
     "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",
@@ -67,6 +68,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
         option = name
         if whole in _PAIRS and whole in (options or {}):
             option, key = known[whole], part
+    # A switch says no by itself.
+    value = "" if value == "False" else value
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 

@@ -6,8 +6,9 @@ A page is one file, with nothing to fetch.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,9 @@ from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
-from asperity.outputs.tables import as_html, html_page, html_table
+from asperity.outputs.tables import Section, as_html, html_page, html_table
 from asperity.outputs.written import written_folder
-from asperity.parameters import law_parameters, point_parameters
+from asperity.parameters import NAMES, Names, in_names, law_parameters, point_parameters
 
 
 def document(title: str, kicker: str, heading: str, sections: Mapping[str, str]) -> str:
@@ -60,7 +61,9 @@ RUN_CAPTION = (
 )
 
 
-def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> None:
+def write_report(
+    folder: Path, fit: Fit, posterior: Posterior | None = None, names: Names = NAMES[0]
+) -> None:
     """Write the report of a fit into a folder, completely or not at all.
 
     Parameters
@@ -69,6 +72,8 @@ def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> 
     fit : Fit
         Converged.
     posterior : Posterior, optional
+    names : {"friction", "geophysics"}
+        Of the page; files keep the names of friction.
 
     Raises
     ------
@@ -82,7 +87,7 @@ def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> 
         record = json.dumps({**fit_record(fit), **more}, indent=2)
         (staging / "fit.json").write_text(record + "\n", encoding="utf-8")
         (staging / "material.toml").write_text(material_text(fit), encoding="utf-8")
-        (staging / "report.html").write_text(page(fit, posterior), encoding="utf-8")
+        (staging / "report.html").write_text(page(fit, posterior, names), encoding="utf-8")
         if posterior is not None:
             posterior.to_netcdf(staging / "posterior.nc")
 
@@ -117,35 +122,41 @@ def material_text(fit: Fit) -> str:
     return "\n".join(lines) + "\n"
 
 
-def page(fit: Fit, posterior: Posterior | None) -> str:
+def page(fit: Fit, posterior: Posterior | None, names: Names) -> str:
     """The page as text, with embedded figures and without external resources."""
     name = fit.objective.terms[0].name
-    sampled = as_html(posterior_sections(posterior)) if posterior else ""
+    sampled = worded_html(posterior_sections(posterior), fit, names) if posterior else ""
     sections = {
-        "Fit": as_html(fit_report(fit)),
+        "Fit": worded_html(fit_report(fit), fit, names),
         **({"Posterior": sampled} if sampled else {}),
-        "Data and fit": _figures(fit, posterior),
+        "Data and fit": _figures(fit, posterior, names),
         "Data": data_tables(fit),
-        "Provenance": provenance(fit),
+        "Provenance": provenance(fit, names),
     }
     return document(f"Fit of {fit.law} to {name}", "A fit", f"{fit.law} fitted to {name}", sections)
 
 
-def _figures(fit: Fit, posterior: Posterior | None) -> str:
+def worded_html(sections: Iterable[Section], fit: Fit, names: Names) -> str:
+    """Sections as HTML, in the names that the user has chosen."""
+    words = partial(in_names, names=names, law=fit.objective.law)
+    return as_html(section.worded(words) for section in sections)
+
+
+def _figures(fit: Fit, posterior: Posterior | None, names: Names) -> str:
     parts = []
     source = "posterior" if posterior else "normal approximation"
     for term, residuals in fit.parts(LockInTerm):
         parts += [
             figure(
-                svg(data_figure(term.table, bands_of(fit, term, posterior))),
+                svg(data_figure(term.table, bands_of(fit, term, posterior)), names),
                 "Readings with standard uncertainties; medians and 95 % bands of the "
                 f"prediction by the {source}.",
             ),
-            figure(svg(residual_figure(residuals, term.table.row_names)), "Residuals."),
+            figure(svg(residual_figure(residuals, term.table.row_names), names), "Residuals."),
         ]
     for run, _ in fit.parts(RunTerm):
         drawn = run_figure(run.run, {fit.law: run.fitted_friction(fit.values)})
-        parts.append(figure(svg(drawn), RUN_CAPTION))
+        parts.append(figure(svg(drawn, names), RUN_CAPTION))
     return "\n".join(parts)
 
 
@@ -182,19 +193,20 @@ def _recording(term: RunTerm) -> str:
     return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 
 
-def provenance(fit: Fit) -> str:
+def provenance(fit: Fit, names: Names) -> str:
     """Fixed parameters, date, version of the program, and source of the law."""
+    words = partial(in_names, names=names, law=fit.objective.law)
     fixed = [
-        (n, f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
+        (words(n), f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
         for n, v in fit.objective.fixed.items()
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sources = "".join(
         f"<pre>{escape(work)}</pre>" for work in cited_works(fit.objective.law.source).values()
     )
-    names = ", ".join(term.name for term in fit.objective.terms)
+    data = ", ".join(term.name for term in fit.objective.terms)
     return (
-        f"<p>asperity {__version__}, {made}; data: {escape(names)}; numbers that were fixed, in "
+        f"<p>asperity {__version__}, {made}; data: {escape(data)}; numbers that were fixed, in "
         f"SI:</p>{html_table(('', 'value'), fixed)}<p>The law:</p>{sources}"
     )
 
@@ -203,7 +215,7 @@ def provenance(fit: Fit) -> str:
 _MOST_NARROW = 2
 
 
-def write_comparison(folder: Path, comparison: Comparison) -> None:
+def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[0]) -> None:
     """Write the report of a comparison into a folder, completely or not at all.
 
     Parameters
@@ -211,6 +223,8 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     folder : Path
     comparison : Comparison
         With one converged fit at least.
+    names : {"friction", "geophysics"}
+        Of the page; files keep the names of friction.
 
     Raises
     ------
@@ -222,13 +236,14 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     require(fits, "comparison", rule, "none", f"{comparison.verdict}")
     with written_folder(folder, "report") as staging:
         record = json.dumps(comparison_record(comparison), indent=2)
+        page = comparison_page(comparison, fits, names)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
-        (staging / "report.html").write_text(comparison_page(comparison, fits), encoding="utf-8")
+        (staging / "report.html").write_text(page, encoding="utf-8")
         for name, fit in fits.items():
             (staging / f"{name}.toml").write_text(material_text(fit), encoding="utf-8")
 
 
-def comparison_page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
+def comparison_page(comparison: Comparison, fits: Mapping[str, Fit], names: Names) -> str:
     """The page as text, with embedded figures and without external resources.
 
     Parameters
@@ -236,21 +251,23 @@ def comparison_page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
     comparison : Comparison
     fits : mapping of str to Fit
         The converged fits.
+    names : {"friction", "geophysics"}
     """
     first = next(iter(fits.values()))
-    names = " and ".join(term.name for term in first.objective.terms)
+    data = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": as_html(comparison_report(comparison, reasons=True)),
-        "Data and laws": _figures_of_laws(fits),
+        "Verdict": worded_html(comparison_report(comparison, reasons=True), first, names),
+        "Data and laws": _figures_of_laws(fits, names),
         "Estimates": "".join(
-            f"<h3>{escape(name)}</h3>{as_html([estimates(fit)])}" for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{worded_html([estimates(fit)], fit, names)}"
+            for name, fit in fits.items()
         ),
         "Data": data_tables(first),
         "Provenance": "".join(
-            f"<h3>{escape(name)}</h3>{provenance(fit)}" for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{provenance(fit, names)}" for name, fit in fits.items()
         ),
     }
-    return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
+    return document(f"Laws compared on {data}", "A comparison", f"Laws on {data}", sections)
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
@@ -290,7 +307,7 @@ def _motions(fits: Mapping[str, Fit], i: int) -> tuple[RecordedRun, dict[str, Fl
     return run, {name: terms[name].fitted_friction(fit.values) for name, fit in fits.items()}
 
 
-def _figures_of_laws(fits: Mapping[str, Fit]) -> str:
+def _figures_of_laws(fits: Mapping[str, Fit], names: Names) -> str:
     first = next(iter(fits.values()))
     parts = []
     for i in range(len(first.objective.terms_of(LockInTerm))):
@@ -300,7 +317,7 @@ def _figures_of_laws(fits: Mapping[str, Fit]) -> str:
             "each law, by the normal approximation."
         )
         many = len(next(iter(predicted.values()))) > _MOST_NARROW
-        parts.append(figure(svg(laws_figure(table, predicted)), caption, wide=many))
+        parts.append(figure(svg(laws_figure(table, predicted), names), caption, wide=many))
     for i in range(len(first.objective.terms_of(RunTerm))):
-        parts.append(figure(svg(run_figure(*_motions(fits, i))), RUN_CAPTION))
+        parts.append(figure(svg(run_figure(*_motions(fits, i)), names), RUN_CAPTION))
     return "\n".join(parts)

@@ -18,6 +18,8 @@ from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
+from asperity.parameters import NAMES, Names
+from asperity.parameters.parameter import labelled
 
 #: Approximate number of samples of a recording in a figure.
 _DRAWN = 2000
@@ -149,10 +151,12 @@ def draw_fit(fit: Fit) -> Figure:
     raise InputError("plot", rule, "another kind of data", "plot its residuals yourself")
 
 
-def svg(figure: Figure) -> str:
-    """A figure as an SVG element, without the header of a file."""
+def svg(figure: Figure, names: Names = NAMES[0]) -> str:
+    """A figure as an SVG element, without the header of a file, labelled in a set of names."""
     text = io.StringIO()
     with style():
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+        labelled(figure, names).savefig(
+            text, format="svg", metadata={"Date": None, "Creator": None}
+        )
     whole = text.getvalue()
     return whole[whole.index("<svg") :]

@@ -357,7 +357,8 @@ def fit(
     """
     options = _by_names(free, options)
     loaded = _loaded(data, options.get("fixed"))
-    return fit_loaded(loaded, default_law(loaded) if law is None else law, free, **options)
+    law = default_law(loaded) if law is None else law
+    return fit_loaded(loaded, law, free, **options)
 
 
 @typed

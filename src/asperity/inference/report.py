@@ -44,7 +44,12 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     """What a fit says of the friction, before its numbers."""
     if not fit.converged:
         return ()
-    sentences = []
+    doubts = [doubt for term in fit.objective.terms_of(RunTerm) for doubt in term.doubts]
+    if fit.judged_by_chi2 and fit.dof > 0 and fit.p_value < _MISFIT:
+        doubts.append(
+            f"the law does not describe the data within their uncertainties (p = {fit.p_value:.2g})"
+        )
+    sentences = [f"These numbers are doubtful: {'; '.join(doubts)}."] if doubts else []
     difference = rate_dependence(fit)
     if difference is not None:
         value, error = difference
@@ -193,6 +198,6 @@ def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[
         f"{name}: {warning}"
         for name, j in comparison.laws.items()
         for warning in j.fit.warnings
-        if not warning.startswith(tuple(f"{n} is not determined" for n in j.fit.undetermined))
+        if warning not in j.fit.because.values()
     )
     return [Section("", (comparison.verdict,), head, tuple(rows), warned)]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import Argument, InputError, closest, require
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
@@ -259,7 +259,10 @@ def unknown_of(
         low, high = middle / 3, middle * 3
     else:
         raise UnfittableLawError(
-            f"start must hold a value for the free parameter {name}, got none; give one, or fix it"
+            Argument("start", name),
+            "say where to look for a free parameter without a usual range",
+            "none",
+            f"give a value, or use {Argument('fixed', name)}",
         )
     if middle:
         low, high = min(low, middle / 3), max(high, middle * 3)

@@ -80,10 +80,7 @@ def build_page(
         f'<p class="kicker">A reproduction</p><h1>{escape(about.title)}</h1>'
         f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
         f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
-        "again from its own equations and numbers. "
-        f"{sum(claim.is_test for claim in claims)} of them could have come out otherwise; "
-        f"each number leads to its entries:</p>{_tiles(claims)}"
-        f"<p>{escape(_counted_apart(claims))}</p>"
+        "again from its own equations and numbers.</p>"
     )
     footer = (
         " Figures (PNG, PDF), their numbers (CSV) and the claims (JSON, CSV) are in the folder of "
@@ -139,6 +136,9 @@ def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
         f"uncertainties too ({ends}).</p>"
     )
     return (
+        f"<p>{sum(claim.is_test for claim in claims)} of the {len(claims)} statements could have "
+        f"come out otherwise; each number leads to its entries:</p>{_tiles(claims)}"
+        f"<p>{escape(_counted_apart(claims))}</p>"
         "<p>Verdicts follow from a rule that was fixed beforehand for each claim. The measured "
         "points of a paper are in its figures only, not in its text; no claim here rests on "
         f"them.</p>{varied if ends else ''}\n{_entries(claims)}"

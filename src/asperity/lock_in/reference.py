@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import ConstantLoadError, InputError, require
+from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
 
 #: Samples of the spectrum in which the line is searched.
@@ -99,7 +99,7 @@ def require_modulated(line: SpectralLine, load: Float) -> None:
             "lock_in.load",
             "be modulated",
             f"a constant of {float(load[0]):.6g}",
-            "name another column, or measure without modulation",
+            f"name another column, or choose {Argument('modulated', value='False')}",
         )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import multiprocessing
+import os
 import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -97,11 +98,7 @@ def run_campaign(
     Interrupted
         On Ctrl-C.
     """
-    rule, advice = "be a CSV or a NetCDF file", "write it like --out campaign.csv"
-    require(out.suffix.lower() in (".csv", ".nc"), "--out", rule, f"'{out}'", advice)
-    out = output_file(
-        out, "--out", example="campaign.csv", inputs={f"recording '{f}'": f for f in files}
-    )
+    out = table_file(out, "--out", {f"recording '{f}'": f for f in files})
     report = progress or (lambda done, total, label: None)
     unfinished = UnfinishedText(out, {**inputs, "files": {str(f): _stamp(f) for f in files}})
     done = int(unfinished.start(resume).get("files", 0))
@@ -114,12 +111,42 @@ def run_campaign(
             done += 1
             report(done, len(files), path.name)
         table = [json.loads(line) for line in unfinished.text().splitlines()]
-        with written_file(out, "--out") as file:
-            (write_csv if out.suffix.lower() == ".csv" else _write_netcdf)(file, table)
+        write_rows(out, table, "--out")
         unfinished.discard()
     failed = sum(bool(row["reason"]) for row in table)
     sliding = {row["file"] for row in table if row["kind"] in _SLIDING_KINDS}
     return CampaignSummary(len(files), len(table), failed, len(sliding), out, table)
+
+
+def table_file(
+    path: str | os.PathLike[str], name: str, inputs: Mapping[str, Path] | None = None
+) -> Path:
+    """Path of a table that can be written; parameters as of `asperity.outputs.output_file`.
+
+    Raises
+    ------
+    InputError
+        If its end names neither CSV nor NetCDF, or it cannot be written.
+    """
+    rule, advice = "be a CSV or a NetCDF file", "write it like campaign.csv"
+    require(Path(path).suffix.lower() in (".csv", ".nc"), name, rule, f"'{path}'", advice)
+    return output_file(path, name, example="campaign.csv", inputs=inputs)
+
+
+def write_rows(path: Path, table: list[Row], name: str) -> None:
+    """Write rows as CSV or NetCDF, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        From `table_file`.
+    table : list of dict
+        From `modulated_rows` and `sliding_rows`.
+    name : str
+        Of the path in messages.
+    """
+    with written_file(path, name) as file:
+        (write_csv if path.suffix.lower() == ".csv" else _write_netcdf)(file, table)
 
 
 def _stamp(path: Path) -> str:

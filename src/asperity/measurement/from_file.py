@@ -39,6 +39,7 @@ def measure_recording(
     only_whole_periods: bool = False,
     refine: bool = True,
     steps: Sequence[float | str] | None = None,
+    velocities: Sequence[float | str] | None = None,
     holds: Sequence[tuple[Any, Any] | str] | None = None,
     stick_slip: bool | None = None,
     stiffness: float | str | None = None,
@@ -68,6 +69,9 @@ def measure_recording(
         Of a modulated recording: see `asperity.measurement.measure`.
     steps : sequence of float, optional
         Of a recording without modulation: times (s) of velocity steps.
+    velocities : sequence of float or str, optional
+        Of the drive between the steps (m/s), one more than these, 0 in a hold; measured where a
+        channel has the motion.
     holds : sequence of (float, float), optional
         Of a recording without modulation: begin and end (s) of holds.
     stick_slip : bool
@@ -156,7 +160,12 @@ def _either(
 
     def sliding() -> SlidingMeasurement:
         return measure_sliding(
-            trace, **where, detrend=question.detrend, steps=question.steps, holds=question.holds
+            trace,
+            **where,
+            detrend=question.detrend,
+            steps=question.steps,
+            velocities=question.velocities,
+            holds=question.holds,
         )
 
     def slips() -> StickSlipMeasurement:
@@ -175,7 +184,7 @@ def _either(
         if known or (not constant and trace.has(question.load)):
             raise
         reason = error
-    what = "The normal load is constant" if constant else "No channel is the normal load"
+    what = "The normal load is not modulated" if constant else "No channel is the normal load"
     events, unread = None, None
     try:
         events = slips() if question.stick_slip is None else None
@@ -189,15 +198,17 @@ def _either(
         raise error from None
     changes = len(measurement.steps) + len(measurement.holds)
     if events is not None and _rather_events(events, changes):
-        return events, f"{what}: {events.kind} is read, not a modulation."
+        return events, f"{what}: {events.kind} is read."
     if changes:
-        return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+        return measurement, f"{what}: velocity steps and holds are read."
     steady = events is not None and events.kind == "steady sliding"
     if not (plain or steady):
-        if constant or measurement.velocity_from:
+        if measurement.velocity_from:
             raise reason
-        raise unread or _without_motion(events)
-    return measurement, f"{what}: steady sliding is read, not a modulation."
+        if unread is not None and not constant:
+            raise unread
+        raise _without_motion(measurement, events)
+    return measurement, f"{what}: steady sliding is read."
 
 
 def _lock_in(question: Question) -> dict[str, Any]:
@@ -230,12 +241,16 @@ def _which_force(trace: Trace) -> InputError:
     )
 
 
-def _without_motion(events: StickSlipMeasurement | None) -> InputError:
-    name, unit = Argument("columns", "displacement", "x"), Argument("units", "x", "um")
-    got = "friction without a displacement or velocity of a known unit"
-    advice = (
-        f"name it, like {name}, give its unit, like {unit}, or give {Argument('measure.steps')}"
+def _without_motion(
+    measurement: SlidingMeasurement, events: StickSlipMeasurement | None
+) -> InputError:
+    (cut,) = (check for check in measurement.checks if check.name == "segments")
+    got = (
+        f"{'friction alone' if measurement.load is None else 'a constant load'}, and {cut.sentence}"
     )
+    name = Argument("columns", "displacement", "x")
+    steps, velocities = Argument("measure.steps"), Argument("measure.velocities")
+    advice = f"name a displacement, like {name}, or give {steps} and {velocities}"
     if events is not None and events.kind == "cannot tell":
         got += f", and as slips {events.regimes[0].evidence}"
         advice += f"; {Argument('measure.stick_slip')} reads slips nevertheless"

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import ConstantLoadError, InputError, require
+from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -243,7 +243,7 @@ def _prepared(
             "be modulated",
             f"a constant load, whose strongest line, at {line.frequency:.4g} Hz, is "
             f"{line.amplitude / line.background:.2g} times its surroundings",
-            "give the frequency if you know it, or measure without modulation",
+            f"give the frequency if you know it, or choose {Argument('modulated', value='False')}",
         )
     start = frequency if frequency is not None and not refine else line.frequency
     options = {**lock_in, "detrend": detrend, "refine": refine}

@@ -220,15 +220,16 @@ def _steps(measurement: SlidingMeasurement) -> list[Section]:
             rows.append(_row("A - B", slope, doubt, "", meaning))
             rows.append(("peak", f"{step.peak:.4g}", "", "beyond the level before"))
         if step.trend != "none":
-            before, after = (_slope(measurement, s) for s in (step.slope_before, step.slope_after))
+            # Trends are over slip where both velocities are known, and over time otherwise.
+            known = abs(step.velocity_before * step.velocity_after) > 0
+            scale, unit = (1e-3, "/mm") if known else (1.0, "/s")
+            before, after = (
+                f"{scale * s:.2g} {unit}" for s in (step.slope_before, step.slope_after)
+            )
             rows.append(("trend", step.trend, "", f"{before} before, {after} after"))
         speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
         sections.append(Section(f"step {k} at {step.time:.10g} s, {speeds}", rows=tuple(rows)))
     return sections
-
-
-def _slope(measurement: SlidingMeasurement, slope: float) -> str:
-    return f"{1e-3 * slope:.2g} /mm" if measurement.velocity_from else f"{slope:.2g} /s"
 
 
 def _holds(measurement: SlidingMeasurement) -> list[Section]:

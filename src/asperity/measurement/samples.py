@@ -125,7 +125,7 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
     raise InputError(
         "measure.force",
         "have the dimension of the load",
-        f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
+        f"{_dimension_text(F, force)} and {_dimension_text(W, load)}",
         f"give the area that makes the stress a force, like {area}"
         if {W.kind, F.kind} == {"force", "pressure"}
         else f"give the unit when reading, like {unit}"
@@ -361,7 +361,7 @@ def about_window(samples: Samples, start: float, end: float) -> list[Finding]:
 def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
     channel, _ = shear_channel(trace, name, load)
     recorded = _name(trace, channel)
-    if channel.kind != "dimensionless" or load.kind in (None, "dimensionless"):
+    if channel.kind != "dimensionless" or load.kind == "dimensionless":
         return channel, recorded
     product = replace(load, values=channel.values * load.values, recorded_name=recorded)
     return product, f"{recorded} x load"
@@ -388,5 +388,6 @@ def _name(trace: Trace, channel: Channel) -> str:
     return next(name for name, c in trace.channels.items() if c is channel)
 
 
-def _dimension_text(channel: Channel) -> str:
-    return f"'{channel.unit}'" if channel.kind else "no known unit"
+def _dimension_text(channel: Channel, name: str) -> str:
+    unit = f"'{channel.unit or '1'}'" if channel.kind else "no known unit"
+    return f"{unit} for '{channel.recorded_name or name}'"

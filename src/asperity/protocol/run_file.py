@@ -30,7 +30,8 @@ _COLUMNS = {
     "friction": "friction",
     "velocity": "velocity (m/s)",
     "slip_velocity": "plastic velocity (m/s)",
-    "displacement": "displacement (m)",
+    "displacement": "displacement of the slider (m)",
+    "load_point_displacement": "load point displacement (m)",
 }
 
 #: Rows read at a time.

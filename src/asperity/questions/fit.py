@@ -20,14 +20,7 @@ from asperity.questions.record import (
     quantity,
     shown,
 )
-from asperity.questions.recording import Source
-
-_Velocity = quantity("velocity", "not negative")
-
-
-def _hold(value: Any) -> Any:
-    """A velocity of zero needs no unit: it is that of a hold."""
-    return 0.0 if isinstance(value, str) and value.strip() == "0" else value
+from asperity.questions.recording import Pulling, Source
 
 
 class Data(Record):
@@ -53,7 +46,7 @@ class Data(Record):
     source: Source = Field(default_factory=Source)
     window: Span | None = None
     steps: tuple[Seconds, ...] | None = None
-    velocities: tuple[Annotated[_Velocity, BeforeValidator(_hold)], ...] | None = None  # type: ignore[valid-type]
+    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
 
 
 class NormalPrior(Record):

@@ -127,7 +127,11 @@ def measure_options(question: Measurement, *, modulated: bool) -> list[str]:
     modulated : bool
         What the recording was read as: options of the other kind are left out.
     """
-    other = {"steps", "holds"} if modulated else {"frequency", "exact_frequency", "harmonics"}
+    other = (
+        {"steps", "velocities", "holds"}
+        if modulated
+        else {"frequency", "exact_frequency", "harmonics"}
+    )
     other |= set() if modulated else {"whole_periods"}
     fields = question.model_dump(exclude=other | {"modulated"}, exclude_defaults=True)
     switch = [] if modulated else [MEASURE_OPTIONS["modulated"]]

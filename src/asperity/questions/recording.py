@@ -7,12 +7,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from asperity.errors import Argument, require
 from asperity.questions.record import Question, Seconds, Span, quantity
 
 Column = str | int
+
+
+def _hold(value: Any) -> Any:
+    """A velocity of zero needs no unit: it is that of a hold."""
+    return 0.0 if isinstance(value, str) and value.strip() == "0" else value
+
+
+#: Velocity of the drive between two steps (m/s), 0 in a hold.
+Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]  # type: ignore[valid-type]
 
 
 class ReadingRecipe(Question):
@@ -105,6 +114,8 @@ class Measurement(Question):
     detrend : {"none", "linear", "quadratic"}
     steps : tuple of float, optional
         Times (s) of the velocity steps of a recording without modulation.
+    velocities : tuple of float, optional
+        Of the drive between the steps (m/s), 0 in a hold; measured by default.
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
     stick_slip : bool, optional
@@ -126,6 +137,7 @@ class Measurement(Question):
     whole_periods: bool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
     steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
+    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: bool | None = None
     stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]
@@ -154,6 +166,14 @@ class Measurement(Question):
             "them of a modulated recording",
         )
         require(steady, "measure.steps and holds", rule, got, "leave one of them out")
+        if self.velocities is not None:
+            got = f"{len(self.velocities)} for {len(self.steps or ())}"
+            rule, counted = "be one more than the steps", len(self.steps or ()) + 1
+            given = self.steps is not None and len(self.velocities) == counted
+            require(given, "measure.velocities", rule, got, "give both")
+            rule, got = f"go without {Argument('measure.holds')}", "both"
+            advice = "write 0 as the velocity of a hold"
+            require(self.holds is None, "measure.velocities", rule, got, advice)
         alone = self.modulated is None and self.frequency is None
         rule = f"go without {modulated} and {frequency}"
         require(alone or not self.stick_slip, "measure.stick_slip", rule, "both", "leave one out")

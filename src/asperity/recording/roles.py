@@ -73,7 +73,8 @@ ROLES: Mapping[str, Role] = {
         "load,normal load,normal force,normal stress",
         "w fn ns n fz load sigma sigman signorm normalkraft normalspannung normallast auflast "
         "auflagekraft anpresskraft σ σn",
-        "nor norm normal normale normala normalkraft normalspannung normallast auflast sigman fn",
+        "nor norm normal normale normala normalstress normalforce normalload normalkraft "
+        "normalspannung normallast auflast sigman fn",
         weak="load loadcell pressure axialforce axialload axialstress last belastung charge carico "
         "carga",
         without=_MOTION + " shear shr tangential coefficient koeffizient",
@@ -84,9 +85,9 @@ ROLES: Mapping[str, Role] = {
         "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
         "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
         "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
-        "shear shr ft tangential tangentiel tangentielle tangenziale tangencial lateral laterale "
-        "traction tau τ reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
-        "tangentialkraft cisaillement taglio cizalla cortante",
+        "shear shr shearstress shearforce ft tangential tangentiel tangentielle tangenziale "
+        "tangencial lateral laterale traction tau τ reibkraft reibungskraft scherkraft schubkraft "
+        "schubspannung scherspannung tangentialkraft cisaillement taglio cizalla cortante",
         weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
         "reibung",
         without=_MOTION + " nor norm normal normale coefficient coeff coef angle koeffizient "

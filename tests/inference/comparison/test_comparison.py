@@ -353,10 +353,7 @@ class _Motion(SimpleNamespace):
 
 def _fit_with(law, run, friction, aicc=0.0, **about):
     white = Autoregression(np.zeros(0), 1e-6)
-    noise = {"whiteness_p": 0.5}
-    term = _Motion(
-        run=run, name=run.name, models=[white], noise=noise, law_fails_after_changes=False
-    )
+    term = _Motion(run=run, name=run.name, models=[white], doubts=())
     vars(term).update(about)
     objective = SimpleNamespace(terms_of=lambda kind: [term])
     return SimpleNamespace(law=law, values={"friction": friction}, aicc=aicc, objective=objective)
@@ -384,8 +381,8 @@ def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps
     everywhere = _fit_with("poor", run, np.full(time.size, 0.61), 1e3)
     doubt, stretch = support(best, everywhere)
     assert "it rests on" not in doubt + stretch
-    doubt, _ = support(_fit_with("good", run, wrong, law_fails_after_changes=True), everywhere)
-    assert "even good misses what follows the velocity changes" in doubt
+    doubt, _ = support(_fit_with("good", run, wrong, doubts=("it misses",)), everywhere)
+    assert "even under good it misses" in doubt
 
 
 def test_a_verdict_that_changes_with_the_window_says_so_first():

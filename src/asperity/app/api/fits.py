@@ -193,7 +193,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
         pictures = _run_pictures(best)
         if question.report:
             report(stage="report")
-            record["report"] = _report(whole, posterior)
+            record["report"] = _report(whole, posterior, question.names)
     command = _fit_command(question, [file["name"] for file in files])
     return {**record, "runs": pictures, "command": command}
 
@@ -265,7 +265,7 @@ def _bands(result: Any, posterior: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _report(result: Any, posterior: Any = None) -> str:
+def _report(result: Any, posterior: Any, names: Names) -> str:
     """The folder of a fit or a comparison, as ``--report`` writes it: a ZIP file in base64."""
     from asperity import fit_report, inference
 
@@ -273,9 +273,9 @@ def _report(result: Any, posterior: Any = None) -> str:
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
         target = Path(folder) / "report"
         if isinstance(result, inference.Comparison):
-            fit_report.write_comparison(target, result)
+            fit_report.write_comparison(target, result, names)
         else:
-            fit_report.write_report(target, result, posterior)
+            fit_report.write_report(target, result, posterior, names)
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(target.iterdir()):
                 archive.write(path, f"report/{path.name}")

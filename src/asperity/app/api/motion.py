@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,8 +34,8 @@ _ENOUGH, _FOLDS = 6, 6.0
 _FEWEST_PERIODS, _MOST_PERIODS = 6.0, 120.0
 #: Rows of a block, time (s) on the clock after which no further block is computed, and tolerance.
 _ROWS, _PATIENCE, _RTOL = 4000, 15.0, 1e-6
-#: Points of the curves, and of the cycles that the drawing repeats.
-_BLOCKS, _FRAMES = 700, 1500
+#: Points of the curves, and of the cycle that the drawing repeats.
+_BLOCKS, _FRAMES = 700, 300
 #: Mean velocity over V in a slip and in a stick.
 _SLIPPING, _STICKING = 3.0, 0.3
 
@@ -54,18 +53,18 @@ class Motion(OperatingPoint):
 
 
 class Cycles(NamedTuple):
-    """Stick-slip in a motion.
+    """Stick-slip in a motion: its last whole cycle, as the first ones grow.
 
     Attributes
     ----------
     onsets : array, (k,)
         Times (s) at which slips begin.
     period : float
-        Mean time (s) between them, without the first.
+        Time (s) from the last slip but one to the last.
     slip : float
-        Mean displacement (m) of a slip.
+        Displacement (m) of the last slip but one, which is over.
     drop : float
-        Mean range of F/W0 over a cycle.
+        Range of F/W0 between the two.
     """
 
     onsets: Float
@@ -168,13 +167,12 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
         return None
     sticks = np.append(np.flatnonzero(state == -1), count)
     stops = sticks[np.searchsorted(sticks, turns)]
-    at = np.searchsorted(time, edges[turns])
-    drops = [np.ptp(whole.force[a:b]) for a, b in pairwise(at)]
+    first, last = np.searchsorted(time, edges[turns[-2:]])
     return Cycles(
         edges[turns],
-        float(np.mean(np.diff(edges[turns])[-_ENOUGH:])),
-        float(np.mean((place[stops] - place[turns])[:-1])),
-        float(np.mean(drops) / np.median(whole.load)),
+        float(edges[turns[-1]] - edges[turns[-2]]),
+        float(place[stops[-2]] - place[turns[-2]]),
+        float(np.ptp(whole.force[first:last]) / np.median(whole.load)),
     )
 
 
@@ -191,11 +189,10 @@ def _record(
     record: dict[str, Any] = {"curves": curves, "reached": time[-1], "inertia": inertia, "V": V}
     if cycles is None:
         return record
-    # Whole cycles, which the drawing repeats, against the motion at V.
-    grid = np.linspace(cycles.onsets[0], cycles.onsets[-1], _FRAMES)
+    # The last whole cycle, which the drawing repeats, against the motion at V.
+    grid = np.linspace(cycles.onsets[-2], cycles.onsets[-1], _FRAMES)
     behind = np.interp(grid, time, whole.displacement) - V * grid
     frames = {
-        "cycles": cycles.onsets.size - 1,
         "duration": grid[-1] - grid[0],
         "travel": V * (grid[-1] - grid[0]),
         "place": behind - behind.mean(),

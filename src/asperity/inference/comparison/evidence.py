@@ -18,6 +18,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from asperity.arrays import Bool, Float
+from asperity.errors import Argument
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import log_density
 from asperity.inference.posterior.density import Whitened
@@ -207,8 +208,6 @@ def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
 #: Parts of a recording, share of the difference of two laws that a stretch of them must hold, and
 #: share of the recording up to which such a stretch is named.
 _PARTS, _MOST, _SHORT = 200, 0.8, 0.1
-#: Probability below which the noise is not the process that was fitted.
-_NOT_WHITE = 1e-3
 
 
 def support(best: Fit, other: Fit) -> tuple[str, str]:
@@ -244,7 +243,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
                 f"it rests on {a:.4g} to {b:.4g} s of {name}, {(b - a) / whole:.1%} of the "
                 f"recording: without that stretch the AICc of {other.law} is "
                 f"{behind * (1 - share):.3g} above that of {best.law}, and {EXCLUDED:g} excludes "
-                "(compare with a --window that leaves it out)"
+                f"(compare without it: {Argument('window')})"
             )
         elif end - begin <= _SHORT * whole:
             stretches.append(
@@ -262,10 +261,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
         inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
-        if first.law_fails_after_changes:
-            doubts.append(f"even {best.law} misses what follows the velocity changes")
-        if first.noise["whiteness_p"] < _NOT_WHITE:
-            doubts.append(f"the noise of {name} is not the process that was fitted")
+        doubts += [f"even under {best.law} {doubt}" for doubt in first.doubts]
     doubt = f"This verdict is doubtful: {'; '.join(doubts)}. " if doubts else ""
     return doubt, "".join(f" {sentence}." for sentence in stretches)
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.arrays import Float
+from asperity.errors import Argument
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -150,7 +151,7 @@ def described_fit(
                 "standard errors"
                 if profiled
                 else "intervals of the normal approximation are wrong there, and those by profile "
-                "likelihood (--profile) take minutes for a recording"
+                f"likelihood ({Argument('profile')}) take minutes for a recording"
             )
         )
     return _with_warnings(_fit_with(objective, at, estimates, rivals), said)
@@ -168,8 +169,8 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
     ]
     return (
         f"{', '.join(e for e in ends if e)}: their profile likelihood runs where the law hardly "
-        "has periodic orbits, which takes minutes; ask for it (--profile), fix a parameter or give "
-        "a prior"
+        f"has periodic orbits, which takes minutes; ask for it ({Argument('profile')}), fix a "
+        "parameter or give a prior"
     )
 
 
@@ -476,8 +477,8 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     outliers = _outliers(fit)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         said += term.warnings(residuals, information, outliers)
-    for name in fit.undetermined:
-        said.append(_why_undetermined(fit, name))
+    because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
+    said += because.values()
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
             said.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
@@ -490,7 +491,7 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(fit, warnings=tuple(said), outliers=outliers)
+    return replace(fit, warnings=tuple(said), because=because, outliers=outliers)
 
 
 def _outliers(fit: Fit) -> tuple[int, ...]:

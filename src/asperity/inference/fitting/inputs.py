@@ -200,7 +200,8 @@ def fixed_values(
             law.name,
             "have all its numbers",
             f"none for {', '.join(missing)}",
-            "free or fix them, add columns, or name a material",
+            f"use {Argument('free')} or {Argument('fixed', missing[0])}, add columns, or name a "
+            "material",
         )
     if over_load(given.get("K")) is not None:
         if "W0" not in result:
@@ -289,7 +290,10 @@ def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
 def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
     """The same for a number of data."""
     needed = sum(1 for u in unknowns if u.prior is None)
-    rule, advice = "hold more data than free parameters", "free fewer or measure more"
+    rule, advice = (
+        "hold more data than free parameters",
+        f"free fewer with {Argument('free')}, or measure more",
+    )
     got = f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})"
     require(not count < max(needed + (needed > 1), 1), name, rule, got, advice)
 

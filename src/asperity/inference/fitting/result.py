@@ -139,6 +139,8 @@ class Fit(Drawn):
     optima : tuple of Optimum
         Other minima that the data do not exclude.
     warnings : tuple of str
+    because : mapping of str to str
+        Why each parameter that is not determined is not: the warnings on them.
     outliers : tuple of int
         Rows of the table without which the law describes it, from 0; at most a tenth of them, or
         two of eight and more.
@@ -163,6 +165,7 @@ class Fit(Drawn):
     residuals: tuple[Residuals, ...] = ()
     optima: tuple[Optimum, ...] = ()
     warnings: tuple[str, ...] = ()
+    because: Mapping[str, str] = field(default_factory=dict)
     outliers: tuple[int, ...] = ()
 
     def parts(self, kind: type[T]) -> list[tuple[T, Residuals]]:

@@ -93,8 +93,6 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
 
 #: Fewest samples between two steps, or a step and an end: a velocity needs them.
 _SAMPLES = 3
-#: A given velocity that differs by this share from that of the displacement is contradicted.
-_OTHER_VELOCITY = 0.05
 
 
 class ConstantVelocities(NamedTuple):
@@ -146,12 +144,10 @@ def constant_velocities(
     speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
     # A hold that was cut in two is one.
     kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
-    doubts = list(result.doubts)
-    if velocities is not None and signals.displacement is not None:
-        measured = partition_at(signals.time, signals.displacement, np.array(steps)).velocities
-        doubts += contradicted_velocities(velocities, measured)
     return ConstantVelocities(
-        [result.cuts[k] for k in kept], [speeds[0], *(speeds[k + 1] for k in kept)], doubts
+        [result.cuts[k] for k in kept],
+        [speeds[0], *(speeds[k + 1] for k in kept)],
+        list(result.doubts),
     )
 
 
@@ -170,7 +166,8 @@ def _given_or_measured(
             got = f"{len(velocities)} for {len(steps or ())}"
             raise InputError(f"{name}.velocities", "be one more than the steps", got, "give both")
         speeds = [float(v) for v in velocities]
-        return partition_at(time, None, np.array(steps)), speeds, [v == 0 for v in speeds]
+        result = partition_at(time, displacement, np.array(steps), speeds)
+        return result, list(result.velocities), list(result.holds)
     if displacement is None:
         raise InputError(
             f"{name} must have the displacement or velocity of the drive, got none: "
@@ -202,13 +199,3 @@ def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:
                 f"ends of the recording ({edges[0]:.6g} to {edges[-1]:.6g} s), got {count} between "
                 f"{begin:.6g} and {end:.6g} s; correct the steps, or the window"
             )
-
-
-def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:
-    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
-    return [
-        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
-        f"{abs(v):.4g} m/s; correct one of them"
-        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
-        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
-    ]

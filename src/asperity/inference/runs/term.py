@@ -12,6 +12,7 @@ import jax
 import numpy as np
 
 from asperity.arrays import Float
+from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
@@ -271,6 +272,18 @@ class RunTerm(DataTerm):
         """Whether innovations after changes of the drive are too large for the law."""
         return self._after_changes[0] < _LAW_FAILS
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why intervals of this recording do not hold, in a few words each."""
+        doubts = []
+        if self.law_fails_after_changes:
+            doubts.append(
+                f"the computed motion misses what follows the velocity changes of {self.name}"
+            )
+        if self._whiteness < _NOT_WHITE:
+            doubts.append(f"the noise of {self.name} is not the process that was fitted")
+        return tuple(doubts)
+
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
@@ -316,7 +329,7 @@ class RunTerm(DataTerm):
             said.append(
                 f"the noise of {self.name} is so slow that its {self.run.time.size} samples say as "
                 f"much as {max(effective, 1):.2g} with white noise: the intervals are rough; a "
-                "longer window would help, or a drift (--drift) if friction drifts with time"
+                f"longer window would help, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:
             said.append(self._said_of_spikes())
@@ -332,8 +345,8 @@ class RunTerm(DataTerm):
             said.append(
                 f"what {self.name} shows just after changes of its drive is {size:.2g} times "
                 f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
-                "(--gauge), the drive or its times are not those of the recording, or a sample "
-                "there is wrong, and intervals do not hold"
+                f"({Argument('gauge')}), the drive or its times are not those of the recording, or "
+                "a sample there is wrong, and intervals do not hold"
             )
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said

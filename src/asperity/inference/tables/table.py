@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtr
 
 from asperity.arrays import Bool, Float, Index
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
@@ -393,8 +393,8 @@ def table_of(
     if missing:
         raise InputError(
             f"{name} must have the columns {', '.join(_OPERATING)}, got none for "
-            f"{', '.join(missing)}; add them in SI, or fix them where they are the same for all "
-            "rows"
+            f"{', '.join(missing)}; add them in SI, or use {Argument('fixed', missing[0])} where "
+            "all rows have the same"
         )
     values, errors = _observables(name, observed)
     runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])

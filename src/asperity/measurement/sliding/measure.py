@@ -148,6 +148,7 @@ def measure_sliding(
     window: tuple[float, float] | None = None,
     detrend: str = "linear",
     steps: Sequence[float] | None = None,
+    velocities: Sequence[float] | None = None,
     holds: Sequence[tuple[float, float]] | None = None,
 ) -> SlidingMeasurement:
     """Friction, its velocity steps and its holds in a recording without modulation.
@@ -166,6 +167,8 @@ def measure_sliding(
         Trend over slip through which levels are extrapolated to a step or a hold.
     steps : sequence of float, optional
         Times (s) of the velocity steps, in place of those that the program finds.
+    velocities : sequence of float, optional
+        Of the drive between the steps (m/s), one more than these, 0 in a hold; measured by default.
     holds : sequence of (float, float), optional
         First and last times (s) of the holds, in place of those that the program finds.
 
@@ -189,7 +192,7 @@ def measure_sliding(
     if times is None:
         cut = partition(time, signals.displacement)
     else:
-        cut = partition_at(time, signals.displacement, np.array(times))
+        cut = partition_at(time, signals.displacement, np.array(times), velocities)
         cut = _with_holds(cut, time, holds)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
     segments = tuple(

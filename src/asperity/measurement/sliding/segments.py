@@ -11,6 +11,7 @@ its two sides intersect.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -43,6 +44,8 @@ _FEWEST = 4
 _STILL = 6.0
 #: Slower than this share of its neighbours a segment is a hold, unless it slides steadily.
 _HOLD = 5e-3
+#: A given velocity that differs by this share from that of the displacement is contradicted.
+_OTHER_VELOCITY = 0.05
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,12 @@ def partition(time: Float, displacement: Float | None) -> Partition:
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
 
-def partition_at(time: Float, displacement: Float | None, times: Float) -> Partition:
+def partition_at(
+    time: Float,
+    displacement: Float | None,
+    times: Float,
+    velocities: Sequence[float] | None = None,
+) -> Partition:
     """Cut a recording at given times.
 
     Parameters
@@ -136,15 +144,31 @@ def partition_at(time: Float, displacement: Float | None, times: Float) -> Parti
     time, displacement : array, (n,)
     times : array, (cuts,)
         Seconds, inside the recording.
+    velocities : sequence of float, optional
+        Of the drive between the cuts (m/s), 0 in a hold; measured by default.
     """
     at = np.searchsorted(time, times)
     cuts = tuple(Cut(float(t), int(i)) for t, i in zip(times, at, strict=True))
-    if displacement is None:
-        return Partition(cuts, (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1))
-    pieces = list(pairwise([0, *at.tolist(), time.size]))
-    motion = _motion(time, displacement)
-    speeds, holds, _ = _speeds(motion, pieces, [_velocity(motion, piece) for piece in pieces])
-    return Partition(cuts, speeds, holds)
+    result = Partition(cuts, (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1))
+    if displacement is not None:
+        pieces = list(pairwise([0, *at.tolist(), time.size]))
+        motion = _motion(time, displacement)
+        speeds, holds, _ = _speeds(motion, pieces, [_velocity(motion, piece) for piece in pieces])
+        result = Partition(cuts, speeds, holds)
+    if velocities is None:
+        return result
+    doubts = tuple(_contradicted(velocities, result.velocities))
+    return Partition(cuts, tuple(velocities), tuple(v == 0 for v in velocities), doubts)
+
+
+def _contradicted(given: Sequence[float], measured: Sequence[float]) -> list[str]:
+    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
+    return [
+        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
+        f"{abs(v):.4g} m/s; correct one of them"
+        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
+        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
+    ]
 
 
 def displacement_noise(time: Float, displacement: Float) -> float:

@@ -88,13 +88,13 @@ export class Machine {
     this.#begin();
   }
 
-  #sequence({ cycles, duration, travel, place, force }) {
+  #sequence({ duration, travel, place, force }) {
     const swing = Math.max(...place.map(Math.abs));
     const [low, high] = [Math.min(...force), Math.max(...force)];
     return {
-      n: place.length, seconds: SHOWN_CYCLE * cycles, ground: (SWING * travel) / swing, epsilon: 0,
+      n: place.length, seconds: SHOWN_CYCLE, ground: (SWING * travel) / swing, epsilon: 0,
       place: place.map((v) => v / swing), pull: force.map((f) => (2 * f - low - high) / (high - low)),
-      note: `Stick-slip: ${cycles} cycles of ${(duration / cycles).toPrecision(3)} s each, shown in ${SHOWN_CYCLE} s each. The block sticks while the spring is stretched, then it slips.`,
+      note: `Stick-slip: the last cycle, of ${duration.toPrecision(3)} s, shown in ${SHOWN_CYCLE} s. The block sticks while the spring is stretched, then it slips.`,
     };
   }
 

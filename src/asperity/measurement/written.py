@@ -1,0 +1,75 @@
+"""Recordings and what was measured in them, as files that are read back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from asperity.errors import InputError
+from asperity.measurement.campaign import (
+    Row,
+    modulated_rows,
+    sliding_rows,
+    table_file,
+    write_rows,
+)
+from asperity.measurement.measure import Measurement
+from asperity.measurement.sliding.measure import SlidingMeasurement
+from asperity.parameters.arguments import FilePath, typed
+from asperity.recording import Trace
+from asperity.recording.writers import write as write_recording
+
+Measured = Measurement | SlidingMeasurement
+
+
+@typed
+def write(
+    data: Trace | Measured | Sequence[Measured],
+    path: FilePath,
+    *,
+    units: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a recording, or measurements as a table: what `asperity.read` or `asperity.fit` takes.
+
+    Parameters
+    ----------
+    data : Trace, Measurement or SlidingMeasurement, or a list of measurements
+        A recording, or what `asperity.measure` returns of one or of several. A table has a row for
+        each modulated stretch, velocity step and hold, in SI, as ``asperity measure --out`` has.
+    path : str or path
+        Of a recording ``.csv``, ``.txt``, ``.h5`` or ``.tdms``, of a table ``.csv`` or ``.nc``.
+    units : mapping of str to str, optional
+        Unit in which a channel of a recording is written, such as ``{"load": "kN"}``; SI by
+        default.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the format is unknown, a unit does not fit, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> recording = asp.samples.modulated()
+    >>> asp.write(recording, "recording.csv", units={"normal force": "kN"})
+    >>> asp.write(asp.measure("recording.csv"), "readings.csv")
+    """
+    if isinstance(data, Trace):
+        return write_recording(data, path, units=units)
+    if units:
+        raise InputError("write.units", "go with a recording", "measurements", "leave them out")
+    measured = [data] if isinstance(data, Measured) else data
+    rows: list[Row] = []
+    for number, one in enumerate(measured, 1):
+        # A measurement does not know its file.
+        name = Path(str(number))
+        if isinstance(one, SlidingMeasurement):
+            rows += sliding_rows(name, one)
+        else:
+            rows += modulated_rows(name, [one])
+    write_rows(table_file(path, "write.path"), rows, "write.path")
+    return Path(path)
