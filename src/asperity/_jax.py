@@ -22,8 +22,8 @@ T = TypeVar("T")
 #: third. The collocation programs run as fast with both (662 against 723 us a point), the fast
 #: method takes 10 to 20 % longer, which its compilation makes up for over millions of points; small
 #: programs over long arrays are slower with either (jaxlib 0.10.2). Vectors of 512 bits where the
-#: processor has them (256 is XLA's own choice) take 10 % off the fast method and a third off orbits
-#: on meshes, at the same time of compilation.
+#: processor has them (256 is XLA's own choice) take a tenth off the fast method, and nothing off
+#: the others.
 _LARGE = {
     "xla_cpu_use_fusion_emitters": False,
     "xla_backend_optimization_level": 1,
