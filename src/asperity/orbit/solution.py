@@ -113,8 +113,9 @@ class Solution(NamedTuple):
     def merge(self, rows: Indices, attempt: Solution, method: str = "") -> None:
         """Write another attempt at the points `rows`; a failed one keeps the earlier outcome."""
         better = np.flatnonzero(attempt.informed)
-        rows = rows[better]
-        put(self, rows, take(attempt, better))
+        if len(better) < len(rows):
+            rows, attempt = rows[better], take(attempt, better)
+        put(self, rows, attempt)
         if method:
             self.method[rows] = method
 
