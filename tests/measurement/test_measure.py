@@ -318,3 +318,24 @@ def test_bad_input_is_one_sentence(truth, protocol, trace, options, message) -> 
     with pytest.raises(InputError, match=message) as caught:
         measure(trace(*protocol(truth)), **options)
     assert str(caught.value).count(";") == 1
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_noise_of_the_load_is_in_the_friction_without_modulation(
+    truth, protocol, trace, shared
+) -> None:
+    variances = []
+    for seed in range(8):
+        time, load, force = protocol(truth, noise=1e-3, on=(6.0, 12.0), end=12.0, seed=seed)
+        of_load = 0.05 * np.random.default_rng(100 + seed).standard_normal(time.size)
+        force = force + truth.mean_friction * of_load if shared else force
+        found = measure(trace(time, load + of_load, force))
+        whole, modulated = found.delta_mu_uncertainty, found.reading.uncertainty("mean_friction")
+        variances.append(max(whole**2 - modulated**2, 0.0))
+    # Of the mean of a ratio F/W by the law of errors, from the 6,000 samples before the modulation.
+    expected = truth.mean_friction * 0.05 / truth.W0 / np.sqrt(6000)
+    if shared:
+        assert np.median(variances) < (0.05 * expected) ** 2
+    else:
+        # Median of chi-squared of eight degrees of freedom; that of eight draws is good to 22 %.
+        assert np.median(variances) == pytest.approx(7.34 / 8 * expected**2, rel=0.5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
@@ -360,6 +360,14 @@ def modulation_line(time: Float, load: Float, near: float | None = None) -> Spec
     return max(lines, key=lambda line: line.amplitude)
 
 
+class _Pause(NamedTuple):
+    """Levels without modulation next to the stretch that is read."""
+
+    force: MeanLevel
+    load: MeanLevel
+    friction: MeanLevel
+
+
 def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadInterval]:
     whole = LoadInterval(0, samples.time.size, line.amplitude)
     if line.amplitude < _LINE * line.background:
@@ -387,10 +395,10 @@ def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
 
 def _around(
     samples: Samples, parts: list[LoadInterval], chosen: LoadInterval, mean_load: float
-) -> tuple[tuple[MeanLevel, MeanLevel] | None, tuple[MeanLevel, MeanLevel] | None]:
-    """Force and load without modulation, before and after the stretch that is read."""
+) -> tuple[_Pause | None, _Pause | None]:
+    """The pauses before and after the stretch that is read."""
     at, most = parts.index(chosen), chosen.stop - chosen.first
-    sides: list[tuple[MeanLevel, MeanLevel] | None] = []
+    sides: list[_Pause | None] = []
     for step in (-1, 1):
         pause = parts[at + step] if 0 <= at + step < len(parts) else None
         if pause is None or pause.modulated or pause.stop - pause.first < 16:
@@ -412,9 +420,8 @@ def _around(
             sides.append(None)
             continue
         cut = slice(first, stop)
-        time, force = samples.time[cut], samples.force[cut]
-        level = _settled_level(time, force) if recovers else mean_level(time, force)
-        sides.append(level and (level, mean_level(time, samples.load[cut])))
+        values = samples.time[cut], samples.force[cut], samples.load[cut]
+        sides.append(_pause(*values, recovers=recovers))
     return sides[0], sides[1]
 
 
@@ -423,32 +430,40 @@ def _no_modulation(time: Float) -> float:
     return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
-def _settled_level(time: Float, force: Float) -> MeanLevel | None:
-    """The level that the force of a pause settles to; None if it is not determined."""
-    settling = settling_from(time, force, _no_modulation(time), 1)
-    if settling is None or not settling.possible:
-        return mean_level(time, force)
-    if settling.present:
-        force = force - settling.at(time - time[0])
-    level = mean_level(time, force)
-    if settling.present and not settling.determined:
+def _pause(time: Float, force: Float, load: Float, *, recovers: bool) -> _Pause | None:
+    """Levels of a pause, of a force that recovers the one that it settles to.
+
+    None if that is not determined.
+    """
+    shift = variance = 0.0
+    settling = settling_from(time, force, _no_modulation(time), 1) if recovers else None
+    if settling is not None and settling.possible:
+        shift, variance = float(settling.shift[0]), float(settling.covariance[0, 0])
+        if settling.present:
+            force = force - settling.at(time - time[0])
+    level, of_load = mean_level(time, force), mean_level(time, load)
+    if settling is not None and settling.possible and settling.present and not settling.determined:
         limit = checks.LIMITS["transient"][0]
         if abs(settling.amplitude) > limit * abs(level.value):
             return None
-    doubt = float(np.hypot(level.uncertainty, np.sqrt(settling.covariance[0, 0])))
-    return level._replace(value=level.value + float(settling.shift[0]), uncertainty=doubt)
+    level = level._replace(
+        value=level.value + shift, uncertainty=float(np.hypot(level.uncertainty, np.sqrt(variance)))
+    )
+    # The ratio has the noise of both channels, less what they share.
+    ratio = level.value / of_load.value
+    noise = mean_level(time, force - ratio * load)
+    doubt = float(np.hypot(noise.uncertainty, np.sqrt(variance))) / abs(of_load.value)
+    return _Pause(level, of_load, noise._replace(value=ratio, uncertainty=doubt))
 
 
-def _rates(
-    samples: Samples, sides: tuple[tuple[MeanLevel, MeanLevel] | None, ...]
-) -> list[Rate | None]:
+def _rates(samples: Samples, sides: tuple[_Pause | None, ...]) -> list[Rate | None]:
     """Rates at which the force changes in the pauses."""
     rates: list[Rate | None] = []
     for side in sides:
         rates.append(None)
         if side is None:
             continue
-        first, stop = np.searchsorted(samples.time, [side[0].start, side[0].end])
+        first, stop = np.searchsorted(samples.time, [side.force.start, side.force.end])
         if stop - first > _FEWEST:
             at, means = bin_means(samples.time[first:stop], samples.force[first:stop])
             fit = fit_trend(columns(at - at[0], 1), means)
@@ -459,19 +474,19 @@ def _rates(
 
 def _static_friction(
     reading: LockInReading,
-    sides: list[tuple[MeanLevel, MeanLevel]],
+    sides: list[_Pause],
     pauses: list[Rate],
 ) -> tuple[float, float, float]:
     """F(0)/W0, its standard uncertainty, drift between the sides included, and its dof."""
     if not sides:
         return np.nan, np.nan, 1.0
-    ratios = [force.value / load.value for force, load in sides]
-    doubts = [force.uncertainty / abs(load.value) / len(sides) for force, load in sides]
+    ratios = [side.friction.value for side in sides]
+    doubts = [side.friction.uncertainty / len(sides) for side in sides]
     # A drift is somewhere between its ends: an even distribution about the mean.
     drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
     if len(sides) == 1:
         # Its other end was not recorded, but the force drifts in the window or in the pause.
-        level, load = sides[0]
+        level, load, _ = sides[0]
         rates = list(pauses)
         if reading.drift.shape[1]:
             rates.append(drift_rate(reading))
@@ -480,6 +495,9 @@ def _static_friction(
             away = (reading.start + reading.end - level.start - level.end) / 2
             drifted = abs(rate.value * away / load.value) / np.sqrt(3)
     dof = effective_dof(
-        [*((d, f.dof) for d, (f, _) in zip(doubts, sides, strict=True)), (float(drifted), 30.0)]
+        [
+            *((d, side.friction.dof) for d, side in zip(doubts, sides, strict=True)),
+            (float(drifted), 30.0),
+        ]
     )
     return float(np.mean(ratios)), float(np.hypot(np.linalg.norm(doubts), drifted)), dof

@@ -206,3 +206,27 @@ def test_coordinates_of_other_data_do_not_count_against_the_readings():
     assert alone == [2]
     beside = np.hstack([seen, np.zeros((8, 20))])
     assert outlying_rows(residuals_of(values, beside)) == alone
+
+
+def test_the_errors_of_a_measured_epsilon_are_errors_of_what_it_predicts(pmma):
+    epsilon, spread, error = np.linspace(0.1, 0.4, 6), 2e-3, 2e-4
+
+    def drop(epsilon, A=pmma.A):
+        slider = Slider(pmma.law("elasto-plastic", A=A), spring=5e5, load=7.0)
+        return periodic_response(slider, velocity=1e-5, epsilon=epsilon, frequency=120.0).delta_mu
+
+    columns = {"V": 1e-5, "epsilon": epsilon, "frequency": 120.0}
+    columns |= {"delta_mu": drop(epsilon), "delta_mu_err": error}
+    ask = {"fixed": {"K": 5e5}, "material": pmma}
+    tables = table_of(columns), table_of({**columns, "epsilon_err": spread})
+    found = [fit(table, "elasto-plastic", ["A"], **ask) for table in tables]
+    # Effective variance: slopes from finite differences.
+    of_epsilon = (drop(epsilon + 1e-5) - drop(epsilon - 1e-5)) / 2e-5
+    of_A = (drop(epsilon, pmma.A + 1e-6) - drop(epsilon, pmma.A - 1e-6)) / 2e-6
+    of_epsilon = (spread * of_epsilon / error) ** 2
+    for one, more in zip(found, (0.0, of_epsilon), strict=True):
+        expected = error * np.sum(of_A**2 / (1 + more)) ** -0.5
+        assert one.parameters["A"].se == pytest.approx(expected, rel=1e-3)
+    deviance = np.sum(np.log1p(of_epsilon))
+    densities = [f.objective.log_likelihood(f.objective.coordinates(f.values)) for f in found]
+    assert 2 * (densities[0] - densities[1]) == pytest.approx(deviance, rel=1e-3)

@@ -193,8 +193,8 @@ def fit(
         minima, agreed = with_noise(objective, minima, searched)
     if not minima or not math.isfinite(minima[0].chi2):
         return failed_fit(objective)
-    if holds:
-        minima = _with_error_of_residuals(objective, minima)
+    if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
+        minima = _with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
     if not recordings:
         other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
@@ -312,10 +312,14 @@ def _cycle_objective(
     return Objective(terms, law, unknowns, constants, curved=True)
 
 
-def _with_error_of_residuals(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
-    """Minima for holds, whose error is that of their residuals where none is given."""
-    for term in objective.terms_of(HoldTerm):
-        term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
+def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
+    """Minima under errors that a fit tells: of holds without any, and of a measured epsilon."""
+    values = objective.named(minima[0].u)
+    for hold in objective.terms_of(HoldTerm):
+        hold.estimate_error(values, len(objective.unknowns))
+    for table in objective.terms_of(LockInTerm):
+        if table.measured_epsilon:
+            table.estimate_error(values)
     objective.forget()
     best = objective.minimise(minima[0].u)
     return [best, *(Minimum(m.u, objective.chi2(m.u)) for m in minima[1:])]

@@ -83,8 +83,17 @@ class Weights(NamedTuple):
         return float(self.log_scales.sum())
 
 
-def weights_of(table: LockInTable) -> Weights:
-    """Weights of the residuals of a table; slots are in the order of `OBSERVABLES`."""
+def weights_of(table: LockInTable, slopes: Float | None = None) -> Weights:
+    """Weights of the residuals of a table; slots are in the order of `OBSERVABLES`.
+
+    Parameters
+    ----------
+    table : LockInTable
+    slopes : array, shape (rows, columns), optional
+        Derivatives of the predictions to the measured epsilon, whose errors then count as errors
+        of the readings (effective variance; Orear, Am. J. Phys. 50, 912, 1982). Without them
+        epsilon is exact.
+    """
     rows, slots = table.rows, len(OBSERVABLES)
     matrix = np.zeros((rows, slots, _COLUMNS))
     data, error = np.zeros((rows, slots)), np.ones((rows, slots))
@@ -114,7 +123,17 @@ def weights_of(table: LockInTable) -> Weights:
     root = _inverse_root(table)
     matrix = root @ (matrix * (reported / error)[..., None])
     target = (root @ (data * reported / error)[..., None])[..., 0]
-    return Weights(matrix, target, reported, np.log(error).sum(1) - np.linalg.slogdet(root)[1])
+    log_scales = np.log(error).sum(1) - np.linalg.slogdet(root)[1]
+    weights = Weights(matrix, target, reported, log_scales)
+    if slopes is None:
+        return weights
+    # An error of epsilon moves all residuals of a row together: their covariance is 1 + g g^T.
+    g = weights.along(slopes) * np.nan_to_num(table.errors["epsilon"])[:, None]
+    size = np.sum(g**2, axis=1)
+    share = (1 / np.sqrt(1 + size) - 1) / np.where(size > 0, size, 1.0)
+    whiten = np.eye(slots) + share[:, None, None] * g[:, :, None] * g[:, None, :]
+    target = (whiten @ target[..., None])[..., 0]
+    return Weights(whiten @ matrix, target, reported, log_scales + np.log1p(size) / 2)
 
 
 def _inverse_root(table: LockInTable) -> Float:
@@ -151,7 +170,7 @@ def columns_of(predicted: Prediction, module: Any = np) -> Any:
     )
 
 
-def _slopes_of(predicted: Prediction, slope: Prediction) -> Float:
+def slopes_of(predicted: Prediction, slope: Prediction) -> Float:
     """Derivatives of `columns_of`."""
     c, change = predicted.harmonics, slope.harmonics
     columns = columns_of(slope)
@@ -175,7 +194,7 @@ def residuals_of(
     reported = weights.reported.T
     slots, rows = np.nonzero(reported)
     values = weights.compared(columns_of(predicted)).T[reported]
-    slopes = [weights.along(_slopes_of(predicted, d)).T[reported] for d in derivatives.values()]
+    slopes = [weights.along(slopes_of(predicted, d)).T[reported] for d in derivatives.values()]
     return Residuals(
         values,
         np.column_stack(slopes) if slopes else np.zeros((values.size, 0)),

@@ -32,6 +32,8 @@ OBSERVABLES = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
 #: Columns of a table of responses that say nothing about the measurement.
 _OF_RESPONSES = ("floquet_max", "stable", "converged", "result", "law")
 _OPERATING = ("V", "epsilon", "frequency")
+#: Columns of the standard uncertainty of epsilon.
+_OF_EPSILON = ("epsilon_err", "epsilon_uncertainty")
 #: Columns of texts: which run a row belongs to, the first of them that is there; what a campaign
 #: says of a row; the unit of its loads.
 _RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
@@ -60,7 +62,7 @@ class LockInTable:
     values : mapping of str to array, shape (rows,)
         Observables by name; NaN where a row does not report one.
     errors : mapping of str to array, shape (rows,)
-        Standard uncertainties of the same; phases in rad.
+        Standard uncertainties of the same, phases in rad; and of `epsilon` where it was measured.
     covariances : mapping of (str, str) to array, shape (rows,)
         Of pairs of observables of a row, in SI and rad; NaN where there is none.
     run : array of str, shape (rows,)
@@ -158,7 +160,7 @@ class LockInTable:
                 values[phase] = values[phase] + np.angle(phasor)
                 errors[phase] = np.where(both, across / np.maximum(np.abs(phasor), 1e-300), np.nan)
             values[amplitude] = np.abs(phasor)
-        scale = {n: errors[n] / self.errors[n] for n in errors}
+        scale = {n: errors[n] / self.errors[n] for n in values}
         covariances = {(a, b): c * scale[a] * scale[b] for (a, b), c in self.covariances.items()}
         return replace(self, values=values, errors=errors, covariances=covariances)
 
@@ -251,7 +253,7 @@ def _columns(
 def _is_read(name: str) -> bool:
     """Whether a column says something of the measurement; others are the user's own."""
     said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
-    return name in _TEXTS or (bool(said) and name not in _OF_RESPONSES)
+    return name in (*_TEXTS, *_OF_EPSILON) or (bool(said) and name not in _OF_RESPONSES)
 
 
 def _unit_in_si(shown: str, name: str, unit: str) -> float:
@@ -294,6 +296,7 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
         errors, unit = record["uncertainties"], record["unit"]
         columns = {name: float(record[name]) for name in ("epsilon", "frequency", "W0")}
         observed = [n for n in OBSERVABLES if record.get(n) is not None]
+        columns["epsilon_err"] = float(errors["epsilon"])
         columns |= {n: float(record[n]) for n in observed}
         columns |= {f"{n}_err": float(errors[n]) for n in observed}
         joint = record.get("observable_covariance", {"names": [], "matrix": []})
@@ -357,6 +360,7 @@ def table_of(
     points: dict[str, Float] = {}
     observed: dict[str, Float] = {}
     covariances: dict[tuple[str, str], Float] = {}
+    of_epsilon: dict[str, Float] = {}
     for key, column in arrays.items():
         if column.ndim != 1 or column.size not in (1, rows):
             raise InputError(
@@ -382,6 +386,12 @@ def table_of(
                 f"{name}.{key} must name two observables as <name>_<name>_cov, of "
                 f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
             )
+        elif key in _OF_EPSILON:
+            # An empty cell, or none, says that it is exact.
+            spread = np.nan_to_num(column)
+            good = np.isfinite(spread) & (spread >= 0)
+            _require(good, name, key, column, "be finite and not negative", "correct it")
+            of_epsilon["epsilon"] = spread
         elif (plain := _observable_of(key)) is not None:
             if plain in observed:
                 raise InputError(
@@ -398,6 +408,7 @@ def table_of(
         )
     values, errors = _observables(name, observed)
     runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])
+    errors |= of_epsilon
     table = LockInTable(name, points, values, errors, covariances, runs, tuple(remarks))
     _refuse_copies(table, table, "{0} must have each reading once, got {2} equal to {1}")
     _refuse_impossible(table)

@@ -23,6 +23,7 @@ from asperity.inference.tables.residuals import (
     Weights,
     columns_of,
     residuals_of,
+    slopes_of,
     standardised,
     weights_of,
 )
@@ -102,6 +103,7 @@ class LockInTerm(DataTerm):
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.coarse, self.least = False, 1.0
         self._weights: Weights | None = None
+        self._slopes: Float | None = None
 
     @property
     def noise(self) -> dict[str, Any]:
@@ -113,8 +115,29 @@ class LockInTerm(DataTerm):
     def weights(self) -> Weights:
         """Residuals as linear functions of predictions."""
         if self._weights is None:
-            self._weights = weights_of(self.table)
+            self._weights = weights_of(self.table, self._slopes)
         return self._weights
+
+    @property
+    def measured_epsilon(self) -> bool:
+        """Whether the table says how uncertain epsilon is."""
+        return bool(np.nan_to_num(self.table.errors.get("epsilon", 0.0)).any())
+
+    def estimate_error(self, values: Mapping[str, float]) -> None:
+        """Count the errors of epsilon, as predictions at these parameters depend on it."""
+        function = self._function(search=self.searches, coarse=self.coarse)
+        given = parameters_at(self.fixed, values, function)
+        known = self._nearest(values) if self.searches else None
+        response, derivatives = function.value_and_jacobian(given, known, names=["epsilon"])
+        slope, none = derivatives["epsilon"], np.zeros(self.table.rows)
+        at = Prediction(response.mean_friction, none, np.asarray(response.harmonics))
+        change = Prediction(slope.mean_friction, none, np.asarray(slope.harmonics))
+        # The contacts carry eps_ratio of what was measured.
+        ratio = np.broadcast_to(
+            values.get("eps_ratio", self.fixed.get("eps_ratio", 1.0)), none.shape
+        )
+        slopes = slopes_of(at, change) * ratio[:, None]
+        self._slopes, self._weights = np.nan_to_num(slopes), None
 
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
@@ -148,6 +171,7 @@ class LockInTerm(DataTerm):
         """The same for some of the rows with their orbits, by the coarse model on request."""
         part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
         part.fixed = {n: v[kept] for n, v in self.fixed.items()}
+        part._slopes = None if self._slopes is None else self._slopes[kept]
         part._visited = [(free, known.picked(rows)) for free, known in self._visited]
         part.coarse, part.least = coarse, _LEAST if coarse else self.least
         return part
