@@ -617,6 +617,41 @@ def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, bar
     fit.get_by_text("Cancelled.").wait_for()
 
 
+def test_velocities_are_given_where_no_channel_has_the_motion(visit, barriers, stepped):
+    rows = [line.split(",") for line in stepped.decode().splitlines()]
+    bare = "\n".join(",".join([row[0], *row[2:]]) for row in rows)
+    page = visit("#data", bypass_csp=True)
+    page.locator(".drop").wait_for()
+    file = {"name": "bare.csv", "mimeType": "text/csv", "buffer": bare.encode()}
+    page.set_input_files("#data-files", [file])
+    card = page.locator(".recording[aria-label='bare.csv']")
+    card.locator(".sentence", has_text="no velocity steps").wait_for()
+    card.locator("summary", has_text="Channels").click()
+    for label, text in (
+        ("Velocity steps (s)", "2, 3"),
+        ("Velocities between the steps", "1 um/s, 10 um/s, 1 um/s"),
+    ):
+        field = card.get_by_label(label)
+        field.fill(text)
+        field.press("Enter")
+    card.get_by_text("Step 1 at 2 s, 1 µm/s to 10 µm/s").wait_for()
+    assert barriers(page) == []
+    # Without them a fit is refused, as nothing says how the drive moves.
+    fit = page.locator("section.fit")
+    for label in ("A", "B", "D0"):
+        fit.get_by_label(label, exact=True).check()
+    fit.get_by_role("button", name="Fit", exact=True).click()
+    table = fit.get_by_role("region", name="Parameters")
+    table.wait_for()
+    rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
+    found = {name: number(rows[name]) * (1e-9 if name == "D0" else 1) for name in PLANTED}
+    assert found == pytest.approx(PLANTED, rel=0.03)
+    again = visit("#" + page.url.split("#", 1)[1])
+    again.locator(".sentence", has_text="2 velocity steps").wait_for()
+    again.locator("summary", has_text="Channels").click()
+    assert again.get_by_label("Velocities between").input_value() == "1 um/s, 10 um/s, 1 um/s"
+
+
 def number(text):
     """A number as the page writes it."""
     mantissa, _, power = text.replace("−", "-").partition("·10")

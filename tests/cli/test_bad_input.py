@@ -5,8 +5,11 @@ import random
 from functools import partial
 from pathlib import Path
 
+import click
 import pytest
 
+from asperity.cli.main import main
+from asperity.cli.shell import _EXAMPLES
 from references.commands import refused
 from references.populations import population
 
@@ -235,11 +238,23 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
         ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),
         (("materials", "bureau"), ["did you mean 'bureau2000'?"]),
         (("materials", "no.toml", "--cite"), ["must be a file"]),
-        (("reproduce",), ["--out must be given, got nothing; add it, like --out DIR"]),
+        (("reproduce",), ["--out must be given, got nothing; add it, like --out folder"]),
+        (("run", "p.toml"), ["--out must be given, got nothing; add it, like --out motion.nc"]),
     ],
 )
 def test_the_other_commands(asperity, arguments: tuple[str, ...], parts: list[str]) -> None:
     refused(asperity(*arguments), *parts)
+
+
+def test_every_option_that_must_be_given_has_an_example() -> None:
+    def options(command: click.Command) -> list[click.Parameter]:
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            known = (command.get_command(context, n) for n in command.list_commands(context))
+            return [o for one in known if one for o in options(one)]
+        return [o for o in command.params if o.required and isinstance(o, click.Option)]
+
+    assert {o.metavar for o in options(main)} == {*_EXAMPLES}
 
 
 def test_a_report_folder_that_cannot_be_written(asperity, tmp_path: Path) -> None:

@@ -1,5 +1,8 @@
 """`.plot()` draws the numbers of the object, and what failed or is unstable is seen."""
 
+from io import BytesIO
+
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -43,6 +46,22 @@ def test_a_single_point_is_a_cycle_of_the_harmonic_sum() -> None:
         for n, c in enumerate(response.harmonics, 1)
     )
     np.testing.assert_allclose(force, expected, rtol=1e-12)
+
+
+def test_a_notebook_shows_the_picture_without_pyplot() -> None:
+    figure = asp.periodic_response(
+        SLIDER, velocity="1 um/s", epsilon=[0.1, 0.2], frequency=120.0
+    ).plot()
+    picture, size = figure._repr_png_()
+    pixels = matplotlib.image.imread(BytesIO(picture), format="png").shape
+    assert pixels[:2] == (2 * size["height"], 2 * size["width"])
+    assert size["width"] == figure.get_size_inches()[0] * figure.dpi
+
+
+def test_other_names_are_refused() -> None:
+    response = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.1, frequency=120.0)
+    with pytest.raises(InputError, match="names must be one of friction, geophysics"):
+        response.plot("picture.png")
 
 
 def test_more_curves_than_can_be_told_apart_are_refused() -> None:

@@ -16,6 +16,16 @@ from asperity.cli.words import in_options
 from asperity.errors import InputError, closest, naming, printable
 
 _BAD_INPUT = 2
+#: What a missing option could be, by its metavar.
+_EXAMPLES = {
+    "CSV": "table.csv",
+    "NC": "motion.nc",
+    "PNG": "picture.png",
+    "DIR": "folder",
+    "OUTPUT": "delta_mu",
+    "AXIS": "V",
+    "VALUE": '"120 Hz"',
+}
 
 
 class Shell(click.Group):
@@ -87,8 +97,8 @@ class Shell(click.Group):
             code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
         except click.MissingParameter as error:
             option, name = error.param, "" if error.param is None else error.param.opts[-1]
-            like = "" if option is None else option.make_metavar(error.ctx or click.Context(self))
-            advice = f"add it, like {name} {like}" if name.startswith("-") else "add it"
+            like = "" if option is None else _EXAMPLES.get(option.metavar or "", "")
+            advice = f"add it, like {name} {like}" if like else "add it"
             code = _print_error(
                 str(InputError(name or "argument", "be given", "nothing", advice)), _BAD_INPUT
             )

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import as_file, files
+from io import BytesIO
 from pathlib import Path
 from string import ascii_lowercase
 
@@ -116,9 +117,21 @@ def style() -> Iterator[None]:
         yield
 
 
+class Picture(Figure):
+    """A figure that a notebook shows without pyplot, whose backend may not be loaded there."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """The picture, and its size (px) on a screen: half of that for sharp lines on any."""
+        file = BytesIO()
+        with style():
+            self.savefig(file, format="png", dpi=2 * self.dpi)
+        width, height = (round(inches * self.dpi) for inches in self.get_size_inches())
+        return file.getvalue(), {"width": width, "height": height}
+
+
 def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
     """An empty figure (inches), not registered with pyplot."""
-    return Figure(figsize=(width, height))
+    return Picture(figsize=(width, height))
 
 
 def letter_panels(axes: Sequence[Axes]) -> None:

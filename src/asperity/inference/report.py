@@ -168,10 +168,8 @@ def windows_sections(over: WindowedFit) -> list[Section]:
         shown = Shown.of(p.value, p.se, p.unit)
         errors = [shown.error(se) for se in (p.se, p.se_noise, p.se_window)]
         rows.append((name, shown.value, *errors, shown.interval(p.interval_95), shown.unit, ""))
-    first = set(over.fits[0].warnings)
-    new = tuple(w for w in over.warnings if w.partition(" s: ")[2] not in first)
     title = f"over {len(over.windows)} windows ({spans} s)"
-    return [Section(title, (), head, tuple(rows), new)]
+    return [Section(title, (), head, tuple(rows), over.new_warnings)]
 
 
 def posterior_sections(posterior: Posterior) -> list[Section]:

@@ -174,11 +174,14 @@ class SummaryWords(Record):
         ``{id}`` stands for what was computed for that claim.
     verdict : str
         Verdict whose claims are listed below the paragraph, with links; none by default.
+    figures : tuple of str
+        Names of figures that are shown beside each other below it, with links; none by default.
     """
 
     title: str
     sentences: tuple[str, ...]
     verdict: str = ""
+    figures: tuple[str, ...] = ()
 
 
 class Contents(Question):

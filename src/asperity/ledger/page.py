@@ -15,6 +15,7 @@ from asperity.ledger.points import RULE, CurveComparison
 from asperity.ledger.sentences import fill, names_in
 from asperity.materials import Number, citation
 from asperity.outputs.tables import html_page
+from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
     from asperity.ledger.contents import About, SummaryWords
@@ -60,8 +61,9 @@ def build_page(
         Of measured points with the curves, where points were given.
     """
     about = paper.contents.paper
+    pictures = {figure.name: _picture(figure, folder) for _, figures in shown for figure in figures}
     parts = {
-        "In brief": ("brief", _brief(paper.contents.summary, headlines, claims)),
+        "In brief": ("brief", _brief(paper.contents.summary, headlines, claims, pictures)),
         **{
             section.title: (
                 section.key,
@@ -111,6 +113,12 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
 def _chip(kind: str, sign: str, word: str) -> str:
     """A verdict as a coloured word with a sign, because some readers do not see the colour."""
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
+
+
+def _picture(shown: PaperFigure, folder: Path) -> str:
+    """The picture of a figure with its title, as a link to its entry."""
+    image = embedded_png(folder / f"figures/{shown.name}.png", shown.alt)
+    return f'<a href="#{shown.name}">{image}<span>{shown.place}: {rich(shown.title)}</span></a>'
 
 
 def _figure(shown: PaperFigure, folder: Path) -> str:
@@ -168,15 +176,18 @@ def _reference(entry: str) -> str:
 
 
 def _brief(
-    words: Sequence[SummaryWords], headlines: Sequence[Headline], claims: Sequence[Claim]
+    words: Sequence[SummaryWords],
+    headlines: Sequence[Headline],
+    claims: Sequence[Claim],
+    pictures: Mapping[str, str],
 ) -> str:
     """The paragraphs of the summary, then the table of conclusions."""
     known = {claim.id: claim for claim in claims}
-    paragraphs = "\n".join(_paragraph(one, known) for one in words)
+    paragraphs = "\n".join(_paragraph(one, known, pictures) for one in words)
     return f'<div class="summary">\n{paragraphs}\n</div>\n{_conclusions(headlines, known)}'
 
 
-def _paragraph(words: SummaryWords, claims: dict[str, Claim]) -> str:
+def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[str, str]) -> str:
     computed = {name: claim.computed for name, claim in claims.items()}
     several = len(words.sentences) > 1
     items = [
@@ -191,6 +202,11 @@ def _paragraph(words: SummaryWords, claims: dict[str, Claim]) -> str:
             for claim in listed
         ]
         text += _list(entries, "ul")
+    if words.figures:
+        beside = "".join(
+            pictures[one_of(name, pictures, "summary.figures")] for name in words.figures
+        )
+        text += f'<div class="beside">{beside}</div>'
     return f'<div class="card"><h3>{rich(words.title)}</h3>{text}</div>'
 
 

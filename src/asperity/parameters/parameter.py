@@ -319,10 +319,9 @@ class Drawn(Displayed):
         Raises
         ------
         InputError
-            If an object of this shape has no picture.
+            If `names` is none of the two, or an object of this shape has no picture.
         """
-        # A notebook shows figures once this is imported.
-        import_module("matplotlib.pyplot")
+        import_module("asperity.parameters.arguments").one_of(names, NAMES, "names")
         module, name = self._drawn_by.split(":")
         with import_module("asperity.figures.style").style():
             figure: Figure = getattr(import_module(module), name)(self)

@@ -1,11 +1,13 @@
 """Fits in several windows: a disturbance in one of them widens the interval."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity.errors import InputError
-from asperity.inference import WindowEstimate, fit_windows
+from asperity.inference import WindowEstimate, fit, fit_windows
 from asperity.inference.fitting.windows import disagreeing
 from asperity.inference.unknowns import unknown_of
 from asperity.laws import RiceRuina
@@ -55,6 +57,15 @@ def test_a_disturbance_outside_some_windows_is_their_spread(run):
     share = [o.parameters["B"].se_window / o.parameters["B"].se_noise for o in (calm, bent)]
     assert share[1] > 3 * share[0]
     assert bent.record()["parameters"]["B"]["se_window"] == bent.parameters["B"].se_window
+
+
+def test_a_warning_of_the_first_window_is_not_new_in_another(run, monkeypatch):
+    one = fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
+    warned = [replace(one, warnings=w) for w in (("A s: b", "c"), ("A s: b", "d"))]
+    monkeypatch.setattr("asperity.inference.fitting.windows.fit", lambda *_, **__: warned.pop(0))
+    result = over(run, run.friction)
+    assert result.new_warnings == ("window 0 to 120 s: d",)
+    assert len(result.warnings) == 4
 
 
 def test_windows_that_are_not_several_are_refused(run):

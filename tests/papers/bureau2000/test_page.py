@@ -38,7 +38,13 @@ def address(tmp_path_factory):
             save_picture(draw(), folder / "figures" / name)
     found = claims(paper)
     sections = [(Section("figures", "Figures", ()), shown)]
-    text = build_page(paper, folder, sections, found, paper.headlines(found))
+    # The head shows the figures that need no computation.
+    first, *others = paper.contents.summary
+    summary = (first.model_copy(update={"figures": tuple(SCHEMATICS)}), *others)
+    with pytest.MonkeyPatch.context() as patch:
+        contents = paper.contents.model_copy(update={"summary": summary})
+        patch.setitem(vars(paper), "contents", contents)
+        text = build_page(paper, folder, sections, found, paper.headlines(found))
     (folder / "index.html").write_text(text, encoding="utf-8")
     return (folder / "index.html").as_uri()
 

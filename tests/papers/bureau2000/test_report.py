@@ -54,8 +54,12 @@ def claim(key, verdict, **fields):
 VARIED = Sensitivity(
     "A", ("A = 0.008", "A = 0.018"), {"value": (0.1, 0.3)}, ("differs", "reproduced")
 )
+#: Figures of the three laws, which the head of the page shows beside each other.
+LAWS = ("figure-08", "figure-09", "figure-11")
 WORDS = (
-    SummaryWords(title="The answer in five sentences", sentences=tuple(5 * ["It is {a-1}."])),
+    SummaryWords(
+        title="The answer in five sentences", sentences=tuple(5 * ["It is {a-1}."]), figures=LAWS
+    ),
     SummaryWords(title="What is wrong in print", sentences=("These:",), verdict="misprint"),
     SummaryWords(title="What inertia does", sentences=("{c-3}.",)),
     SummaryWords(title="What stays open", sentences=("All.", "And {b-2}.")),
@@ -254,7 +258,7 @@ def test_the_page_is_sound(page):
 def test_the_page_needs_nothing_else(page, report):
     assert page.all("script") == page.all("link") == page.all("iframe") == []
     assert all(image["src"].startswith("data:image/png;base64,") for image in page.all("img"))
-    assert len(page.all("img")) == 19
+    assert len(page.all("img")) == 19 + len(LAWS)
     style_text = files("asperity.outputs").joinpath("page.css").read_text(encoding="utf-8")
     assert "url(" not in style_text
     assert "@import" not in style_text
@@ -298,6 +302,9 @@ def test_the_summary_leads_and_links_to_its_claims(page):
     assert places == sorted(places)
     assert places[-1] < text.index("The set-up")
     linked = [a["href"] for a in page.all("a")]
+    at = [linked.index(f"#{name}") for name in LAWS]
+    assert at == [*range(at[0], at[0] + 3)]
+    assert places[0] < text.index("Figure 11: Elastic asperities") < places[1]
     assert linked.count("#b-2") >= 2
     assert {"#show-reproduced", "#show-misprint", "#show-differs"} <= set(linked)
 

@@ -74,6 +74,8 @@ class WindowedFit:
     undetermined : tuple of str
         Parameters of which the windows say nothing, or contradict each other.
     warnings : tuple of str
+    new_warnings : tuple of str
+        Those that the fit in the first window does not have.
     """
 
     windows: tuple[tuple[float, float], ...]
@@ -81,6 +83,7 @@ class WindowedFit:
     parameters: Mapping[str, WindowEstimate]
     undetermined: tuple[str, ...]
     warnings: tuple[str, ...]
+    new_warnings: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
         """Plain numbers and texts, for JSON."""
@@ -165,9 +168,12 @@ def fit_windows(
         if far_off or not known:
             undetermined.append(unknown.name)
         said += far_off
-    for i, result in enumerate(fits):
-        said += [f"{_shown(spans[i])}: {w}" for w in result.warnings]
-    return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said))
+    new = list(said)
+    for span, result in zip(spans, fits, strict=True):
+        of_window = {w: f"{_shown(span)}: {w}" for w in result.warnings}
+        said += of_window.values()
+        new += [text for w, text in of_window.items() if w not in fits[0].warnings]
+    return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said), tuple(new))
 
 
 def _shown(span: tuple[float, float]) -> str:

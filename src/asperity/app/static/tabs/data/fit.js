@@ -18,10 +18,10 @@ const DEFAULTS = {
 const SETTINGS = {
   ...DEFAULTS.tables, fixed: "",
   prior: false, profile: false, inertia: false, report: false, posterior: false, draws: "1000", chains: "4",
-  trend: "linear", drift: false, initial: "steady", gauge: "", fit_rate: "", velocities: "",
+  trend: "linear", drift: false, initial: "steady", gauge: "", fit_rate: "",
 };
 const FLAGS = ["prior", "profile", "inertia", "report", "drift", "posterior"];
-const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "fit_rate", "velocities", "draws", "chains"];
+const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "fit_rate", "draws", "chains"];
 const LABELS = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", mu1: "μ₁", mu2: "μ₂" };
 
 export class FitPanel {
@@ -132,7 +132,6 @@ export class FitPanel {
         choice("State at the beginning", [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
         text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
         text("Mean values per second for long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
-        text("Velocities between the steps", "velocities", "measured, or 1 um/s, 10 um/s"),
         tick("Friction also drifts over time", settings.drift, set("drift")).element));
     fill(this.form,
       el("fieldset", {}, el("legend", {}, "Laws: tick one to fit it, several to compare them"),
@@ -208,14 +207,6 @@ export class FitPanel {
           return;
         }
       }
-    }
-    const velocities = settings.velocities.split(",").map((v) => v.trim()).filter(Boolean);
-    if (velocities.length && question.runs.length) {
-      if (question.runs.length > 1) {
-        this.message.textContent = `Velocities between the steps must go with one recording, got ${question.runs.length}; fit them one by one.`;
-        return;
-      }
-      question.runs[0].velocities = velocities;
     }
     this.#running(true);
     try {

@@ -66,7 +66,7 @@ export class RecordingCard {
     this.traced ||= { curve: curves.friction, segments: record.segments, level: record.friction.value, load: record.load?.value ?? 1 };
     return {
       name, python: this.recording?.python || "", recording: this.traced,
-      question: { recording: key, source, window: options.window || null, steps: options.steps || null },
+      question: { recording: key, source, window: options.window || null, steps: options.steps || null, velocities: options.velocities || null },
     };
   }
 
@@ -181,6 +181,7 @@ export class RecordingCard {
         tick("Whole periods only", Boolean(options.whole_periods), (on) => { if (on) options.whole_periods = true; else delete options.whole_periods; again(); }).element,
         choice("Drift", ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", (v) => { options.detrend = v; again(); }).element,
         text("Velocity steps (s)", options.steps?.join(", "), several("steps"), "detected, or 12.5, 60"),
+        text("Velocities between the steps", options.velocities?.join(", "), several("velocities"), "measured, or 1 um/s, 10 um/s"),
         text("Holds (s)", options.holds?.join(", "), several("holds"), "detected, or 100:110"),
         ...[["Spring stiffness K", "stiffness", "for slips and energies, 168 N/m"], ["Pulling velocity V", "velocity", "of stick-slip, 42 um/s"], ["Mass M", "mass", "of stick-slip, 30.7 g"], ["Normal load W0", "normal_load", "M g, or 3 N"]]
           .map(([label, key, example]) => text(label, options[key], optional(options, key), example)),
@@ -248,7 +249,7 @@ export class RecordingCard {
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
       record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
-        "The fit below uses it, with the window and the velocity steps above").element,
+        "The fit below uses it, with the window, the velocity steps and the velocities above").element,
       measured.amplitudes && this.#amplitudes(measured),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
       ...sections(measured.sections, ` of ${this.state.name}`),
