@@ -107,9 +107,9 @@ def beginning(path: Path) -> bytes:
         return file.read(_HEAD)
 
 
-def truncated(path: Path, number: float, where: str, sentence: str, sure: bool = True) -> Finding:
+def truncated(number: float, where: str, sentence: str, sure: bool = True) -> Finding:
     """The finding of a file that is or may be cut; the complete rows are read."""
-    whole = f"{path.name} {'is' if sure else 'may be'} cut short: {sentence}"
+    whole = f"the file {'is' if sure else 'may be'} cut short: {sentence}"
     return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
 

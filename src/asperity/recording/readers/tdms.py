@@ -102,7 +102,7 @@ def _whole_rows(
         raise refuse_truncated(path, "which is cut before its first value")
     sentence = "its last segment is not whole; the rows that all channels have were read."
     last = min(columns[0].values.size for columns in cut.values())
-    return cut, truncated(path, lost, f"row {last}", sentence)
+    return cut, truncated(lost, f"row {last}", sentence)
 
 
 def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:

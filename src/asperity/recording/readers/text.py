@@ -167,7 +167,7 @@ def _load(
         step = None
     if ending.sentence:
         where = f"row {len(frame)}, the last"
-        findings.insert(0, truncated(path, ending.rows, where, ending.sentence, ending.sure))
+        findings.insert(0, truncated(ending.rows, where, ending.sentence, ending.sure))
     provenance = {
         "format": "text",
         "delimiter": layout.delimiter or "blank",
