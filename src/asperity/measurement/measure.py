@@ -173,13 +173,23 @@ def measure(
     return _measured(_prepared(**options), None, window)
 
 
-def measure_amplitudes(trace: Trace, **options: Any) -> list[Measurement | InputError]:
+def measure_amplitudes(
+    trace: Trace,
+    *,
+    load: str = "W",
+    force: str = "F",
+    frequency: float | None = None,
+    harmonics: int = 4,
+    detrend: str = "linear",
+    only_whole_periods: bool = False,
+    refine: bool = True,
+) -> list[Measurement | InputError]:
     """Read every modulated stretch of a recording, in their order.
 
     Parameters
     ----------
-    trace, **options
-        As in `measure`, all but the window.
+    trace, load, force, frequency, harmonics, detrend, only_whole_periods, refine
+        As in `measure`.
 
     Returns
     -------
@@ -191,7 +201,7 @@ def measure_amplitudes(trace: Trace, **options: Any) -> list[Measurement | Input
     InputError
         As `measure` where the recording as a whole cannot be read.
     """
-    recording = _prepared(trace, **options)
+    recording = _prepared(**locals())
     measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
