@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "asperity"
 
 #: What every room may use.
-_BASE = {"arrays", "_jax", "_lazy", "_version", "errors", "outputs", "parameters", "units"}
+_BASE = {"arrays", "_jax", "_lazy", "_processes", "_version", "errors", "outputs"}
+_BASE |= {"parameters", "units"}
 _EQUATIONS = _BASE | {"laws", "loads", "slider"}
 _SOLVERS = {"algebra", "theory", "orbit", "branches", "transients"}
 _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
@@ -27,6 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "arrays": set(),
     "_jax": set(),
     "_lazy": set(),
+    "_processes": set(),
     "errors": set(),
     "units": {"errors", "_lazy"},
     "outputs": {"errors", "_lazy", "_version"},  # files of any content

@@ -112,7 +112,10 @@ def _takes_options() -> bool:
 
 @cache
 def configure() -> Path | None:
-    """Switch JAX to double precision and turn its compilation cache on; once per process.
+    """Switch JAX to double precision, to the CPU, and its compilation cache on; once per process.
+
+    Arrays lie on the CPU unless JAX_PLATFORMS or JAX's default device say otherwise: the searches
+    are loops of small programs, which an accelerator only slows down.
 
     The cache lies in ``$JAX_COMPILATION_CACHE_DIR`` if set, else in ``asperity/jax`` under
     ``$XDG_CACHE_HOME`` or ``~/.cache``. Where that cannot be written, there is no cache.
@@ -123,6 +126,8 @@ def configure() -> Path | None:
         The folder of the cache, None without one.
     """
     jax.config.update("jax_enable_x64", True)
+    if not jax.config.jax_platforms and jax.config.jax_default_device is None:
+        jax.config.update("jax_default_device", "cpu")
     jax.monitoring.register_event_duration_secs_listener(_count)
     folder = _cache_folder()
     if folder is None or not _writable(folder):

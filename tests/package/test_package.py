@@ -52,6 +52,27 @@ CONFIGURE = (
 )
 
 
+DEVICE = (
+    "import jax\nchosen = None\n{}\nfrom asperity._jax import configure\nconfigure()\n"
+    "print(jax.config.jax_default_device is chosen or jax.config.jax_default_device)"
+)
+
+
+@pytest.mark.parametrize(
+    ("before", "platforms", "after"),
+    [
+        ("", "", "cpu"),
+        ("", "cpu", "True"),
+        ("chosen = jax.devices()[0]; jax.config.update('jax_default_device', chosen)", "", "True"),
+    ],
+    ids=["nothing said", "platform chosen", "device chosen"],
+)
+def test_programs_run_on_the_cpu_unless_another_device_is_chosen(
+    before: str, platforms: str, after: str
+) -> None:
+    assert run(DEVICE.format(before), JAX_PLATFORMS=platforms) == after
+
+
 def test_compiled_programs_are_kept(tmp_path: Path) -> None:
     chosen = tmp_path / "chosen"
     assert run(CONFIGURE, JAX_COMPILATION_CACHE_DIR=str(chosen)) == str(chosen)

@@ -6,6 +6,8 @@ it runs, so that ``asperity --version`` costs nothing.
 
 from __future__ import annotations
 
+import os
+
 import click
 
 from asperity._version import __version__
@@ -61,6 +63,8 @@ def main(context: click.Context) -> None:
     A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI
     numbers, or have units in their headings.
     """
+    # Before JAX looks for accelerators, which takes seconds and most of their memory.
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 

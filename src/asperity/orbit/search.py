@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity._processes import ENVIRONMENT
 from asperity.errors import require
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following import BranchFollowing
@@ -169,8 +170,7 @@ def find_orbits_on_cores(
 
     solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
     options = {"harmonics": harmonics, "phases": phases, "methods": methods}
-    # One thread of XLA for each process; more threads than cores would slow all of them.
-    executor = get_reusable_executor(max_workers=workers, env={"NPROC": "1"})
+    executor = get_reusable_executor(max_workers=workers, env=ENVIRONMENT)
     slices = [np.arange(k, min(k + _SLICE, points)) for k in range(0, points, _SLICE)]
     problems = [take(problem, index) for index in slices]
     try:

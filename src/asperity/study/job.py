@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity._processes import ENVIRONMENT
 from asperity._version import __version__
 from asperity.arrays import Index
 from asperity.errors import InputError
 from asperity.outputs import differences
 from asperity.study.engine import DoneChunk
-from asperity.study.workers import ENVIRONMENT
 
 if TYPE_CHECKING:
     from asperity.study.points import Answers, Points

@@ -13,14 +13,8 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+from asperity._processes import ENVIRONMENT
 from asperity.errors import InputError, printable
-
-#: Environment of a worker: one thread for XLA and for the linear algebra of NumPy, as in Dask.
-#: Sums over several threads differ in their last bits from sums in one thread.
-ENVIRONMENT = {
-    "NPROC": "1",
-    **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
-}
 
 #: Seconds between counts of the workers of a scheduler.
 _RECOUNT = 5.0

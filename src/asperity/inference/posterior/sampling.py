@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
+from asperity._processes import ENVIRONMENT
 from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.fitting.result import Fit
@@ -40,8 +41,6 @@ _TRIES = 100
 _MOST_DRAWS = 4_000_000
 #: Time (s) between two calls of `progress` while no block ends.
 _ASK = 0.5
-#: One thread for XLA and for linear algebra in each process.
-_ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 #: Where a chain is, all as arrays: data of the key of the next block, position with its density and
 #: gradient, step size, and inverse mass matrix.
@@ -238,7 +237,7 @@ def _submitting(jobs: int) -> Iterator[Callable[..., Future]]:
     """Submit work to processes with one thread each: the order of sums depends on threads."""
     from loky import ProcessPoolExecutor
 
-    executor = ProcessPoolExecutor(max_workers=jobs, env=_ONE_THREAD)
+    executor = ProcessPoolExecutor(max_workers=jobs, env=ENVIRONMENT)
     finished = False
     try:
         yield executor.submit

@@ -22,6 +22,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity._processes import ENVIRONMENT
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.batches import mesh_chunk, run_chunks
@@ -343,7 +344,7 @@ def _in_another_process(function: Any, *arguments: Any) -> Any:
     """
     from loky import get_reusable_executor
 
-    executor = get_reusable_executor(max_workers=1, timeout=_IDLE)
+    executor = get_reusable_executor(max_workers=1, timeout=_IDLE, env=ENVIRONMENT)
     return executor.submit(function, *arguments).result()
 
 
