@@ -21,7 +21,8 @@ T = TypeVar("T")
 #: memory mappings in half to two thirds of the time. Optimisation at level 1 takes off another
 #: third. The collocation programs run as fast with both (662 against 723 us a point), the fast
 #: method takes 10 to 20 % longer, which its compilation makes up for over millions of points; small
-#: programs over long arrays are slower with either (jaxlib 0.10.2). Vectors of 512 bits where the
+#: programs over long arrays are slower with either (jaxlib 0.10.2; 0.12 has the newer generator
+#: alone and takes a fifth longer to compile). Vectors of 512 bits where the
 #: processor has them (256 is XLA's own choice) take a tenth off the fast method, and nothing off
 #: the others.
 _LARGE = {
@@ -30,7 +31,7 @@ _LARGE = {
     "xla_cpu_prefer_vector_width": 512,
 }
 #: The same where JAX's own switch sets the level.
-_BRIEF = {"xla_cpu_use_fusion_emitters": False}
+_BRIEF = ("xla_cpu_use_fusion_emitters",)
 
 #: Programs after whose loading the memory mappings of the process are counted.
 _OFTEN = 8
@@ -84,30 +85,35 @@ def jit_large(function: Callable[P, T], static_argnames: tuple[str, ...] = ()) -
     JAX's own switch ``jax_disable_most_optimizations`` (``JAX_DISABLE_MOST_OPTIMIZATIONS``) holds
     here too: such a program compiles in half the time, and runs several times as long.
     """
-    plain = jax.jit(function, static_argnames=static_argnames)
-    tuned = jax.jit(function, static_argnames=static_argnames, compiler_options=dict(_LARGE))
-    brief = jax.jit(function, static_argnames=static_argnames, compiler_options=dict(_BRIEF))
+
+    @cache
+    def compiled(options: tuple[str, ...]) -> Callable[P, T]:
+        chosen = {name: _LARGE[name] for name in options}
+        return jax.jit(function, static_argnames=static_argnames, compiler_options=chosen)
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
         # Within another program that one's options hold, and JAX takes no others.
         inner = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((args, kwargs)))
-        if inner or not _takes_options():
-            return plain(*args, **kwargs)
         unoptimised = jax.config.read("jax_disable_most_optimizations")
-        return (brief if unoptimised else tuned)(*args, **kwargs)
+        options = () if inner else known_options(_BRIEF if unoptimised else tuple(_LARGE))
+        return compiled(options)(*args, **kwargs)
 
     return call
 
 
 @cache
-def _takes_options() -> bool:
-    """Whether this XLA knows the options of `jit_large`."""
-    try:
-        jax.jit(lambda x: x + 1, compiler_options=dict(_LARGE))(1.0)
-    except jax.errors.JaxRuntimeError:
-        return False
-    return True
+def known_options(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the options of `jit_large` that this XLA knows: releases differ in them."""
+
+    def known(name: str) -> bool:
+        try:
+            jax.jit(lambda x: x + 1, compiler_options={name: _LARGE[name]})(1.0)
+        except jax.errors.JaxRuntimeError:
+            return False
+        return True
+
+    return tuple(name for name in names if known(name))
 
 
 @cache

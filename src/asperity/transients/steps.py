@@ -37,7 +37,7 @@ _ALLOWED = frozenset((
     "ge", "gt", "integer_pow", "is_finite", "le", "log", "log1p", "lt", "max", "min", "mul", "ne",
     "neg", "not", "or", "pow", "reduce_sum", "rem", "reshape", "round", "select_n", "sign", "sin",
     "sinh", "slice", "sqrt", "square", "squeeze", "stack", "stop_gradient", "sub", "tan", "tanh",
-    "xor",
+    "unstack", "xor",
 ))
 # fmt: on
 
@@ -54,7 +54,7 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def call(system: SegmentEquations, *arguments: Any) -> Any:
-        run = joined if jax.default_backend() == "cpu" and _goes_well(system) else apart
+        run = joined if _goes_well(system) else apart
         return run(system, *arguments)
 
     return call
