@@ -399,3 +399,22 @@ def test_load_shear_and_pull_even_or_not():
     np.testing.assert_allclose(fast.harmonics[..., :2], robust.harmonics[..., :2], rtol=1e-8)
     np.testing.assert_allclose(fast.multipliers, robust.multipliers, rtol=1e-8)
     np.testing.assert_allclose(fast.waveform, robust.waveform, atol=1e-5)
+
+
+def test_a_point_without_progress_is_given_up_and_others_are_not():
+    # The load of the second point is not a number: no change is smaller than the one before.
+    law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
+    pair = np.ones(2)
+    slider = jax.tree.map(lambda a: a * pair, Slider(law, spring=2e5, load=7.0))
+    system = QuasiStatic(slider, 1e-5 * pair, 2 * np.pi * 120.0 * pair)
+    problem = Problem(jax.tree.map(np.asarray, system), Harmonic(np.array([0.1, np.nan])))
+    mesh = graded_mesh(72, 2, 0.5)
+    orbit = Orbit.empty(GAUSS, 2, 72, 2)._replace(mesh=mesh)
+    orbit = orbit._replace(centre=np.asarray(problem.system.steady()))
+    result = solve(problem, orbit, 30, patience=3)
+    assert result.error[0] < ACCEPTED
+    assert not result.error[1] < ACCEPTED
+    assert result.steps[1] == 3
+    without = solve(problem, orbit, 30)
+    np.testing.assert_array_equal(result.orbit.nodes[..., 0], without.orbit.nodes[..., 0])
+    assert without.steps[1] == 30

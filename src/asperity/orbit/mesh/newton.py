@@ -15,6 +15,7 @@ until no exponent and no logarithmic state changes by more than a few units.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache, partial
 from typing import NamedTuple, TypeVar
@@ -219,6 +220,7 @@ def solve_in_plane(
     max_steps: int,
     tolerance: float = TOLERANCE,
     few: int = 0,
+    patience: float = math.inf,
 ) -> NewtonResult:
     """Newton's method on the plane through a guess.
 
@@ -235,13 +237,16 @@ def solve_in_plane(
         relative to their swing.
     few : int
         Number of points that may be left unfinished.
+    patience : float
+        Steps without a smaller change than before, after which a point counts as failed.
     """
     orbit, t = guess, np.array(t, float)
     problem, direction = line(t)
     at = excitation_at(problem.load, orbit.stage_phases)
     error, steps = np.full(t.shape, np.inf), np.zeros(t.shape, int)
+    smallest, waited = error.copy(), steps.copy()
     for _ in range(max_steps):
-        going = error > tolerance
+        going = (error > tolerance) & (waited < patience)
         if going.sum() <= few:
             break
         equations = condensed(problem, orbit, direction, at=at)
@@ -254,24 +259,28 @@ def solve_in_plane(
         orbit, t = moved(orbit, t, change, shortened)
         size = np.where(np.isfinite(step.error), step.error, np.inf)
         error, steps = np.where(going, size, error), steps + going
+        waited = np.where(error < smallest, 0, waited + 1)
+        smallest = np.minimum(error, smallest)
         if direction is not None:
             problem, direction = line(t)
             at = excitation_at(problem.load, orbit.stage_phases)
     return NewtonResult(orbit, t, error, steps)
 
 
-def solve(problem: Problem, guess: Orbit, max_steps: int) -> NewtonResult:
-    """Newton's method at fixed parameters, NumPy arrays (points,)."""
+def solve(
+    problem: Problem, guess: Orbit, max_steps: int, patience: float = math.inf
+) -> NewtonResult:
+    """Newton's method at fixed parameters, NumPy arrays (points,); see `solve_in_plane`."""
     t = np.zeros(guess.nodes.shape[-1])
     few = FEW if len(t) > FEW else 0
     plane = Plane.of_fixed_parameters(guess)
     line = partial(_fixed, problem)
-    result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few)
+    result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few, patience=patience)
     # The last points of a chunk go on in a smaller one: a step takes as long as its points.
-    left = np.flatnonzero(result.error > TOLERANCE)
     taken = int(result.steps.max())
+    left = np.flatnonzero((result.error > TOLERANCE) & (result.steps == taken))
     if 0 < len(left) <= few and taken < max_steps:
-        again = partial(solve, max_steps=max_steps - taken)
+        again = partial(solve, max_steps=max_steps - taken, patience=patience)
         for part, rest in run_chunks(again, (problem, result.orbit), left, FEW):
             put(result, part, rest._replace(steps=rest.steps + taken))
     return result
@@ -319,6 +328,7 @@ def refined_orbit(
     intervals: int,
     read: Callable[[Problem, Orbit], T],
     rounds: int = _ROUNDS,
+    patience: float = math.inf,
 ) -> tuple[Orbit, T, Float]:
     """The orbit on an equidistributed mesh of `intervals`, what is read of it, and its error.
 
@@ -327,9 +337,9 @@ def refined_orbit(
     Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
     a finer one than the last iterate.
     """
-    first, result = _attempt(problem, guess, intervals)
+    first, result = _attempt(problem, guess, intervals, patience)
     mesh, points = jax.tree.map(np.copy, first), len(result.error)
-    again = partial(_attempt, intervals=intervals)
+    again = partial(_attempt, intervals=intervals, patience=patience)
     for _ in range(rounds - 1):
         left = np.flatnonzero(result.error >= ACCEPTED)
         # A failed attempt still improves the mesh where the orbit is steep.
@@ -340,10 +350,12 @@ def refined_orbit(
     return orbit, read(problem, orbit), result.error
 
 
-def _attempt(problem: Problem, guess: Orbit, intervals: int) -> tuple[Orbit, NewtonResult]:
+def _attempt(
+    problem: Problem, guess: Orbit, intervals: int, patience: float
+) -> tuple[Orbit, NewtonResult]:
     """The guess on a new mesh, and what Newton's method makes of it there."""
     mesh = remeshed(problem, guess, intervals)
-    return mesh, solve(problem, mesh, _NEWTON_STEPS)
+    return mesh, solve(problem, mesh, _NEWTON_STEPS, patience)
 
 
 def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:

@@ -5,6 +5,7 @@ An orbit is solved on finer and finer meshes until two of them agree.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import jax
@@ -175,7 +176,9 @@ Float = NDArray[np.float64]
 _GRADING, _NEWTON_STEPS = 0.5, 30
 
 
-def orbits_from_averaged_limit(problem: Problem, index: Indices) -> tuple[Orbit, Indices]:
+def orbits_from_averaged_limit(
+    problem: Problem, index: Indices, patience: float = math.inf
+) -> tuple[Orbit, Indices]:
     """Orbits by Newton's method from the averaged limit.
 
     Parameters
@@ -184,6 +187,8 @@ def orbits_from_averaged_limit(problem: Problem, index: Indices) -> tuple[Orbit,
         NumPy arrays with the points along the last axis.
     index : array of int
         Points to work on.
+    patience : float
+        Of Newton's method, see `asperity.orbit.mesh.newton.solve_in_plane`.
 
     Returns
     -------
@@ -194,16 +199,15 @@ def orbits_from_averaged_limit(problem: Problem, index: Indices) -> tuple[Orbit,
     """
     system, solved = problem.system, [index[:0]]
     orbit = Orbit.empty(scheme_for(system), system.size, FIRST_MESH, len(system.V))
-    for part, (first, error) in run_chunks(
-        _first_orbit, (problem,), index, mesh_chunk(system.size)
-    ):
+    begin = partial(_first_orbit, patience=patience)
+    for part, (first, error) in run_chunks(begin, (problem,), index, mesh_chunk(system.size)):
         good = error < ACCEPTED
         put(orbit, part[good], take(first, np.flatnonzero(good)))
         solved.append(part[good])
     return orbit, np.concatenate(solved)
 
 
-def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
+def _first_orbit(problem: Problem, patience: float) -> tuple[Orbit, Float]:
     """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
@@ -212,9 +216,9 @@ def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
     bare = Orbit.empty(GAUSS, size, FIRST_MESH, points)
     mesh = graded_mesh(FIRST_MESH, points, _GRADING)
     guess = bare._replace(mesh=mesh, centre=centre)
-    result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS)
+    result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS, patience)
     if not isinstance(system, QuasiStatic):
-        result = solve(problem, inertial_guess(problem, result.orbit), _NEWTON_STEPS)
+        result = solve(problem, inertial_guess(problem, result.orbit), _NEWTON_STEPS, patience)
     return result.orbit, result.error
 
 
