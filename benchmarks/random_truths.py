@@ -6,9 +6,9 @@
 Each table has 25 to 60 rows at two to four velocities of 0.1 to 100 um/s and one to three
 frequencies of 1 Hz to 1 kHz, with mu0, A, B, D0, eps_ratio (and lambda or alpha) drawn over a
 decade or two, 1 % noise in either part of the harmonics and 0.3 % in the mean; every second table
-is without phases. All of them are free. A minimum is missed if one begun at the truth is lower by 0.01.
-With --slow, each row has a velocity of 0.3 to 10 um/s and a frequency of 0.1 to 10 Hz of its own,
-amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as stable sliding needs.
+is without phases. All of them are free. A minimum is missed if one begun at the truth is lower by
+0.01. With --slow, each row has a velocity of 0.3 to 10 um/s and a frequency of 0.1 to 10 Hz of its
+own, amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as stable sliding needs.
 """
 
 from __future__ import annotations
