@@ -353,19 +353,20 @@ class LockInTerm(DataTerm):
         return Prediction(mean, steady, harmonics), outcome
 
     def _nearest(self, free: Mapping[str, float]) -> KnownOrbits:
-        """Orbits of the earlier call with the most similar parameters, to begin with and replace.
+        """Of each row the orbit of the earlier call with the most similar parameters that has one.
 
-        Not simply of the last one: a minimiser that has gone too far comes back.
+        They are what a call begins with and replaces. Not simply those of the last call: a
+        minimiser that has gone too far comes back.
         """
 
         def distance(visited: Mapping[str, float]) -> float:
             pairs = [(visited.get(n, v), v) for n, v in free.items()]
             return sum(((a - b) / max(abs(a), abs(b), 1e-300)) ** 2 for a, b in pairs)
 
-        if not self._visited:
-            return KnownOrbits(self.table.rows)
-        nearest = min(self._visited, key=lambda visited: distance(visited[0]))[1]
-        return nearest.picked(np.arange(self.table.rows))
+        result = KnownOrbits(self.table.rows)
+        for _, known in sorted(self._visited, key=lambda visited: distance(visited[0])):
+            result.complete(known)
+        return result
 
 
 def all_converged(outcome: NDArray[np.int64]) -> bool:

@@ -149,6 +149,17 @@ class KnownOrbits:
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
+    def complete(self, other: KnownOrbits) -> None:
+        """Take the orbits of points of which only another call knows one."""
+        index = np.flatnonzero(other.known & ~self.known)
+        if other.orbit is None or not len(index):
+            return
+        if self.orbit is None:
+            self.orbit = jax.tree.map(np.copy, other.orbit)
+        else:
+            put(self.orbit, index, take(other.orbit, index))
+        self.known[index] = True
+
     def picked(self, index: Indices) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
