@@ -128,6 +128,24 @@ def test_points_that_fail_keep_the_orbits_known_before():
     assert again.harmonics == pytest.approx(WHOLE(at(epsilon=few)).harmonics, rel=1e-9)
 
 
+def test_a_point_takes_the_orbit_of_another_call_only_where_it_has_none():
+    first, second = KnownOrbits(2), KnownOrbits(2)
+    DIRECT(at(epsilon=np.array([0.1, 0.9995])), first)  # the second is out of range
+    DIRECT(at(epsilon=EPSILON[1:3]), second)
+    assert first.known.tolist() == [True, False]
+    own, other = first.orbit.nodes[..., 0].copy(), second.orbit.nodes.copy()
+    first.complete(second)
+    assert first.known.all()
+    np.testing.assert_array_equal(first.orbit.nodes[..., 0], own)
+    np.testing.assert_array_equal(first.orbit.nodes[..., 1], other[..., 1])
+    empty = KnownOrbits(2)
+    empty.complete(KnownOrbits(2))
+    assert not empty.known.any()
+    empty.complete(second)
+    empty.orbit.nodes[:] = 0.0  # its own copy
+    np.testing.assert_array_equal(second.orbit.nodes, other)
+
+
 def test_points_out_of_range_are_named_so():
     values = DIRECT(at(epsilon=np.array([0.2, 0.9995])), KnownOrbits(2))
     assert values.outcome.tolist() == [Outcome.CONVERGED, Outcome.OUT_OF_RANGE]
