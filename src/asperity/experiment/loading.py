@@ -149,8 +149,8 @@ def elastic_length(
     rule = "hold two cycles of loading and unloading at least"
     advice = "record more, or choose the channel of the shear force"
     require(pairs.size >= 2, "elastic_length.trace", rule, pairs.size, advice)
-    doubt = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
-    return ElasticLength(float(pairs.mean()), doubt, pairs, float(1 / np.mean(slopes)))
+    uncertainty = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
+    return ElasticLength(float(pairs.mean()), uncertainty, pairs, float(1 / np.mean(slopes)))
 
 
 def _turning_points(force: Float) -> list[int]:

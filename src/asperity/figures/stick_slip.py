@@ -132,10 +132,10 @@ def draw_campaign(campaign: StickSlipCampaign) -> Figure:
         ends = np.array([row["regime"].endswith("steady sliding") for row in series.rows], bool)
         clear = np.array([row["regime"] in REPEATED for row in series.rows], bool)
         for axis, name in ((drops, "drop"), (times, "recurrence")):
-            y, doubt = series.column(name), series.column(f"{name}_uncertainty")
+            y, uncertainty = series.column(name), series.column(f"{name}_uncertainty")
             for some, face in ((clear, colours[k]), (~clear & ~ends, "white")):
                 if some.any():
-                    bars = NORMAL * np.nan_to_num(doubt[some])
+                    bars = NORMAL * np.nan_to_num(uncertainty[some])
                     axis.errorbar(
                         V[some], y[some], bars, fmt=_MARKS[k % len(_MARKS)], linewidth=0.9,
                         markerfacecolor=face, **look,

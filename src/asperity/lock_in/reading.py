@@ -278,7 +278,7 @@ def reading_of(
     powers = np.arange(1, first)
     across = (1 - (-1.0) ** powers)[:, None]
     variances = np.diagonal(covariance).clip(min=0)
-    doubts = np.sqrt([variances[1:first], variances[linear + fitted :][1:first]]).T
+    uncertainties = np.sqrt([variances[1:first], variances[linear + fitted :][1:first]]).T
     return LockInReading(
         W0=float(mean_load),
         epsilon=float(abs(relative[0, 0])),
@@ -291,7 +291,7 @@ def reading_of(
         covariance=jacobian @ covariance @ jacobian.T,
         dof=noise.dof,
         drift=(beta[1:first] * across).T,
-        drift_uncertainty=(doubts * across).T,
+        drift_uncertainty=(uncertainties * across).T,
         start=basis.centre - basis.half_width,
         end=basis.centre + basis.half_width,
         samples=int(blocks.count.sum()),

@@ -47,7 +47,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
     """
     reading = measurement.reading
     values = reading.observables()
-    doubts = {name: reading.uncertainty(name) for name in values}
+    uncertainties = {name: reading.uncertainty(name) for name in values}
     intervals = {name: reading.half_width(name) for name in values}
     joint = observable_covariance(measurement)
     if isfinite(measurement.delta_mu_interval_95):
@@ -58,7 +58,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
         **values,
         "static_friction": measurement.static_friction,
         "delta_mu": measurement.delta_mu,
-        "uncertainties": {**doubts, "delta_mu": measurement.delta_mu_uncertainty},
+        "uncertainties": {**uncertainties, "delta_mu": measurement.delta_mu_uncertainty},
         "intervals_95": intervals,
         "harmonics": _pairs(reading.harmonics),
         "load_harmonics": _pairs(reading.load_harmonics),
@@ -141,13 +141,13 @@ def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], Fl
         # The errors of the level at constant load are independent of all others.
         covariance[1, 1] = measurement.delta_mu_uncertainty**2
     # Phases that may be any have a bound on what is reported of them.
-    doubts = [
+    uncertainties = [
         measurement.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n)
         for n in names
     ]
     # A variance of zero may come out a round-off below it.
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    scale = np.divide(doubts, spread, out=np.zeros_like(spread), where=spread > 0)
+    scale = np.divide(uncertainties, spread, out=np.zeros_like(spread), where=spread > 0)
     covariance *= np.outer(scale, scale)
     return tuple(names), covariance
 

@@ -161,9 +161,9 @@ def measured_stiffness(
     bend, bend_se = _bend(u, t, F, slope, low, high)
     # Of the slope over the attenuated one: noise of the displacement has no part in the force.
     attenuation = (noise / spread) ** 2
-    doubt = max(abs(bend), bend_se) / (2 * math.sqrt(3))
+    bending = max(abs(bend), bend_se) / (2 * math.sqrt(3))
     K = slope / half / (1 - attenuation)
-    error = K * math.hypot(se / slope, attenuation, doubt)
+    error = K * math.hypot(se / slope, attenuation, bending)
     mean = float(weight.mean())
     return MeasuredStiffness(
         over_load=K / mean,

@@ -557,9 +557,11 @@ def _without_copies(table: LockInTable) -> LockInTable:
     dof = int(both.sum()) - degree - 1
     if dof < 1:
         return table
-    doubt = np.hypot(table.errors["mean_friction"][both], table.errors["delta_mu"][both])
-    smooth = np.polyval(np.polyfit(x - x.mean(), steady[both], degree, w=1 / doubt), x - x.mean())
-    if chdtr(dof, float(np.sum(((steady[both] - smooth) / doubt) ** 2))) > _SAME_NOISE:
+    uncertainty = np.hypot(table.errors["mean_friction"][both], table.errors["delta_mu"][both])
+    smooth = np.polyval(
+        np.polyfit(x - x.mean(), steady[both], degree, w=1 / uncertainty), x - x.mean()
+    )
+    if chdtr(dof, float(np.sum(((steady[both] - smooth) / uncertainty) ** 2))) > _SAME_NOISE:
         return table
     kept = np.where(both, np.nan, table.values["delta_mu"])
     values = {**table.values, "delta_mu": kept}
