@@ -18,7 +18,7 @@ if len(sys.argv) > 4:  # before anything counts the cores
     os.sched_setaffinity(0, map(int, sys.argv[4:]))
 from benchmarks.cases import batch
 from benchmarks.ours import respond
-from asperity.orbit.search import available_cores
+from asperity._processes import available_cores
 
 if __name__ == "__main__":
     law, points, repeats = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])

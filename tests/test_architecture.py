@@ -28,7 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "arrays": set(),
     "_jax": set(),
     "_lazy": set(),
-    "_processes": set(),
+    "_processes": {"errors"},
     "errors": set(),
     "units": {"errors", "_lazy"},
     "outputs": {"errors", "_lazy", "_version"},  # files of any content

@@ -132,7 +132,7 @@ def configure() -> Path | None:
         The folder of the cache, None without one.
     """
     jax.config.update("jax_enable_x64", True)
-    if not jax.config.jax_platforms and jax.config.jax_default_device is None:
+    if not any(getattr(jax.config, name) for name in ("jax_platforms", "jax_default_device")):
         jax.config.update("jax_default_device", "cpu")
     jax.monitoring.register_event_duration_secs_listener(_count)
     folder = _cache_folder()

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,25 @@ def test_a_table_has_a_row_for_each_part_and_a_reason_for_each_failure(
         assert data["phase1"].attrs["units"] == "rad"
         assert data["reason"].values[4] == rows[4]["reason"]
     assert {p.name for p in tmp_path.iterdir()} == {"broken.csv", "campaign.csv", "campaign.nc"}
+
+
+def test_a_campaign_of_which_a_process_ends_says_so_and_goes_on(amplitudes, tmp_path) -> None:
+    files = [tmp_path / f"{name}.csv" for name in "ab"]
+    part = b"".join(amplitudes.read_bytes().splitlines(keepends=True)[:14_000])
+    for file in files:
+        file.write_bytes(part)
+
+    def rows_of(path: Path) -> list:
+        if path.name == "b.csv":
+            os._exit(9)  # as the system ends a process for want of memory
+        return ROWS(path)
+
+    out = tmp_path / "campaign.csv"
+    with pytest.raises(InputError, match="jobs must be processes for which there is memory, got 2"):
+        run_campaign(files, rows_of, out, inputs=ROWS.inputs(), jobs=2)
+    assert not out.exists()
+    done = run_campaign(files, ROWS, out, inputs=ROWS.inputs(), resume=True, jobs=2)
+    assert (done.files, done.failed) == (2, 0)
 
 
 def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:

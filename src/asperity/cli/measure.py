@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity._processes import available_cores
 from asperity.cli.options import (
     field_option,
     law_option,
@@ -402,7 +403,6 @@ def _campaign(
     jobs: int | None,
     output: Output,
 ) -> int:
-    import os
 
     from asperity.cli.progress import bar
     from asperity.measurement.campaign import run_campaign
@@ -430,7 +430,7 @@ def _campaign(
             out,
             inputs=rows_of.inputs(),
             resume=resume,
-            jobs=jobs or os.cpu_count() or 1,
+            jobs=jobs or available_cores(),
             progress=update,
         )
     campaign = StickSlipCampaign.of(done.table)

@@ -150,7 +150,7 @@ def run(
 
 
 def _estimate(plan: Path, output: Output) -> int:
-    from asperity.orbit.search import available_cores
+    from asperity._processes import available_cores
     from asperity.outputs import size_text
     from asperity.study import dry_run
 

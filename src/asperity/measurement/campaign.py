@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
 import os
 import re
-import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from asperity._processes import process_pool
 from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
 from asperity.outputs import UnfinishedText, output_file, write_table, written_file
@@ -166,18 +164,8 @@ def _measured(
         for path in files:
             yield path, rows_of(path)
         return
-    # Fresh processes: a fork of one that runs threads may hang.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_ignore_interrupts)
-    try:
+    with process_pool(jobs, "jobs") as pool:
         yield from zip(files, pool.map(rows_of, files), strict=True)
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C is the main process's to answer."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def failed_row(path: Path, part: int, reason: str) -> Row:

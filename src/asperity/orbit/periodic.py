@@ -13,6 +13,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._processes import available_cores
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation
 from asperity.orbit.outcome import Outcome
@@ -20,7 +21,6 @@ from asperity.orbit.response import PeriodicResponse
 from asperity.orbit.search import (
     CHOICES,
     WORTHWHILE,
-    available_cores,
     chosen_methods,
     find_orbits,
     find_orbits_on_cores,

@@ -14,14 +14,13 @@ Worker processes are started once and kept; each loads the compiled programs fro
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from asperity._processes import ENVIRONMENT
+from asperity._processes import process_pool
 from asperity.errors import require
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following import BranchFollowing
@@ -148,13 +147,6 @@ _SLICE = 20_000
 WORTHWHILE = 200_000
 
 
-def available_cores() -> int:
-    """Cores this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def find_orbits_on_cores(
     problem: Problem,
     points: int,
@@ -166,23 +158,17 @@ def find_orbits_on_cores(
     methods: tuple[Method, ...],
 ) -> Solution:
     """`find_orbits` with the points divided among `workers` processes; same results and order."""
-    from loky import get_reusable_executor
-
     solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
     options = {"harmonics": harmonics, "phases": phases, "methods": methods}
-    executor = get_reusable_executor(max_workers=workers, env=ENVIRONMENT)
     slices = [np.arange(k, min(k + _SLICE, points)) for k in range(0, points, _SLICE)]
     problems = [take(problem, index) for index in slices]
-    try:
+    with process_pool(workers, "workers") as executor:
         results = executor.map(partial(_search, options=options), problems)
         for index, result in zip(slices, results, strict=True):
             # Orbits are not wanted here.
             for target, values in zip(solution[:-1], result[:-1], strict=True):
                 target[..., index] = values
             progress(len(index))
-    except BaseException:  # Ctrl-C included: the processes must be stopped
-        executor.shutdown(wait=False, kill_workers=True)
-        raise
     return solution
 
 

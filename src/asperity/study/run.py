@@ -17,11 +17,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from asperity._processes import available_cores
 from asperity._version import __version__
 from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works, load_from
-from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.parameters.toml_file import file_content

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -13,13 +11,11 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from asperity._processes import ENVIRONMENT
+from asperity._processes import ENVIRONMENT, kept_processes
 from asperity.errors import InputError, printable
 
 #: Seconds between counts of the workers of a scheduler.
 _RECOUNT = 5.0
-#: Seconds between checks of a worker process whether its driver still runs.
-_DRIVER_CHECK = 1.0
 
 
 class Workers(ABC):
@@ -67,16 +63,7 @@ class LocalProcesses(Workers):
         self._executor = self._start()
 
     def _start(self) -> Any:
-        from loky import get_reusable_executor
-
-        # loky does not fork: the fork of a process that runs JAX hangs.
-        return get_reusable_executor(
-            max_workers=self.count,
-            env=dict(ENVIRONMENT),
-            timeout=600,
-            initializer=_begin,
-            initargs=(os.getpid(),),
-        )
+        return kept_processes(self.count)
 
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
         """As in `Workers`."""
@@ -94,23 +81,6 @@ class LocalProcesses(Workers):
         """As in `Workers`; without `kill` idle processes stay ten minutes for the next sweep."""
         if kill:
             self._executor.shutdown(wait=False, kill_workers=True)
-
-
-def _begin(driver: int) -> None:
-    """Set up a worker of the process `driver`."""
-    from loky import process_executor
-
-    # loky restarts workers whose memory grows by 300 MB; here compiled programs take this memory.
-    process_executor._USE_PSUTIL = False
-    if os.name == "posix":
-        threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
-
-
-def _end_with(driver: int) -> None:
-    """End this process when its driver has ended; a killed driver cannot end its workers."""
-    while os.getppid() == driver:
-        time.sleep(_DRIVER_CHECK)
-    os._exit(1)
 
 
 class DaskWorkers(Workers):

@@ -6,9 +6,8 @@ density. Every chain has a key of its own: the draws do not depend on the number
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, wait
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -19,13 +18,12 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity._processes import ENVIRONMENT
+from asperity._processes import available_cores, process_pool
 from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
-from asperity.orbit.search import available_cores
 from asperity.outputs import Interrupted
 
 #: Logarithm of a density, of z and of arrays.
@@ -98,9 +96,10 @@ def sample_posterior(
     report = progress or (lambda done, total: None)
     try:
         report(done, total)
-        with _submitting(min(jobs or available_cores(), chains)) as submit:
+        # One thread each: the order of sums depends on threads.
+        with process_pool(min(jobs or available_cores(), chains), "jobs") as pool:
             waiting = {
-                submit(warmed_up, density, data, *_beginning(whitened, seed, chain)): chain
+                pool.submit(warmed_up, density, data, *_beginning(whitened, seed, chain)): chain
                 for chain in range(chains)
             }
             while waiting:
@@ -112,7 +111,7 @@ def sample_posterior(
                         kept[chain].append(transitions)
                     done += WARM_UP if transitions is None else BLOCK
                     if len(kept[chain]) < blocks:
-                        waiting[submit(next_block, density, data, state)] = chain
+                        waiting[pool.submit(next_block, density, data, state)] = chain
                 report(done, total)
     except KeyboardInterrupt:
         raise Interrupted() from None
@@ -230,20 +229,6 @@ def finite_density(log_density: LogDensity, data: Any) -> Callable[[Array], Arra
 
     density.defvjp(forward, lambda gradient, change: (change * gradient,))
     return density
-
-
-@contextmanager
-def _submitting(jobs: int) -> Iterator[Callable[..., Future]]:
-    """Submit work to processes with one thread each: the order of sums depends on threads."""
-    from loky import ProcessPoolExecutor
-
-    executor = ProcessPoolExecutor(max_workers=jobs, env=ENVIRONMENT)
-    finished = False
-    try:
-        yield executor.submit
-        finished = True
-    finally:
-        executor.shutdown(wait=finished, kill_workers=not finished)
 
 
 def require_bayes() -> None:

@@ -22,7 +22,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity._processes import ENVIRONMENT
+from asperity._processes import kept_processes
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.batches import mesh_chunk, run_chunks
@@ -259,10 +259,6 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
     return right, left, gap
 
 
-#: Time after which an idle process of the search ends (s); to start one takes seconds.
-_IDLE = 600
-
-
 def values_of(orbits: MeshOrbits, *, multipliers: bool) -> ResponseValues:
     """Response of converged orbits, NumPy arrays."""
     points = len(orbits.mean_friction)
@@ -342,10 +338,7 @@ def _in_another_process(function: Any, *arguments: Any) -> Any:
     A program of XLA for the CPU that calls another program may deadlock. The search therefore runs
     in a separate process, which starts at its first use.
     """
-    from loky import get_reusable_executor
-
-    executor = get_reusable_executor(max_workers=1, timeout=_IDLE, env=ENVIRONMENT)
-    return executor.submit(function, *arguments).result()
+    return kept_processes(1).submit(function, *arguments).result()
 
 
 def _response(
