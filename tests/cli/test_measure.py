@@ -299,7 +299,8 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--window", "12:4"], "--window must enclose"),
+        (["--window", "12:4"], "--window must end after it begins"),
+        (["--window", "4:4.001"], "--window must enclose"),
         (["--window", "10"], "--window must be START:END"),
         (["--exact-frequency"], "--exact-frequency must go with --frequency"),
         (["--unit", "N"], "--unit must be NAME=VALUE"),

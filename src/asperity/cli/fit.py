@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Count,
     field_option,
     law_options,
     option,
@@ -193,9 +194,9 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
 @_question_options(
     _field("windows"),
     switch("--posterior", "Sample the posterior (extra 'bayes')."),
-    option("--chains", "N", "Chains.", default=4, show_default=True),
-    option("--draws", "N", "Draws of each chain.", default=1000, show_default=True),
-    option("--seed", "N", "Of the draws.", default=0, show_default=True),
+    option("--chains", "N", "Chains.", Count(), default=4, show_default=True),
+    option("--draws", "N", "Draws of each chain.", Count(), default=1000, show_default=True),
+    option("--seed", "N", "Of the draws.", Count(), default=0, show_default=True),
     option("--out", "NC", "Where the draws go, for ArviZ.", Path),
 )
 def fit(

@@ -82,7 +82,7 @@ def map(
     assert out is not None
     output.require_picture()
     output_files({"--out": out, "--plot": output.plot})
-    along_x, along_y = Axis.parse(str(x), log_x), Axis.parse(str(y), log_y)
+    along_x, along_y = Axis.parse(str(x), log_x, "--x"), Axis.parse(str(y), log_y, "--y")
     # A material's number gives way to an axis; one that was given for this map does not.
     numbers = {
         name: number

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Count,
     field_option,
     law_option,
     material_option,
@@ -191,7 +192,7 @@ in place of numbers; 2: bad input.
     'like "run_k{K N/m}_v{V um/s}".',
 )
 @switch("--resume", "Go on with an interrupted table.")
-@option("--jobs", "N", "Processes of a table; as many as cores if not given.", click.IntRange(1))
+@option("--jobs", "N", "Processes of a table; as many as cores if not given.", Count(1))
 @option(
     "--thresholds",
     "CSV",

@@ -101,7 +101,7 @@ def run(
             advice = "describe its sensors or leave the option out"
             got = f"'{record}' and none"
             raise InputError("--record", "go with a [tribometer] in the protocol", got, advice)
-        check_path(record)
+        check_path(record, "--record")
     _check_room(wanted, out, text, record)
     with bar("ms", "motion") as update:
         done = run_protocol(

@@ -42,7 +42,7 @@ def path(name: str) -> Path:
         If there is no sample of this name.
     """
     if name not in names():
-        raise InputError(f"samples.name must be a sample, got '{name}'; {closest(name, names())}")
+        raise InputError("name", "be a sample", f"'{name}'", closest(name, names()))
     return _FOLDER / f"{name}.toml"
 
 

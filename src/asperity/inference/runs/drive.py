@@ -164,7 +164,7 @@ def _given_or_measured(
     if velocities is not None:
         if steps is None or len(velocities) != len(steps) + 1:
             got = f"{len(velocities)} for {len(steps or ())}"
-            raise InputError(f"{name}.velocities", "be one more than the steps", got, "give both")
+            raise InputError("velocities", "be one more than the steps", got, "give both")
         speeds = [float(v) for v in velocities]
         result = partition_at(time, displacement, np.array(steps), speeds)
         return result, list(result.velocities), list(result.holds)

@@ -22,7 +22,7 @@ from asperity.recording.readers.units import (
     split_labels,
     understood,
 )
-from asperity.recording.roles import ROLES, candidates, role_of
+from asperity.recording.roles import ROLES, candidates, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
@@ -141,8 +141,8 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
         if kind is not None and kind not in fitting:
             raise InputError(
                 Argument("columns", role),
-                f"be a {' or '.join(sorted(fitting))}",
-                f"'{name}', a {kind}",
+                f"be {nouns(fitting)}",
+                f"'{name}', {nouns([kind])}",
                 f"choose another column, or correct its unit with {Argument('units', name, '...')}",
             )
 
