@@ -230,7 +230,7 @@ def test_claims_as_json_and_csv(report):
 def test_summary(report):
     out, summary, _ = report
     assert (summary.folder, summary.page) == (out, out / "index.html")
-    assert (summary.figures, summary.failed) == (19, 0)
+    assert (summary.figures, summary.failed) == (20, 0)
     assert summary.points > 2000
     text = "\n".join(summary.lines())
     assert "4, of which 3 tests: 1 reproduced, 1 misprint, 1 differs" in text
