@@ -72,7 +72,7 @@ def in_labels(argument: Argument) -> str:
     elif name == "channels" and key:
         label = f"Channel {key}"
     elif name == "modulated":
-        return "Velocity steps and holds"
+        return f"What it is{': velocity steps and holds' if value == 'False' else ''}"
     else:
         label = _LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

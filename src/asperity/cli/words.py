@@ -26,6 +26,7 @@ _OPTIONS: Mapping[str, str] = {
     "slice.start and slice.end": "--window",
     "samples.seed": "--seed",
     "initial": "start.states",
+    "span": "--stiffness-from",
     **{name: f"--{name}" for name in ("workers", "cluster", "thresholds")},
 }
 

@@ -25,7 +25,7 @@ from pydantic import (
 from asperity.errors import InputError, MistakesError, closest, require
 from asperity.parameters.arguments import number, rising, shown as shown_value
 from asperity.parameters.toml_file import toml_content
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS
 
 T = TypeVar("T")
 
@@ -205,7 +205,7 @@ def _seconds(value: Any) -> float:
     """A time; a text without a unit is in seconds."""
     if isinstance(value, str) and not value.strip()[-1:].isalpha():
         value = f"{value} s"
-    return float(to_si(value, "time", ""))
+    return number(value, "", "time")
 
 
 def _span(value: Any) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from asperity.parameters.arguments import shown
 from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
+from asperity.recording.readers.missing import without_codes
 from asperity.recording.readers.raw import refuse_truncated
 from asperity.recording.readers.units import (
     Unit,
@@ -74,8 +75,10 @@ def assemble(
     for name, column in zip(names, recorded.columns, strict=True):
         if name in numbers and name != clock.column:
             unit, text = known.get(name), texts[name]
+            recorded_values, missing = without_codes(column.values, name)
+            findings += [missing] if missing else []
             channels[name] = Channel(
-                in_si(column.values, unit),
+                in_si(recorded_values, unit),
                 unit.kind if unit else None,
                 unit.si if unit else "",
                 column.label,
