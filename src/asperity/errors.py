@@ -243,6 +243,11 @@ def listed(names: Iterable[str], joint: str = ", ", most: int = 40) -> str:
     return joint.join(every[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
+def enumerated(names: Sequence[str]) -> str:
+    """Names in a sentence: "a", "a and b", "a, b and c"."""
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
 def printable(text: str, most: int = 600) -> str:
     """A text as one line that a terminal can show: control characters escaped, its end cut.
 

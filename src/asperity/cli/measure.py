@@ -305,7 +305,13 @@ def _one(
     with waiting(f"reading and measuring {recording.name}"):
         trace = read_source(recording, source)
         result, why = answer_measurement(trace, question)
-    say(why)
+    modulated = sum(part.modulated for part in getattr(result, "stretches", ()))
+    say(
+        why,
+        modulated > 1
+        and result.chosen_by == "program"
+        and f"1 of {modulated} modulated stretches is read; --amplitudes reads each",
+    )
     record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
     if hasattr(result, "regimes"):
         record_of = catalogue.stick_slip_record

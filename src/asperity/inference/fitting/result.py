@@ -16,7 +16,7 @@ from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
-from asperity.outputs.tables import rounded
+from asperity.outputs.tables import rounded, two_digits
 from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit
@@ -83,7 +83,7 @@ class Shown(NamedTuple):
 
     def error(self, se: float) -> str:
         """A standard error in SI as text."""
-        return f"{float(f'{se * 10.0**-self.power:.2g}'):g}"
+        return two_digits(se * 10.0**-self.power)
 
     def interval(self, ends: Interval) -> str:
         """An interval in SI in words; one that the data do not bound on either side is none."""

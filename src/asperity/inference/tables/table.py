@@ -211,8 +211,8 @@ def read_table(
     if not kept.any():
         raise InputError(
             f"{shown} must have lock-in readings, got none: every row is another kind of "
-            "measurement or has a reason why it could not be measured; measure a modulated "
-            "recording"
+            "measurement or has a reason why it could not be measured; fit the recordings "
+            "themselves, or measure modulated ones"
         )
     if not kept.all():
         remarks.append(
