@@ -304,7 +304,7 @@ def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) ->
     ("options", "message"),
     [
         ({"window": (5, 4)}, "window must end after it begins"),
-        ({"window": (90, 99)}, "window must end after it begins"),
+        ({"window": (90, 99)}, "window must enclose"),
         ({"detrend": "cubic"}, "detrend must be none, linear or quadratic"),
         ({"frequency": 900.0}, "frequency must lie within what the recording resolves"),
         ({"harmonics": 9}, "harmonics must lie below half the sampling rate"),

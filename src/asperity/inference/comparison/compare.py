@@ -311,8 +311,8 @@ def _without_numbers(not_compared: Mapping[str, str]) -> str:
     if not not_compared:
         return ""
     return (
-        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither free "
-        "nor given, or of samples."
+        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither "
+        "free nor given, or of samples."
     )
 
 
@@ -351,8 +351,8 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
 
     which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
     said = (
-        f"No law describes {enumerated(rows)} together with the other rows; check that measurement. "
-        f"With it, {which} are excluded. Without it: "
+        f"No law describes {enumerated(rows)} together with the other rows; check that "
+        f"measurement. With it, {which} are excluded. Without it: "
     )
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 
