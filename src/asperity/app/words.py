@@ -37,7 +37,7 @@ _LABELS: Mapping[str, str] = {
     "drift": "Friction also drifts over time",
     "profile": "Intervals by profile likelihood",
     "fit_rate": "Mean values per second for long recordings",
-    "velocities": "Velocities between the steps",
+    "velocities": "Velocities between steps",
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")

@@ -187,7 +187,7 @@ def test_a_code_for_a_missing_value_is_no_reading(recording, code):
     for k in (10, 11, 12, 30):
         rows[k] = f"{0.1 * k:.1f},{4 + 0.01 * (k % 3)},{code}"
     trace = read(recording("time (s),Ft (N),Fn (N)", *rows))
-    assert names(trace) == ["missing code", "nan"]
+    assert names(trace) == ["missing code", "missing values"]
     assert trace.findings[0].number == 4
     load, kept = trace.channels["Fn"].values, np.isfinite(trace.channels["Fn"].values)
     np.testing.assert_array_equal(np.flatnonzero(~kept), [10, 11, 12, 30])
