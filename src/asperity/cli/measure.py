@@ -22,7 +22,7 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.recording import listed_times, source_options, velocities_option
-from asperity.cli.report import Output, say
+from asperity.cli.report import Output, save_figure, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require
 
@@ -259,8 +259,8 @@ def measure(
     require(out or count == 1, "--out", rule, f"{count} without", advice)
     table, options = out or not (resume or jobs or thresholds), "--resume, --jobs and --thresholds"
     require(table, options, "go with --out", "no table", "name it or leave them out")
-    alone = not amplitudes or out or not (no_modulation or plot)
-    require(alone, "--amplitudes", "go without --no-modulation and --plot", "both", one)
+    alone = not (amplitudes and no_modulation)
+    require(alone, "--amplitudes", "go without --no-modulation", "both", one)
     rows_of = _file_rows(recordings, source, question, conditions)
     output.require_picture(*recordings)
     if out is not None:
@@ -283,6 +283,11 @@ def _amplitudes(recording: Path, source: Source, question: Question, output: Out
         lambda: {"recording": str(recording), "amplitudes": rows},
         lambda: amplitude_sections(rows, recording.name),
     )
+    if output.plot is not None:
+        from asperity.figures.recording import draw_amplitudes
+
+        save_figure(lambda: draw_amplitudes(rows), output.plot, output.names)
+        say(f"the figure is {output.plot}")
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 

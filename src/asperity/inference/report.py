@@ -11,7 +11,6 @@ from asperity.inference.fitting.result import NOT_DETERMINED, Estimate, Fit, Sho
 from asperity.inference.fitting.windows import WindowedFit
 from asperity.inference.holds.table import HoldTerm
 from asperity.inference.posterior import Posterior
-from asperity.inference.runs.levels import level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
@@ -68,11 +67,8 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
         ]
         known = abs(value) > _KNOWN_SIGN * error and all(value * other > 0 for other in others)
         sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
-    measured = level_change(
-        [rate for term in fit.objective.terms_of(RunTerm) for rate in term.run.level_rates]
-    )
-    if measured is not None:
-        value, error, steps = measured
+    if fit.level_change is not None:
+        value, error, steps = fit.level_change
         number, doubt = rounded(value, error)
         which = "its step" if steps == 1 else f"its {steps} steps"
         sentences.append(
