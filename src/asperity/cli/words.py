@@ -24,7 +24,7 @@ _OPTIONS: Mapping[str, str] = {
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
     "slice.start and slice.end": "--window",
-    "samples.seed": "--seed",
+    "seed": "--seed",
     "initial": "start.states",
     "span": "--stiffness-from",
     **{name: f"--{name}" for name in ("workers", "cluster", "thresholds")},

@@ -194,7 +194,7 @@ def read_table(
     path = Path(path)
     shown = name or path.name
     require_rereadable(path, "data")
-    with readable(path, "data"):
+    with readable(path, "data", "file"):
         text = file_content(path).decode("utf-8-sig")
         if path.suffix.lower() == ".json":
             return table_of(_given(_reading(shown, text), given), name=shown)
