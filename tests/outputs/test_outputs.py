@@ -275,6 +275,7 @@ def test_undisturbed_work_hands_back_results_and_errors() -> None:
         (0.6, 0.0104, ("0.600", "+- 0.010")),
         (-3.3e-4, 1.9e-4, ("-3.3e-04", "+- 1.9e-04")),
         (1.0, 0.0, ("1", "")),
+        (10.000018082865530, 1.5e-31, ("10.0000181", "")),
     ],
 )
 def test_an_uncertainty_has_two_digits_and_its_number_as_many(value, doubt, shown) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -135,9 +136,10 @@ def two_digits(doubt: float) -> str:
 def rounded(value: float, doubt: float) -> tuple[str, str]:
     """A number and its uncertainty, rounded to two uncertain digits.
 
-    The uncertainty is empty where it is unknown or zero.
+    The uncertainty is empty where it is unknown, or no more than the rounding of doubles.
     """
-    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
+    seen = doubt > 4 * sys.float_info.epsilon * abs(value)
+    if not (math.isfinite(doubt) and doubt > 0 and seen and math.isfinite(value)):
         return f"{value:.9g}", ""
     last = math.floor(math.log10(doubt)) - 1
     if value and (max(abs(value), doubt) < 1e-3 or abs(value) >= 1e6):
