@@ -186,7 +186,7 @@ def _gauges(table: LockInTable) -> str:
     return (
         f"{table.name}: noise leaves {error:.2g} rad to the phase at "
         f"{quantity_text(frequency, 'Hz', 3)}; a gauge or filter with a low-pass below "
-        f"{quantity_text(corner, 'Hz', 2)} turns it by more, which no uncertainty here holds"
+        f"{quantity_text(corner, 'Hz', 3)} turns it by more, which no uncertainty here holds"
     )
 
 
