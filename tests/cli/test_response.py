@@ -197,6 +197,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--plot", "no/map.png"), ["--plot must lie in a folder that exists"]),
         (("--out", "no/map.nc"), ["--out must lie in a folder that exists"]),
         (("--out", "."), ["--out must be the name of a file, got '.'"]),
+        (("--out", "map.csv"), ["--out must be a NetCDF file, got 'map.csv'"]),
     ],
 )
 def test_a_bad_question_to_a_map(asperity, tmp_path, monkeypatch, arguments, parts) -> None:

@@ -266,13 +266,12 @@ def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None)
         return
     from asperity.inference.posterior import require_bayes
     from asperity.inference.posterior.sampling import require_sizes
-    from asperity.outputs import output_file
+    from asperity.outputs import output_file, require_netcdf
 
     require_sizes(sampling["chains"], sampling["draws"])
     require_bayes()
     if out is not None:
-        netcdf, like = out.suffix.lower() == ".nc", "write it like --out posterior.nc"
-        require(netcdf, "--out", "be a NetCDF file", f"'{out}'", like)
+        require_netcdf(out, "--out", "posterior.nc")
         output_file(out, "--out", example="posterior.nc")
 
 

@@ -70,7 +70,7 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
-    from asperity.outputs import output_files
+    from asperity.outputs import output_files, require_netcdf
     from asperity.protocol import (
         ProtocolError,
         load_protocol,
@@ -87,6 +87,7 @@ def run(
         {"--out": out, "--csv": text, "--plot": output.plot, "--record": record},
         inputs={"protocol": protocol},
     )
+    require_netcdf(out, "--out", "run.nc")
     try:
         wanted = load_protocol(protocol)
     except ProtocolError as error:

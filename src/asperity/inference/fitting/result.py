@@ -176,7 +176,7 @@ class Fit(Drawn):
 
     @property
     def level_change(self) -> LevelChange | None:
-        """d mu/d ln V by the steady friction of the recordings, measured without a law."""
+        """D mu/d ln V by the steady friction of the recordings, measured without a law."""
         runs = [term.run for term in self.objective.terms_of(RunTerm)]
         return level_change([rate for run in runs for rate in run.level_rates])
 
