@@ -190,7 +190,7 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
     return with_options
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Fit a law to recordings, readings or holds.")
 @_question_options(
     _field("windows"),
     switch("--posterior", "Sample the posterior (extra 'bayes')."),
@@ -302,7 +302,7 @@ if its AICc exceeds the lowest by 10 or more.
 """
 
 
-@click.command(epilog=_EPILOG_OF_COMPARE)
+@click.command(epilog=_EPILOG_OF_COMPARE, short_help="Say which laws the data exclude.")
 @_question_options(click.option("--windows", hidden=True, metavar="SPANS"))
 def compare(
     laws: tuple[str, ...],

@@ -33,7 +33,7 @@ bifurcation and the frequency of its mode.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Response and stability over any two numbers.")
 @option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".')
 @option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".')
 @point_options

@@ -137,7 +137,7 @@ in place of numbers; 2: bad input.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Friction in recordings: steps, holds, slips, harmonics.")
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @output_options(plot=True)
 @field_option(

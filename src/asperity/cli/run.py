@@ -46,7 +46,7 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="The motion of a slider in an experiment.")
 @click.argument("protocol", type=Path)
 @option("--out", "NC", "Where the motion goes.", Path, required=True)
 @output_options(plot=True)
