@@ -63,8 +63,10 @@ def in_labels(argument: Argument) -> str:
         name = field
     elif head in _OF_DATA:
         name = field
-    if name in ("numbers", "fixed", "start") and key:
+    if name in ("numbers", "start") and key:
         label = key
+    elif name == "fixed" and key:
+        label = f"Fixed numbers, {key}"
     elif name in ("columns", "Trace.channel") and key:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
