@@ -50,7 +50,7 @@ def in_python(argument: Argument) -> str:
         return f"{name}['{key}']" if key else name
     if name == "numbers" and key:
         return f"'{key}={value}'"
-    shown = value if value.isdigit() or value in ("...", "False") else f"'{value}'"
+    shown = value if value.isdigit() or value in ("...", "True", "False") else f"'{value}'"
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
 
 
@@ -140,6 +140,10 @@ class ConstantLoadError(InputError):
     """A recording that is to have a modulated load has a constant one."""
 
 
+#: Mistakes that a message lists: a wrong file may hold one a row.
+_MISTAKES_SHOWN = 20
+
+
 class MistakesError(InputError):
     """Several mistakes in one file or object, in one message.
 
@@ -170,8 +174,12 @@ class MistakesError(InputError):
         where = f" (in '{self.source}')" if self.source else ""
         if len(self.errors) == 1:
             return f"{self.errors[0]}{where}"
-        numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(self.errors, start=1))
-        return f"{self.subject} must be free of mistakes, got {len(self.errors)}{where}: {numbered}"
+        first = self.errors[:_MISTAKES_SHOWN]
+        numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(first, start=1))
+        more = len(self.errors) - len(first)
+        rest = f"; and {more} more" if more else ""
+        count = f"{len(self.errors)}{where}"
+        return f"{self.subject} must be free of mistakes, got {count}: {numbered}{rest}"
 
 
 @contextmanager
@@ -233,6 +241,11 @@ def listed(names: Iterable[str], joint: str = ", ", most: int = 40) -> str:
     every = list(names)
     rest = len(every) - most
     return joint.join(every[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Names in a sentence: "a", "a and b", "a, b and c"."""
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def printable(text: str, most: int = 600) -> str:

@@ -629,7 +629,7 @@ def test_velocities_are_given_where_no_channel_has_the_motion(visit, barriers, s
     card.locator("summary", has_text="Channels").click()
     for label, text in (
         ("Velocity steps (s)", "2, 3"),
-        ("Velocities between the steps", "1 um/s, 10 um/s, 1 um/s"),
+        ("Velocities between steps", "1 um/s, 10 um/s, 1 um/s"),
     ):
         field = card.get_by_label(label)
         field.fill(text)

@@ -141,7 +141,7 @@ def test_the_first_grid_does_not_wait_for_the_boundary(monkeypatch):
         ({"x": {"name": "epsilon", "low": 0.5, "high": 0.1}}, "smaller to a larger"),
         ({"x": {"name": "no", "low": 0, "high": 1}}, "axis must be a number"),
         ({"count": 100_000}, "count must be"),
-        ({"show": "__class__"}, "map.show must be"),
+        ({"show": "__class__"}, "show must be"),
         ({"air": {}}, "map.air must be left out"),
     ],
 )

@@ -284,7 +284,10 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
     result = asperity("measure", recording, "--amplitudes", "--json")
     (row,) = record(result)["amplitudes"]
     assert row["epsilon"] == pytest.approx(EPSILON, rel=1e-3)
-    assert "delta_mu" in asperity("measure", recording, "--amplitudes").stdout
+    picture = tmp_path / "amplitudes.png"
+    result = asperity("measure", recording, "--amplitudes", "--plot", picture)
+    assert "delta_mu" in result.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
     out = tmp_path / "table.csv"
     constant = tmp_path / "constant.csv"
     rows = [f"{i * 1e-3:.3f},7,{2.8 + 0.01 * (i % 7)}" for i in range(500)]
@@ -299,7 +302,8 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--window", "12:4"], "--window must enclose"),
+        (["--window", "12:4"], "--window must end after it begins"),
+        (["--window", "4:4.001"], "--window must enclose"),
         (["--window", "10"], "--window must be START:END"),
         (["--exact-frequency"], "--exact-frequency must go with --frequency"),
         (["--unit", "N"], "--unit must be NAME=VALUE"),

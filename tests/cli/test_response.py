@@ -186,7 +186,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (("--x", "K"), ["axis must be NAME=LOW:HIGH:COUNT UNIT, got 'K'"]),
+        (("--x", "K"), ["--x must be NAME=LOW:HIGH:COUNT UNIT, got 'K'"]),
         (("--x", "K=1:2:5"), ["axis of K must carry a unit"]),
         (("--x", "epsilon=0:0.4:5", "--log-x"), ["must start above zero to be logarithmic"]),
         (("--x", "K=0.1:0.3:5 N/um"), ["axes must be two numbers, got 'K' on both"]),
@@ -197,6 +197,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--plot", "no/map.png"), ["--plot must lie in a folder that exists"]),
         (("--out", "no/map.nc"), ["--out must lie in a folder that exists"]),
         (("--out", "."), ["--out must be the name of a file, got '.'"]),
+        (("--out", "map.csv"), ["--out must be a NetCDF file, got 'map.csv'"]),
     ],
 )
 def test_a_bad_question_to_a_map(asperity, tmp_path, monkeypatch, arguments, parts) -> None:

@@ -176,3 +176,11 @@ def test_a_warning_is_a_line_without_a_path(monkeypatch, capsys) -> None:
         "(overflow encountered in square)",
         "asperity: warning: a library has its say",
     ]
+
+
+@pytest.mark.parametrize("command", [(), ("sweep",)])
+def test_no_line_of_a_list_of_commands_is_cut(asperity, command) -> None:
+    lines = asperity(*command, "--help").stdout.splitlines()
+    listed = lines[lines.index("Commands:") + 1 :]
+    assert len(listed) > 5
+    assert not [line for line in listed if line.rstrip().endswith("...")]

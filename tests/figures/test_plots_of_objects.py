@@ -8,6 +8,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.figures.recording import draw_amplitudes
 from asperity.loads import Hold, Programme, Slide
 
 PMMA = asp.materials.load("bureau2000")
@@ -103,3 +104,20 @@ def test_stick_slip_over_the_velocity_is_drawn_as_its_numbers_and_one_point_as_i
     stiff = asp.Slider(law, spring="1 kN/um", load="10 kN", mass="10 kg")
     with pytest.raises(InputError, match="must show a cycle, got no stick-slip"):
         asp.experiment.stick_slip_response(stiff, velocity="10 um/s").plot()
+
+
+def test_amplitudes_are_drawn_over_the_load_with_bars_of_95_percent():
+    columns = {"epsilon": 0.1, "mean_friction": 0.5, "mu1": 2e-3, "mu2": 1e-4}
+    row = {**columns, **{f"{n}_uncertainty": 0.01 * v for n, v in columns.items()}, "reason": ""}
+    rows = [
+        {**row, "static_friction": 0.52},
+        {**row, "epsilon": 0.2, "mean_friction": 0.4},
+        {"reason": "too short"},
+    ]
+    mean, harmonics = draw_amplitudes(rows).axes
+    (friction,) = mean.containers
+    assert friction.lines[0].get_xydata().tolist() == [[0.1, 0.5], [0.2, 0.4]]
+    ends = friction.lines[2][0].get_segments()[0]
+    assert np.ptp(ends[:, 1]) == pytest.approx(2 * 1.96 * 0.005)
+    assert mean.lines[-1].get_xydata().tolist() == [[0.0, 0.52]]
+    assert [c.get_label() for c in harmonics.containers] == [r"$\mu_1$", r"$\mu_2$"]

@@ -192,7 +192,7 @@ PLANTED = {
     "saturation": (saturated, None, "saturation", {"bad"}),
     "unsteady exciter": (unsteady, None, "leakage", {"bad"}),
     "gap": (with_gap, (10, 20), "gap", {"suspicious"}),
-    "missing values": (with_nan, (10, 20), "nan", {"suspicious"}),
+    "missing values": (with_nan, (10, 20), "missing values", {"suspicious"}),
     "coarse steps": (coarse, None, "resolution", {"bad"}),
     "noise": (noisy, None, "signal", {"bad", "suspicious"}),
     "transient": (lambda *a: a, (6.3, 14), "transient", {"bad"}),
@@ -234,7 +234,7 @@ def test_defects_outside_the_window_are_avoided(truth, protocol, trace) -> None:
     assert found.reading.start >= 10.6
     assert found.verdict == "ok"
     # They are reported all the same.
-    assert "nan" in {finding.name for finding in found.samples.findings}
+    assert "missing values" in {finding.name for finding in found.samples.findings}
     assert found.samples.dropped == 100
 
 
@@ -303,7 +303,7 @@ def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) ->
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"window": (5, 4)}, "window must enclose"),
+        ({"window": (5, 4)}, "window must end after it begins"),
         ({"window": (90, 99)}, "window must enclose"),
         ({"detrend": "cubic"}, "detrend must be none, linear or quadratic"),
         ({"frequency": 900.0}, "frequency must lie within what the recording resolves"),

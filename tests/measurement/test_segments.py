@@ -203,7 +203,7 @@ def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
             measure_sliding(trace, steps=steps)
     with pytest.raises(InputError, match="at least 4 samples between"):
         measure_sliding(trace, steps=[20.0, 20.01])
-    with pytest.raises(InputError, match="must end after they begin"):
+    with pytest.raises(InputError, match="must end after it begins"):
         measure_sliding(trace, holds=[(30.0, 20.0)])
 
 

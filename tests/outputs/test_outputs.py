@@ -18,6 +18,7 @@ from asperity.outputs import (
     undisturbed,
     written_file,
 )
+from asperity.outputs.tables import rounded
 
 
 def a_folder(path: Path) -> None:
@@ -264,3 +265,18 @@ def test_undisturbed_work_hands_back_results_and_errors() -> None:
     assert undisturbed(lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
         undisturbed(lambda: 1 / 0)
+
+
+@pytest.mark.parametrize(
+    ("value", "doubt", "shown"),
+    [
+        (12.2, 0.1, ("12.20", "+- 0.10")),
+        (701.0, 120.0, ("701", "+- 120")),
+        (0.6, 0.0104, ("0.600", "+- 0.010")),
+        (-3.3e-4, 1.9e-4, ("-3.3e-04", "+- 1.9e-04")),
+        (1.0, 0.0, ("1", "")),
+        (10.000018082865530, 1.5e-31, ("10.0000181", "")),
+    ],
+)
+def test_an_uncertainty_has_two_digits_and_its_number_as_many(value, doubt, shown) -> None:
+    assert rounded(value, doubt) == shown

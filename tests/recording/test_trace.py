@@ -108,9 +108,9 @@ def test_missing_and_infinite_values(rng):
     load[[3, 77, 1999]] = np.nan
     load[50] = np.inf
     result = found(trace_of(time, W=load))
-    assert set(result) == {"nan", "infinite"}
-    assert result["nan"].number == 3
-    assert result["nan"].where == "W, row 3, t = 5.003 s"
+    assert set(result) == {"missing values", "infinite"}
+    assert result["missing values"].number == 3
+    assert result["missing values"].where == "W, row 3, t = 5.003 s"
     assert result["infinite"].number == 1
 
 
@@ -118,15 +118,15 @@ def test_a_time_that_is_missing_is_an_error(rng):
     time, load = clean(rng)
     time[10] = np.nan
     result = found(trace_of(time, W=load))
-    assert result["nan"].severity == "error"
+    assert result["missing values"].severity == "error"
     assert trace_of(time).sample_rate is None
 
 
 def test_a_channel_without_any_value_is_an_error(rng):
     time, _ = clean(rng)
     result = found(trace_of(time, W=np.full(N, np.nan)))
-    assert list(result) == ["nan"]
-    assert result["nan"].severity == "error"
+    assert list(result) == ["missing values"]
+    assert result["missing values"].severity == "error"
 
 
 @pytest.mark.parametrize(("side", "rate"), [(1, 1.0), (-1, 12.3), (1, 120.0)])
@@ -233,7 +233,7 @@ def test_a_slice_is_half_open_and_checked_anew(rng):
     assert first.time[-1] == time[999]
     assert len(first) == 1000
     assert [f.name for f in first.findings] == ["truncated"]
-    assert [f.name for f in whole.slice("6 s").findings] == ["truncated", "nan"]
+    assert [f.name for f in whole.slice("6 s").findings] == ["truncated", "missing values"]
     assert np.array_equal(whole.slice(5.5, 6).channels["W"].values, load[500:1000])
     with pytest.raises(InputError, match=r"must enclose samples.* runs from 5 s to 6.999 s"):
         whole.slice(10, 11)
@@ -255,7 +255,7 @@ def test_the_dataset_carries_units_findings_and_provenance(rng):
     assert data.W.attrs["units"] == "N"
     assert data.time.attrs["units"] == "s"
     assert np.array_equal(data.W.values, load, equal_nan=True)
-    assert "nan (W, row 5" in data.attrs["findings"]
+    assert "missing values (W, row 5" in data.attrs["findings"]
     assert json.loads(data.attrs["provenance"]) == {"file": "x.csv"}
 
 

@@ -37,7 +37,7 @@ _LABELS: Mapping[str, str] = {
     "drift": "Friction also drifts over time",
     "profile": "Intervals by profile likelihood",
     "fit_rate": "Mean values per second for long recordings",
-    "velocities": "Velocities between the steps",
+    "velocities": "Velocities between steps",
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
@@ -63,8 +63,10 @@ def in_labels(argument: Argument) -> str:
         name = field
     elif head in _OF_DATA:
         name = field
-    if name in ("numbers", "fixed", "start") and key:
+    if name in ("numbers", "start") and key:
         label = key
+    elif name == "fixed" and key:
+        label = f"Fixed numbers, {key}"
     elif name in ("columns", "Trace.channel") and key:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
@@ -72,7 +74,7 @@ def in_labels(argument: Argument) -> str:
     elif name == "channels" and key:
         label = f"Channel {key}"
     elif name == "modulated":
-        return "Velocity steps and holds"
+        return f"What it is{': velocity steps and holds' if value == 'False' else ''}"
     else:
         label = _LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

@@ -17,7 +17,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.report import Output, say
 from asperity.errors import require
-from asperity.parameters.arguments import one_of
+from asperity.parameters.arguments import number, one_of
 
 if TYPE_CHECKING:
     from asperity.air import AirLayer
@@ -76,7 +76,6 @@ def air(
     against the load, |gamma R| of the layer and its stiffness.
     """
     from asperity.air import AirLayer
-    from asperity.units import to_si
 
     if sought is not None:
         one_of(sought, ("radius", "gap"), "--for")
@@ -89,7 +88,7 @@ def air(
     require(one, "--inverse", "have one frequency", count, "call once for each")
     unknown = {"radius": "R", "gap": "h0"}.get(sought or "", "")
     numbers = _numbers(settings_of(settings), material_named(material), vacuum, unknown)
-    hertz = [float(to_si(text, "frequency", "frequency")) for text in frequencies]
+    hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
     contact = {name: numbers[name] for name in _CONTACT}
     layer = None
     if not vacuum:
@@ -100,7 +99,7 @@ def air(
         _forward(hertz, contact, layer, numbers, output)
         return 0
     assert layer is not None
-    ratio = float(to_si(inverse, "dimensionless", "--inverse"))
+    ratio = number(inverse, "--inverse", "dimensionless", "positive")
     return _invert(ratio, unknown, hertz[0], contact, layer, numbers, output)
 
 
@@ -108,14 +107,20 @@ def _numbers(
     given: dict[str, str], material: Material | None, vacuum: bool, unknown: str
 ) -> dict[str, float]:
     """SI values of the parameters; the one that is sought need not be known."""
-    from asperity.units import KINDS, to_si
+    from asperity.units import KINDS
 
     chosen = _CONTACT if vacuum else _LAYER | _CONTACT
     for name, text in given.items():
         needless = vacuum and name in _LAYER
-        require(not needless, name, "not be given with --vacuum", f"'{text}'", "leave one out")
-        one_of(name, chosen, "parameter")
-    numbers = {n: float(to_si(text, chosen[n][0], f"air.{n}")) for n, text in given.items()}
+        require(
+            not needless,
+            f"--set {name}",
+            "not be given with --vacuum",
+            f"'{text}'",
+            "leave one out",
+        )
+        one_of(name, chosen, "--set")
+    numbers = {n: number(text, f"--set {n}", chosen[n][0], "positive") for n, text in given.items()}
     for name, (_, published) in chosen.items():
         if name not in numbers and material is not None and published in material:
             numbers[name] = material[published].si

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import option, output_options
+from asperity.cli.options import Count, option, output_options
 from asperity.cli.report import Output
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ line by line, examples/load_on_age.toml is one.
     "--simulate",
     "N",
     "Fit N synthetic sets of readings and compare the spread of the estimates.",
-    click.IntRange(0, 100_000),
+    Count(0),
     default=0,
 )
 @option("--csv table", "CSV", "Write the points as a table for `response`.", Path)

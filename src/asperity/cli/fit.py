@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Count,
     field_option,
     law_options,
     option,
@@ -189,13 +190,13 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
     return with_options
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Fit a law to recordings, readings or holds.")
 @_question_options(
     _field("windows"),
     switch("--posterior", "Sample the posterior (extra 'bayes')."),
-    option("--chains", "N", "Chains.", default=4, show_default=True),
-    option("--draws", "N", "Draws of each chain.", default=1000, show_default=True),
-    option("--seed", "N", "Of the draws.", default=0, show_default=True),
+    option("--chains", "N", "Chains.", Count(), default=4, show_default=True),
+    option("--draws", "N", "Draws of each chain.", Count(), default=1000, show_default=True),
+    option("--seed", "N", "Of the draws.", Count(), default=0, show_default=True),
     option("--out", "NC", "Where the draws go, for ArviZ.", Path),
 )
 def fit(
@@ -265,13 +266,12 @@ def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None)
         return
     from asperity.inference.posterior import require_bayes
     from asperity.inference.posterior.sampling import require_sizes
-    from asperity.outputs import output_file
+    from asperity.outputs import output_file, require_netcdf
 
     require_sizes(sampling["chains"], sampling["draws"])
     require_bayes()
     if out is not None:
-        netcdf, like = out.suffix.lower() == ".nc", "write it like --out posterior.nc"
-        require(netcdf, "--out", "be a NetCDF file", f"'{out}'", like)
+        require_netcdf(out, "--out", "posterior.nc")
         output_file(out, "--out", example="posterior.nc")
 
 
@@ -302,7 +302,7 @@ if its AICc exceeds the lowest by 10 or more.
 """
 
 
-@click.command(epilog=_EPILOG_OF_COMPARE)
+@click.command(epilog=_EPILOG_OF_COMPARE, short_help="Say which laws the data exclude.")
 @_question_options(click.option("--windows", hidden=True, metavar="SPANS"))
 def compare(
     laws: tuple[str, ...],

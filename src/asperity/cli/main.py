@@ -15,11 +15,13 @@ from asperity.cli.shell import Shell
 
 _EPILOG = """\b
 Examples:
+  asperity samples velocity_steps --out steps.csv
+  asperity measure steps.csv
+  asperity fit steps.csv --plot fit.png
   asperity reproduce --out report
   asperity response --law elasto-plastic --material bureau2000 \\
       -V "1 um/s" -e 0.24 -f "120 Hz" --json
   asperity response --table points.csv --out responses.csv --material bureau2000
-  asperity measure recording.csv --json --plot recording.png
   asperity run protocol.toml --out run.nc --plot run.png
   asperity map --law elasto-plastic --material bureau2000 -V "1 um/s" -f "120 Hz" \\
       --x "epsilon=0.01:0.5:200" --y "K=0.05:0.5:200 N/um" --out map.nc --plot map.png
@@ -55,10 +57,10 @@ Examples:
 @click.version_option(__version__, prog_name="asperity")
 @click.pass_context
 def main(context: click.Context) -> None:
-    """Friction of a slider under a modulated normal load.
+    """Friction of sliding contacts: predict it, measure it in recordings, fit laws to it.
 
-    Laws, periodic responses with their stability, the squeezed air layer, and the paper they come
-    from (Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810, 2000).
+    Responses to modulated loads and to velocity steps, stick-slip, maps, a virtual tribometer, and
+    the paper it starts from (Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810, 2000).
 
     A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI
     numbers, or have units in their headings.

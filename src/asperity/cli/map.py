@@ -33,7 +33,7 @@ bifurcation and the frequency of its mode.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Response and stability over any two numbers.")
 @option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".')
 @option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".')
 @point_options
@@ -68,7 +68,7 @@ def map(
     from asperity.cli.progress import bar
     from asperity.figures.map import draw_map
     from asperity.operating_point import offered_numbers
-    from asperity.outputs import output_files
+    from asperity.outputs import output_files, require_netcdf
     from asperity.outputs.tables import Section
     from asperity.study.map import SHOWN, Axis, write_map
 
@@ -82,7 +82,8 @@ def map(
     assert out is not None
     output.require_picture()
     output_files({"--out": out, "--plot": output.plot})
-    along_x, along_y = Axis.parse(str(x), log_x), Axis.parse(str(y), log_y)
+    require_netcdf(out, "--out", "map.nc")
+    along_x, along_y = Axis.parse(str(x), log_x, "--x"), Axis.parse(str(y), log_y, "--y")
     # A material's number gives way to an axis; one that was given for this map does not.
     numbers = {
         name: number

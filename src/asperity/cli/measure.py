@@ -11,6 +11,7 @@ import click
 
 from asperity._processes import available_cores
 from asperity.cli.options import (
+    Count,
     field_option,
     law_option,
     material_option,
@@ -22,7 +23,7 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.recording import listed_times, source_options, velocities_option
-from asperity.cli.report import Output, say
+from asperity.cli.report import Output, save_figure, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require
 
@@ -137,7 +138,7 @@ in place of numbers; 2: bad input.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Friction in recordings: steps, holds, slips, harmonics.")
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @output_options(plot=True)
 @field_option(
@@ -192,7 +193,7 @@ in place of numbers; 2: bad input.
     'like "run_k{K N/m}_v{V um/s}".',
 )
 @switch("--resume", "Go on with an interrupted table.")
-@option("--jobs", "N", "Processes of a table; as many as cores if not given.", click.IntRange(1))
+@option("--jobs", "N", "Processes of a table; as many as cores if not given.", Count(1))
 @option(
     "--thresholds",
     "CSV",
@@ -259,8 +260,8 @@ def measure(
     require(out or count == 1, "--out", rule, f"{count} without", advice)
     table, options = out or not (resume or jobs or thresholds), "--resume, --jobs and --thresholds"
     require(table, options, "go with --out", "no table", "name it or leave them out")
-    alone = not amplitudes or out or not (no_modulation or plot)
-    require(alone, "--amplitudes", "go without --no-modulation and --plot", "both", one)
+    alone = not (amplitudes and no_modulation)
+    require(alone, "--amplitudes", "go without --no-modulation", "both", one)
     rows_of = _file_rows(recordings, source, question, conditions)
     output.require_picture(*recordings)
     if out is not None:
@@ -283,6 +284,11 @@ def _amplitudes(recording: Path, source: Source, question: Question, output: Out
         lambda: {"recording": str(recording), "amplitudes": rows},
         lambda: amplitude_sections(rows, recording.name),
     )
+    if output.plot is not None:
+        from asperity.figures.recording import draw_amplitudes
+
+        save_figure(lambda: draw_amplitudes(rows), output.plot, output.names)
+        say(f"the figure is {output.plot}")
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 
@@ -305,7 +311,13 @@ def _one(
     with waiting(f"reading and measuring {recording.name}"):
         trace = read_source(recording, source)
         result, why = answer_measurement(trace, question)
-    say(why)
+    modulated = sum(part.modulated for part in getattr(result, "stretches", ()))
+    say(
+        why,
+        modulated > 1
+        and result.chosen_by == "program"
+        and f"1 of {modulated} modulated stretches is read; --amplitudes reads each",
+    )
     record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
     if hasattr(result, "regimes"):
         record_of = catalogue.stick_slip_record

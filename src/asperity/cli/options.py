@@ -14,6 +14,7 @@ from asperity.cli.report import CHOSEN_NAMES, Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError, require
 from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
+from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -24,18 +25,29 @@ Decorator = Callable[[Command], Command]
 
 
 class Count(click.ParamType):
-    """A whole number; its limits are those of the question or the function that takes it."""
+    """A whole number.
+
+    Parameters
+    ----------
+    least : int, optional
+        Without it the limits are those of the question or the function that takes the number.
+    """
 
     name = "N"
 
+    def __init__(self, least: int | None = None) -> None:
+        self.least = least
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: Any) -> int:
         """The number that a text is."""
+        option, advice = "" if param is None else param.opts[0], "correct the value"
         try:
-            return int(value)
+            count = int(value)
         except ValueError:
-            option = "" if param is None else param.opts[0]
-            rule = "be a whole number"
-            raise InputError(option, rule, f"'{value}'", "correct the value") from None
+            raise InputError(option, "be a whole number", f"'{value}'", advice) from None
+        within = self.least is None or count >= self.least
+        require(within, option, f"be at least {self.least}", value, advice)
+        return count
 
 
 class FieldOption(click.Option):
@@ -149,13 +161,14 @@ _OUTPUT = (
     option("--plot", "PNG", "Where a figure goes.", Path),
     option(
         "--names",
-        None,
+        "|".join(NAMES),
         "Names on screen, in figures and options: A, B, D0, K/W0, or geophysics: a, b, D_c, "
         "k/sigma_n.",
-        click.Choice(NAMES),
         default=NAMES[0],
         is_eager=True,
-        callback=lambda context, option, names: context.meta.setdefault(CHOSEN_NAMES, names),
+        callback=lambda context, option, names: context.meta.setdefault(
+            CHOSEN_NAMES, one_of(names, NAMES, "--names")
+        ),
     ),
     switch("--json as_json", "Print JSON instead of text."),
 )

@@ -32,7 +32,7 @@ the first oscillations, frequency_err. They give A, B and D0.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Parameters by the steps of a paper.")
 @click.argument("paper")
 @click.argument("readings", nargs=-1, required=True, type=Path)
 @option("--thresholds", "CSV", "Table of bifurcations.", Path, required=True)
@@ -91,7 +91,10 @@ def _section(result: RecipeResult) -> Section:
     return Section("", head=head, rows=tuple(rows), warnings=tuple(result.warnings))
 
 
-@click.command(epilog="Example: asperity reproduce --out report")
+@click.command(
+    epilog="Example: asperity reproduce --out report",
+    short_help="Reproduce a paper, statement by statement.",
+)
 @click.argument("paper", required=False)
 @option("--out", "DIR", "Folder for the report; made if absent.", Path, required=True)
 @option(

@@ -46,7 +46,7 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="The motion of a slider in an experiment.")
 @click.argument("protocol", type=Path)
 @option("--out", "NC", "Where the motion goes.", Path, required=True)
 @output_options(plot=True)
@@ -70,7 +70,7 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
-    from asperity.outputs import output_files
+    from asperity.outputs import output_files, require_netcdf
     from asperity.protocol import (
         ProtocolError,
         load_protocol,
@@ -87,6 +87,7 @@ def run(
         {"--out": out, "--csv": text, "--plot": output.plot, "--record": record},
         inputs={"protocol": protocol},
     )
+    require_netcdf(out, "--out", "run.nc")
     try:
         wanted = load_protocol(protocol)
     except ProtocolError as error:
@@ -101,7 +102,7 @@ def run(
             advice = "describe its sensors or leave the option out"
             got = f"'{record}' and none"
             raise InputError("--record", "go with a [tribometer] in the protocol", got, advice)
-        check_path(record)
+        check_path(record, "--record")
     _check_room(wanted, out, text, record)
     with bar("ms", "motion") as update:
         done = run_protocol(

@@ -47,7 +47,7 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
         return
     known.path(name)
     target = Path(f"{name}.csv") if out is None else out
-    check_path(target)
+    check_path(target, "--out")
     output_file(target, "--out")
     truth = known.protocol(name)
     trace = known.record(name, seed)

@@ -22,7 +22,7 @@ an environment.
 """
 
 
-@click.command(epilog=_EPILOG)
+@click.command(epilog=_EPILOG, short_help="Serve the page in the browser.")
 @option(
     "--port",
     "NUMBER",

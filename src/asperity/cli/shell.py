@@ -26,6 +26,16 @@ _EXAMPLES = {
     "AXIS": "V",
     "VALUE": '"120 Hz"',
 }
+#: What an argument could be, by its name.
+_ARGUMENTS = {
+    "data": "recording.csv",
+    "paper": "bureau2000",
+    "plan": "plan.toml",
+    "protocol": "protocol.toml",
+    "readings": "bureau2000 readings.csv",
+    "recordings": "recording.csv",
+    "store": "results.zarr",
+}
 
 
 class Shell(click.Group):
@@ -95,16 +105,33 @@ class Shell(click.Group):
                     code = _print_error(str(error), _BAD_INPUT)
         except click.Abort as abort:
             code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
-        except click.MissingParameter as error:
-            option, name = error.param, "" if error.param is None else error.param.opts[-1]
-            like = "" if option is None else _EXAMPLES.get(option.metavar or "", "")
-            advice = f"add it, like {name} {like}" if like else "add it"
-            code = _print_error(
-                str(InputError(name or "argument", "be given", "nothing", advice)), _BAD_INPUT
-            )
         except click.ClickException as error:
-            code = _print_error(error.format_message(), _BAD_INPUT)
+            code = _print_error(str(_in_our_words(error)), _BAD_INPUT)
         sys.exit(code)
+
+
+def _in_our_words(error: click.ClickException) -> InputError:
+    """What click says of options and arguments, as a sentence like all others."""
+    command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else ""
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        name, metavar = error.param.opts[-1], error.param.metavar or ""
+        if isinstance(error.param, click.Argument):
+            like = f"{command} {_ARGUMENTS[name]}" if name in _ARGUMENTS else ""
+            name = name.upper()
+        else:
+            like = f"{name} {_EXAMPLES[metavar]}" if metavar in _EXAMPLES else ""
+        advice = f"add it, like {like}" if like else "add it"
+        return InputError(name, "be given", "nothing", advice)
+    if isinstance(error, click.NoSuchOption):
+        near = [f"did you mean '{name}'?" for name in error.possibilities or ()]
+        advice = next(iter(near), f"{command} --help lists them")
+        return InputError(error.option_name, f"be an option of {command}", "", advice)
+    text = error.format_message().rstrip(".")
+    if isinstance(error, click.UsageError) and "unexpected extra argument" in text:
+        surplus = text.partition("(")[2].rpartition(")")[0]
+        advice = 'quote a value that has blanks, like -V "1 um/s"'
+        return InputError(f"the arguments of {command}", "be fewer", f"'{surplus}' too", advice)
+    return InputError(text)
 
 
 @contextmanager

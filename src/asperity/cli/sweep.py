@@ -67,7 +67,12 @@ class SweepGroup(click.Group):
         return ["PLAN --out STORE [OPTIONS] | COMMAND ..."]
 
 
-@click.group(cls=SweepGroup, epilog=_EPILOG, invoke_without_command=True)
+@click.group(
+    cls=SweepGroup,
+    epilog=_EPILOG,
+    invoke_without_command=True,
+    short_help="Solve a plan of ten points or a billion.",
+)
 @click.pass_context
 def sweep(context: click.Context) -> None:
     """Solve ten points or a billion: one plan, one command, one labelled store.
@@ -208,7 +213,7 @@ def _run_text(run: dict[str, Any]) -> str:
     return f"{text}, {run['points_solved']:,} points in {run['seconds']:.1f} s"
 
 
-@sweep.command()
+@sweep.command(short_help="Count, mean, deviation and extremes of every output.")
 @click.argument("store", type=Path)
 @output_options()
 def summary(store: Path, output: Output) -> None:

@@ -24,8 +24,10 @@ _OPTIONS: Mapping[str, str] = {
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
     "slice.start and slice.end": "--window",
-    "samples.seed": "--seed",
-    **{name: f"--{name}" for name in ("workers", "cluster")},
+    "seed": "--seed",
+    "initial": "start.states",
+    "span": "--stiffness-from",
+    **{name: f"--{name}" for name in ("workers", "cluster", "thresholds")},
 }
 
 
@@ -68,8 +70,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
         option = name
         if whole in _PAIRS and whole in (options or {}):
             option, key = known[whole], part
-    # A switch says no by itself.
-    value = "" if value == "False" else value
+    # A switch says yes or no by itself.
+    value = "" if value in ("True", "False") else value
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 

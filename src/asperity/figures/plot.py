@@ -194,11 +194,14 @@ class _Drawing:
     ) -> None:
         self.data, self.numbers, self.points = data, numbers, points
         self.figure = new_figure(*plot.size)
-        rows = -(-len(plot.panel) // plot.columns)
+        columns = plot.columns
+        rows = -(-len(plot.panel) // columns)
+        of_rows = (plot.panel[k * columns : (k + 1) * columns] for k in range(rows))
+        alike = columns > 1 and all(len({p.y for p in row}) == 1 for row in of_rows)
         grid = self.figure.subplots(
-            rows, plot.columns, squeeze=False,
-            sharex="col" if plot.columns > 1 else True,
-            sharey="row" if plot.columns > 1 else False, height_ratios=plot.heights or None,
+            rows, columns, squeeze=False,
+            sharex="col" if columns > 1 else True,
+            sharey="row" if alike else False, height_ratios=plot.heights or None,
         )  # fmt: skip
         self.panels = list(zip(plot.panel, grid.ravel(), strict=True))
         letters = iter("abcdefgh")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
 from asperity.arrays import Float
+from asperity.figures.plot import NORMAL
 from asperity.figures.style import (
     ELASTO_PLASTIC,
     GREY,
@@ -47,6 +49,39 @@ def draw_modulated(measurement: Measurement) -> Figure:
     _draw_cycle(cycle, measurement)
     _draw_residual(left, measurement)
     letter_panels((whole, cycle, left))
+    return figure
+
+
+def draw_amplitudes(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Mean friction and harmonics against the amplitude of the load, with bars of 95 %.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        From `asperity.measurement.campaign.modulated_rows`; those without numbers are left out.
+    """
+    figure = new_figure(5.0, 5.6)
+    mean, harmonics = figure.subplots(2, 1, sharex=True)
+    kept = [row for row in rows if not row["reason"]]
+    epsilon = [row["epsilon"] for row in kept]
+    for axis, name, colour, label in (
+        (mean, "mean_friction", _MEASURED, None),
+        (harmonics, "mu1", _FITTED, r"$\mu_1$"),
+        (harmonics, "mu2", LINKER_DIETERICH, r"$\mu_2$"),
+    ):
+        values = [row[name] for row in kept]
+        bars = [NORMAL * row[f"{name}_uncertainty"] for row in kept]
+        axis.errorbar(epsilon, values, bars, fmt="o", capsize=2.5, color=colour, label=label)
+    # Friction without modulation, by the rests beside a stretch.
+    still = [row["static_friction"] for row in kept if "static_friction" in row]
+    mean.plot(np.zeros(len(still)), still, "o", mfc="none", color=_MEASURED)
+    mean.set_ylabel(r"mean friction $\bar{\mu}$")
+    harmonics.set(xlabel=r"modulation amplitude $\epsilon$", ylabel="amplitude of $F/W_0$")
+    largest = max(epsilon, default=1.0)
+    harmonics.set_xlim(-0.04 * largest, 1.08 * largest)
+    harmonics.set_ylim(bottom=0)
+    harmonics.legend(loc="upper left")
+    letter_panels((mean, harmonics))
     return figure
 
 

@@ -69,7 +69,13 @@ def is_table(data: questions.Data) -> bool:
         return True
     cells = _heading(path)
     # The reader of tables says what is wrong with a file that cannot be opened.
-    return cells is None or HEALING in cells or any(cell in OBSERVABLES for cell in cells)
+    # A table by `measure` of which no file could be measured has no observable.
+    return (
+        cells is None
+        or HEALING in cells
+        or {"kind", "reason"} <= {*cells}
+        or any(cell in OBSERVABLES for cell in cells)
+    )
 
 
 def _heading(path: Path) -> list[str] | None:

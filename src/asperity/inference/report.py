@@ -12,7 +12,9 @@ from asperity.inference.fitting.windows import WindowedFit
 from asperity.inference.holds.table import HoldTerm
 from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
-from asperity.outputs.tables import Section
+from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.term import LockInTerm
+from asperity.outputs.tables import Section, rounded, two_digits
 from asperity.units import quantity_text
 
 #: Probability of chi-squared below which law or uncertainties are wrong.
@@ -65,6 +67,14 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
         ]
         known = abs(value) > _KNOWN_SIGN * error and all(value * other > 0 for other in others)
         sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
+    if fit.level_change is not None:
+        value, error, steps = fit.level_change
+        number, doubt = rounded(value, error)
+        which = "its step" if steps == 1 else f"its {steps} steps"
+        sentences.append(
+            f"steady friction alone, before and after {which}: d mu/d ln V = {number} {doubt}, "
+            "measured without a law"
+        )
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
     # Holds are counted from the level of sliding, which is assumed.
@@ -120,7 +130,7 @@ def _estimate_row(name: str, p: Estimate, undetermined: bool) -> tuple[str, ...]
         if unit in ("", p.unit):
             mean, sd, unit = mean * 10.0**-shown.power, sd * 10.0**-shown.power, shown.unit
         unit = f" {unit}" if unit else ""
-        notes = f"prior {mean:.4g} +- {float(f'{sd:.2g}'):g}{unit} ({p.prior.source})"
+        notes = f"prior {mean:.4g} +- {two_digits(sd)}{unit} ({p.prior.source})"
     intervals = (shown.interval(p.interval_68), shown.interval(p.interval_95))
     return name, shown.value, shown.error(p.se), *intervals, shown.unit, notes
 
@@ -143,6 +153,7 @@ def quality(fit: Fit) -> Section:
             (name, f"{chi2:.4g}", f"for {count} data")
             for name, (chi2, count) in fit.observables.items()
         )
+    sentences += [s for term, _ in fit.parts(LockInTerm) if (s := _gauges(term.table))]
     for term in fit.objective.terms_of(RunTerm):
         noise = term.noise
         sentences.append(
@@ -154,6 +165,29 @@ def quality(fit: Fit) -> Section:
         f"log-likelihood {fit.log_likelihood:.6g}, AICc {fit.aicc:.6g}, BIC {fit.bic:.6g}"
     )
     return Section("", tuple(sentences), (), rows)
+
+
+def _gauges(table: LockInTable) -> str:
+    """What the uncertainties of phases ask of the gauges; empty without phases.
+
+    A low-pass of first order with the corner f_c turns a phase at f by f/f_c.
+    """
+    asked = [
+        (n * frequency / error, n * frequency, error)
+        for n in (1, 2)
+        for frequency, error in zip(
+            table.points["frequency"], table.errors.get(f"phase{n}", ()), strict=False
+        )
+        if np.isfinite(error) and error > 0
+    ]
+    if not asked:
+        return ""
+    corner, frequency, error = max(asked)
+    return (
+        f"{table.name}: noise leaves {error:.2g} rad to the phase at "
+        f"{quantity_text(frequency, 'Hz', 3)}; a gauge or filter with a low-pass below "
+        f"{quantity_text(corner, 'Hz', 3)} turns it by more, which no uncertainty here holds"
+    )
 
 
 def windows_sections(over: WindowedFit) -> list[Section]:
@@ -192,10 +226,12 @@ def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[
     What is not determined stands in the table, without the sentence that a fit has for each.
     """
     head, rows = laws_table(comparison, reasons=reasons)
-    warned = tuple(
-        f"{name}: {warning}"
+    warnings = {
+        name: [w for w in j.fit.warnings if w not in j.fit.because.values()]
         for name, j in comparison.laws.items()
-        for warning in j.fit.warnings
-        if warning not in j.fit.because.values()
-    )
-    return [Section("", (comparison.verdict,), head, tuple(rows), warned)]
+    }
+    # What every law is warned of is said once: it is about the data.
+    first = next(iter(warnings.values()), [])
+    of_data = [w for w in first if all(w in warned for warned in warnings.values())]
+    of_laws = [f"{n}: {w}" for n, warned in warnings.items() for w in warned if w not in of_data]
+    return [Section("", (comparison.verdict,), head, tuple(rows), (*of_data, *of_laws))]

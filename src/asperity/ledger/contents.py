@@ -175,7 +175,7 @@ class SummaryWords(Record):
     verdict : str
         Verdict whose claims are listed below the paragraph, with links; none by default.
     figures : tuple of str
-        Names of figures that are shown beside each other below it, with links; none by default.
+        Names of figures that are shown beside each other above it, with links; none by default.
     """
 
     title: str

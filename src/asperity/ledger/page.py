@@ -206,7 +206,7 @@ def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[
         beside = "".join(
             pictures[one_of(name, pictures, "summary.figures")] for name in words.figures
         )
-        text += f'<div class="beside">{beside}</div>'
+        text = f'<div class="beside">{beside}</div>{text}'
     return f'<div class="card"><h3>{rich(words.title)}</h3>{text}</div>'
 
 

@@ -43,7 +43,7 @@ def read_columns(
     InputError
         If the file cannot be read, a column is missing, or a cell is no number.
     """
-    cells = read_headed_columns(path, columns, texts=texts, label=label or path.stem, row=row)
+    cells = read_headed_columns(path, columns, texts=texts, label=label or path.name, row=row)
     wanted = [*columns, *texts]
     if missing := ", ".join(column for column in wanted if column not in cells):
         rule = f"have the columns {', '.join(wanted)}"

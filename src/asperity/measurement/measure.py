@@ -38,6 +38,7 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
+from asperity.parameters.arguments import rising
 from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
@@ -393,10 +394,11 @@ def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int)
 
 
 def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
+    rising(window, "measure.window")
     start, end = window
     first, stop = np.searchsorted(time, [start, end], side="left")
     stop = int(np.searchsorted(time, end, side="right"))
-    if not start < end or stop - int(first) < 16:
+    if stop - int(first) < 16:
         rule = "enclose at least 16 samples"
         advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
         raise InputError("measure.window", rule, f"{start:g} s to {end:g} s", advice)

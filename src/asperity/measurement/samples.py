@@ -291,7 +291,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     time, values = even_times(trace.time), (turned_load, turned_force)
     names_found = {finding.name for finding in findings}
     keep = None
-    if names_found & {"nan", "infinite", "backward time", "repeated time"}:
+    if names_found & {"missing values", "infinite", "backward time", "repeated time"}:
         keep = usable_rows(time, values)
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < _FEWEST:

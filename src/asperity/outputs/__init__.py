@@ -12,6 +12,7 @@ from asperity.outputs.targets import (
     output_files as output_files,
     require_disk as require_disk,
     require_memory as require_memory,
+    require_netcdf as require_netcdf,
     require_short as require_short,
     size_text as size_text,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -126,17 +127,24 @@ def html_page(
     )  # fmt: skip
 
 
+def two_digits(doubt: float) -> str:
+    """An uncertainty with two digits, zeros included: "0.10", "12", "1.2e-05"."""
+    text = f"{doubt:#.2g}"
+    return f"{float(text):g}" if "e+" in text else text.rstrip(".")
+
+
 def rounded(value: float, doubt: float) -> tuple[str, str]:
     """A number and its uncertainty, rounded to two uncertain digits.
 
-    The uncertainty is empty where it is unknown or zero.
+    The uncertainty is empty where it is unknown, or no more than the rounding of doubles.
     """
-    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
+    seen = doubt > 4 * sys.float_info.epsilon * abs(value)
+    if not (math.isfinite(doubt) and doubt > 0 and seen and math.isfinite(value)):
         return f"{value:.9g}", ""
     last = math.floor(math.log10(doubt)) - 1
     if value and (max(abs(value), doubt) < 1e-3 or abs(value) >= 1e6):
         power = math.floor(math.log10(abs(value)))
-        return f"{value:.{max(0, min(15, power - last))}e}", f"+- {doubt:.2g}"
+        return f"{value:.{max(0, min(15, power - last))}e}", f"+- {doubt:.1e}"
     places = max(0, min(15, -last))
     # Without the sign of a zero.
-    return f"{round(value, places) + 0.0:.{places}f}", f"+- {doubt:.2g}"
+    return f"{round(value, places) + 0.0:.{places}f}", f"+- {two_digits(doubt)}"

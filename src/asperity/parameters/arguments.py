@@ -45,6 +45,19 @@ def shown(value: Any) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
+def rising(span: tuple[float, float], label: str, advice: str = "write it like 10:60") -> None:
+    """Refuse a stretch of time (s) that does not end after it begins.
+
+    Raises
+    ------
+    InputError
+    """
+    first, last = span
+    if not first < last:
+        got = f"{first:g} s to {last:g} s"
+        raise InputError(label, "end after it begins", got, advice)
+
+
 def typed(function: Callable[P, R]) -> Callable[P, R]:
     """Let annotations be the check of the arguments of a function, or of a class.
 
@@ -219,8 +232,9 @@ def one_of(value: Any, known: Iterable[str], label: str) -> str:
     """
     known = list(known)
     if value not in known:
-        rule = f"be one of {', '.join(known)}"
-        raise InputError(label, rule, shown(value), closest(value, known))
+        near = closest(str(value), known)
+        advice = near if near.startswith("did you mean") else "choose one"
+        raise InputError(label, f"be one of {', '.join(known)}", shown(value), advice)
     return value
 
 

@@ -112,15 +112,15 @@ def headings(
 
 
 @contextmanager
-def readable(path: Path, label: str) -> Iterator[None]:
-    """Raise an `InputError` about the argument `label` where a CSV cannot be read."""
+def readable(path: Path, label: str, what: str = "CSV") -> Iterator[None]:
+    """Raise an `InputError` about the argument `label` where a CSV, or `what`, cannot be read."""
     try:
         yield
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = (getattr(error, "strerror", None) or "").lower() or "not UTF-8 text"
         if isinstance(error, csv.Error):
             why = f"{error}, check the quotation marks"
-        rule, got = "be a CSV that can be read", f"'{path}': {why}"
+        rule, got = f"be a {what} that can be read", f"'{path}': {why}"
         raise InputError(Argument(label), rule, got, "correct the path or the file") from None
 
 

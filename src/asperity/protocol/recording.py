@@ -167,7 +167,11 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
         needed = field.default is field.default_factory is dataclasses.MISSING
         if needed and field.name not in fields:
             raise InputError(f"{place}.{field.name}", "be given", "nothing", "add it")
-    return kind(**fields)
+    try:
+        return kind(**fields)
+    except InputError as error:
+        # The sensor does not know its channel.
+        raise error.about(f"{place}.{error.field.name.rpartition('.')[2]}") from None
 
 
 def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:

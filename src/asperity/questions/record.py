@@ -23,9 +23,9 @@ from pydantic import (
 )
 
 from asperity.errors import InputError, MistakesError, closest, require
-from asperity.parameters.arguments import number, shown as shown_value
+from asperity.parameters.arguments import number, rising, shown as shown_value
 from asperity.parameters.toml_file import toml_content
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS
 
 T = TypeVar("T")
 
@@ -35,7 +35,7 @@ Given = bool | float | str
 _LONGEST = 60
 #: What pydantic puts into the place of a field that may be of several types, besides texts with
 #: brackets and the names of records.
-_TYPES = frozenset({"bool", "float", "int", "str", "nullable"})
+_TYPES = frozenset({"bool", "float", "int", "str", "constrained-str", "nullable"})
 
 #: What a value must be, by the beginning of pydantic's name of the mistake.
 _WORDS = {
@@ -205,7 +205,7 @@ def _seconds(value: Any) -> float:
     """A time; a text without a unit is in seconds."""
     if isinstance(value, str) and not value.strip()[-1:].isalpha():
         value = f"{value} s"
-    return float(to_si(value, "time", ""))
+    return number(value, "", "time")
 
 
 def _span(value: Any) -> tuple[float, float]:
@@ -217,6 +217,7 @@ def _span(value: Any) -> tuple[float, float]:
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
     first, last = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
+    rising((first, last), "")
     return first, last
 
 
@@ -288,7 +289,9 @@ def _mistakes(
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)
     if reported["type"] == "missing":
-        return (InputError(field, "be given", "nothing", "add it"),)
+        inside = _fields_at(model, reported["loc"])
+        advice = f"add it, a table of {', '.join(inside)}" if inside else "add it"
+        return (InputError(field, "be given", "nothing", advice),)
     value = shown(reported["input"])
     if reported["type"] == "extra_forbidden":
         known = _fields_at(model, reported["loc"][:-1])
@@ -298,9 +301,10 @@ def _mistakes(
         expected = reported["ctx"]["expected"].replace("'", "")
         return (InputError(field, f"be {expected}", value, "choose one"),)
     if reported["type"].endswith(("too_short", "too_long")):
-        edge, what = reported["ctx"], "characters" if "string" in reported["type"] else "parts"
+        edge, what = reported["ctx"], "character" if "string" in reported["type"] else "part"
         rule = f"have {'at least' if 'min_length' in edge else 'at most'} "
-        rule += f"{edge.get('min_length', edge.get('max_length'))} {what}"
+        limit = edge.get("min_length", edge.get("max_length"))
+        rule += f"{limit} {what}{'s' * (limit != 1)}"
         return (InputError(field, rule, edge.get("actual_length", value), "correct it"),)
     limits = {"greater_than_equal": "at least", "less_than_equal": "at most"}
     if reported["type"] in limits:

@@ -13,7 +13,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Names, Quantity, evaluate
 from asperity.recording.finding import Finding
-from asperity.recording.roles import ROLES, role_of
+from asperity.recording.roles import ROLES, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
 from asperity.units.scale import base_units, kind_of_dimension, unit_text
@@ -109,7 +109,7 @@ def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: A
     if kind not in fitting:
         shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
         advice = "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'"
-        raise InputError(field, f"be a {' or '.join(sorted(fitting))}", shown, advice)
+        raise InputError(field, f"be {nouns(fitting)}", shown, advice)
 
 
 def _names(trace: Trace, field: Argument) -> Names:

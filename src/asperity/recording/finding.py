@@ -23,7 +23,7 @@ class Finding:
     Attributes
     ----------
     name : str
-        Short name of the defect, such as ``"gap"``, ``"nan"`` or ``"truncated"``.
+        Short name of the defect, such as ``"gap"``, ``"missing values"`` or ``"truncated"``.
     severity : {"note", "warning", "error"}
         A note changes no result, a warning can, an error means that part of the recording is
         missing or unusable.

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from asperity.errors import Argument, InputError, closest, listed
+from asperity.units import KINDS
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,10 @@ def candidates(role: str, kinds: Mapping[str, str | None]) -> list[str]:
 
 def _says(name: str, spec: Role) -> bool:
     spoken = words(name)
-    return "".join(spoken) in spec.whole or any(w in spec.words for w in spoken)
+    # Two words or more say what the whole name "friction force" says, as in "Friction force Fx".
+    runs = ("".join(spoken[:end]) for end in range(2, len(spoken) + 1))
+    whole = "".join(spoken) in spec.whole or any(run in spec.whole for run in runs)
+    return whole or any(w in spec.words for w in spoken)
 
 
 def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str, str]) -> str:
@@ -206,8 +210,8 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
             unit = Argument("units", other, "kgf" if kind == "mass" else "...")
             raise InputError(
                 field,
-                f"be a {' or '.join(sorted(ROLES[role].kinds))}",
-                f"'{other}', a {kind}",
+                f"be {nouns(ROLES[role].kinds)}",
+                f"'{other}', {nouns([kind])}",
                 f"say what its unit is, like {unit}, or choose another column",
             )
     raise InputError(
@@ -223,6 +227,11 @@ _TITLES = {
     "displacement": "a displacement",
     "friction": "a friction coefficient",
 }
+
+
+def nouns(kinds: Iterable[str]) -> str:
+    """Kinds of quantities in words, as "a force or a pressure"."""
+    return " or ".join(KINDS[kind].noun for kind in sorted(kinds))
 
 
 def _may_be(role: str | None, kind: str | None) -> bool:

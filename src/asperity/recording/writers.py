@@ -64,12 +64,12 @@ def write(
     return file
 
 
-def check_path(path: str | os.PathLike[str]) -> Path:
-    """The path, if its end names a format; raises `InputError` if not."""
+def check_path(path: str | os.PathLike[str], label: str = "write.path") -> Path:
+    """The path, if its end names a format; raises `InputError` about `label` if not."""
     file = Path(path)
     if file.suffix.lower() not in WRITERS:
         advice = closest(file.suffix.lower(), WRITERS)
-        raise InputError("write.path", "end in the name of a format", f"'{file.name}'", advice)
+        raise InputError(label, "end in the name of a format", f"'{file.name}'", advice)
     return file
 
 

@@ -16,9 +16,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import at_least, typed
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
@@ -33,6 +34,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
 
+@typed
 def path(name: str) -> Path:
     """File of a sample's protocol, to be read, copied and changed.
 
@@ -42,7 +44,7 @@ def path(name: str) -> Path:
         If there is no sample of this name.
     """
     if name not in names():
-        raise InputError(f"samples.name must be a sample, got '{name}'; {closest(name, names())}")
+        raise InputError("name", "be a sample", f"'{name}'", closest(name, names()))
     return _FOLDER / f"{name}.toml"
 
 
@@ -58,7 +60,8 @@ def truth(name: str) -> Mapping[str, SourcedNumber]:
     return protocol(name).numbers
 
 
-def record(name: str, seed: int = 0) -> Trace:
+@typed
+def record(name: str, seed: Annotated[int, at_least(0)] = 0) -> Trace:
     """Recording of a sample.
 
     Parameters
@@ -80,8 +83,6 @@ def record(name: str, seed: int = 0) -> Trace:
     """
     from asperity.protocol import record_run, run_protocol
 
-    if not (type(seed) is int and seed >= 0):
-        raise InputError("samples.seed", "be a whole number from 0", seed, "correct it")
     wanted = protocol(name)
     assert wanted.setup is not None, f"{name}.toml has no instrument"
     with TemporaryDirectory(prefix="asperity-") as folder:

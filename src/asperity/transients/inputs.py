@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.small_systems import jacobian_columns, solve_points
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, State
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
@@ -116,7 +116,7 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     """
     level = programme.level
     rule, got = "be positive for a start in steady sliding", f"{level.velocity:g} m/s"
-    advice = "give it, or the states at rest as initial"
+    advice = f"give it, or the states at rest as {Argument('initial')}"
     require(level.velocity > 0, "programme.velocity", rule, got, advice)
     first = SegmentEquations(motion, programme.segments[0])
     w = level.load / np.asarray(motion.slider.W0)

@@ -93,8 +93,9 @@ def _factor_by_pint(unit: str, kind: str) -> Decimal:
     # Roots are compared as units, not as dimensions: pint counts radians and turns as pure
     # numbers, and would take 24 degrees for an amplitude of 0.42.
     if kind in ("force", "stiffness") and root * registry.meter**2 == si_root:
+        what = "stress" if kind == "force" else "stress over a length"
         like = "'50 MN' for 50 MPa" if kind == "force" else "'17 GN/m' for 17 MPa/mm"
-        raise _UnitError(", which is one over an area", f"give that of a square metre, like {like}")
+        raise _UnitError(f", a {what}", f"give the {spec.noun[2:]} on a square metre, like {like}")
     if root != si_root:
         raise _UnitError
     if registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0:

@@ -26,7 +26,7 @@ from asperity_papers.bureau2000.virtual import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Figures made of curves: those of the paper, and three that are not in it.
+#: Figures made of curves: those of the paper, and four that are not in it.
 _OF_THE_PAPER = (
     *(
         curves.figure_2,
@@ -37,7 +37,12 @@ _OF_THE_PAPER = (
     ),
     *(curves.figure_4, curves.figure_8, curves.figure_9, curves.figure_11),
 )
-_FURTHER = (stability.floquet_figure, curves.phase_figure, motion.resonance_figure)
+_FURTHER = (
+    stability.floquet_figure,
+    curves.phase_figure,
+    motion.resonance_figure,
+    curves.law_figure,
+)
 #: What computes each figure.
 NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
     **{figure.name: figure for figure in (*_OF_THE_PAPER, *_FURTHER)},

@@ -94,7 +94,7 @@ def read_thresholds(path: str | Path) -> Thresholds:
     InputError
         If the file cannot be read, a column is missing, or a cell is no positive number.
     """
-    columns = read_columns(Path(path), THRESHOLD_COLUMNS, "a bifurcation")
+    columns = read_columns(Path(path), THRESHOLD_COLUMNS, "a bifurcation", label="thresholds")
     return Thresholds(Path(path).name, **columns)
 
 

@@ -1,4 +1,4 @@
-"""Figures 2 to 9, 11 and 14: the mean friction, and the harmonics of the force."""
+"""Figures 2 to 9, 11, 14 and 16: the mean friction, and the harmonics of the force."""
 
 from __future__ import annotations
 
@@ -221,15 +221,25 @@ def curves_11(machine: Machine) -> list[FigureCurve]:
 figure_11 = CurveFigure("figure-11", curves_11)
 
 
-def phase_curves(machine: Machine) -> list[FigureCurve]:
-    """Three laws, and the elasto-plastic one with the mass, at both velocities."""
+def law_curves(machine: Machine) -> list[FigureCurve]:
+    """Three laws at both velocities."""
     eps, alpha = machine.borne_amplitudes(), {"alpha": float(machine.numbers.alpha)}
     return [
         *speed_curves(machine, RR, eps, case="RR"),
         *speed_curves(machine, LD, eps, case="LD", overrides=alpha),
         *speed_curves(machine, EXT, eps, case="EXT"),
-        *speed_curves(machine, EXT, eps, case=with_inertia("EXT"), inertia=True),
     ]
+
+
+#: The three laws on common axes, which the head of the report shows.
+law_figure = CurveFigure("figure-16", law_curves)
+
+
+def phase_curves(machine: Machine) -> list[FigureCurve]:
+    """Three laws, and the elasto-plastic one with the mass, at both velocities."""
+    eps = machine.borne_amplitudes()
+    moving = speed_curves(machine, EXT, eps, case=with_inertia("EXT"), inertia=True)
+    return [*law_curves(machine), *moving]
 
 
 @curve_figure("figure-14", phase_curves)

@@ -68,7 +68,7 @@ def test_time_is_spent_on_settling_and_reading():
         ({"measure": None, "rival": "elasto-plastic"}, "rival must differ from the law"),
         ({"points": 1, "noise": {"mu1": 2e-5}}, "at least as many data as free parameters, got 1"),
         ({"rival_free": ["A"]}, "rival_free must go with a rival"),
-        ({"free": []}, "free must have at least 1 parts, got 0"),
+        ({"free": []}, "free must have at least 1 part, got 0"),
         ({"free": ["V"]}, "free must not have what ranges has, got 'V'"),
         ({"points": None}, "must have points or time, got none"),
         ({"points": 2.5}, "whole number"),

@@ -264,8 +264,8 @@ def test_readings_that_differ_are_joined(other):
         ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
         ({"free": ("A", "A")}, "'A' twice"),
         ({"free": ()}, "free must name a parameter of elasto-plastic, got none"),
-        ({"free": ("A", "M")}, "'M', which has no influence without inertia; add --inertia"),
-        ({"free": ("eta",), "inertia": True}, "no influence without radiation damping; add --rad"),
+        ({"free": ("A", "M")}, "'M', which has no influence without inertia; add inertia=True"),
+        ({"free": ("eta",), "inertia": True}, "no influence without radiation damping; add rad"),
         ({"free": ("A",), "prior": {"B": Prior(0.02, 0.01, "")}}, "prior must be of free"),
         (
             {"free": ("A",), "prior": {"A": Prior(-1.0, 0.1, "")}},

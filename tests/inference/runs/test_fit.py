@@ -22,6 +22,7 @@ from asperity.inference.fitting.result import Optimum
 from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, without_spikes
+from asperity.inference.runs.levels import level_change, level_rates
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
@@ -412,6 +413,35 @@ def test_a_transient_longer_than_its_recording_leaves_its_length_open(monkeypatc
     assert {"B", "D0"} <= {*fitted.undetermined}
     assert not any("A - B" in sentence for sentence in fit_in_words(fitted))
     assert coverage.TRUTH["A"] == pytest.approx(fitted.values["A"], rel=0.1)
+
+
+def test_the_steady_friction_alone_stands_next_to_the_law(found):
+    """Its uncertainty is that of the measured steps, which hold the truth too."""
+    rates = found.objective.terms[0].run.level_rates
+    assert len(rates) == len(CASE.changes)
+    for value, uncertainty in rates:
+        assert abs(value - (TRUE["A"] - TRUE["B"])) < 4 * uncertainty
+    (said,) = (s for s in fit_in_words(found) if "d mu/d ln V" in s)
+    assert f"its {len(rates)} steps" in said
+    assert f"{level_change(rates).value:.4f}"[:6] in said
+
+
+def test_steps_that_disagree_widen_their_mean():
+    assert level_change([]) is None
+    # By hand: weights 100 and 25; (0.2/0.1)^2 and (0.8/0.2)^2 for one degree of freedom.
+    mean = level_change([(1.0, 0.1), (2.0, 0.2)])
+    assert mean == pytest.approx((1.2, np.sqrt(20 / 125), 2))
+    alike = level_change([(1.0, 0.1), (1.0, 0.2)])
+    assert alike == pytest.approx((1.0, np.sqrt(1 / 125), 2))
+
+
+def test_levels_under_a_load_that_changes_say_nothing_of_the_velocity(found):
+    run = found.objective.terms[0].run
+    time, at = np.arange(0, 100.0, 0.1), [50.0]
+    levels = np.where(time < 50, 0.6, 0.59) + 1e-4 * np.random.default_rng(1).normal(size=time.size)
+    steady = level_rates(time, levels, np.full(time.size, 2.0), at, run.velocities[:2])
+    assert len(steady) == 1
+    assert level_rates(time, levels, 2.0 + (time > 50), at, run.velocities[:2]) == ()
 
 
 @pytest.mark.parametrize(("above", "known"), [(1.0, False), (20.0, True)])

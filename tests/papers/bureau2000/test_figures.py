@@ -23,7 +23,7 @@ def test_every_point_is_solved(figures):
 
 
 def test_every_figure_with_curves_is_there(figures):
-    numbers = (2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15)
+    numbers = (2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15, 16)
     assert sorted(figures) == [f"figure-{n:02}" for n in numbers]
     for figure in figures.values():
         words = WORDS.figure(figure, {})
@@ -134,6 +134,28 @@ def test_rice_ruina_harmonics_are_proportional_to_velocity_and_saturate(figures)
         assert late_over_early_slope(figure, curve, "mu2") < 0.3
         assert 0.95 * limit[V] < end(figure, curve, "mu1") < limit[V]
         assert end(figure, curve, "mu2") < limit[V] / 2
+
+
+def test_the_three_laws_on_common_axes_are_those_of_their_own_figures(figures):
+    figure = figures["figure-16"]
+    read = figure.scalars
+    for curve, name, column in (
+        ("RR", "figure-08", "mu1"),
+        ("LD", "figure-09", "mu2"),
+        ("EXT", "figure-11", "delta_mu"),
+    ):
+        for speed in (SLOW, FAST):
+            own = f"alpha = 0.2, {speed}" if curve == "LD" else speed
+            np.testing.assert_allclose(
+                figure.curve(f"{curve}, {speed}")[column],
+                figures[name].curve(own)[column],
+                rtol=1e-8,
+            )
+    # Harmonics of rigid asperities are proportional to V, those of elastic ones are not.
+    assert read["growth_mu1 RR"] == pytest.approx(10, rel=0.01)
+    assert read["growth_mu1 LD"] == pytest.approx(10, rel=0.02)
+    assert read["growth_mu1 EXT"] == pytest.approx(1, abs=0.05)
+    assert read["relative_drop LD"] < 0.6 * read["relative_drop EXT"]
 
 
 def test_linker_dieterich(figures):

@@ -178,3 +178,32 @@ def test_conversion_is_rounded_once(recording):
     for name, power in (("x", -6), ("delay", -3), ("p", 6)):
         expected = [float(f"{i}e{power}") for i in range(1, 60)]
         assert np.array_equal(trace.channels[name].values, expected)
+
+
+@pytest.mark.parametrize("code", ["-9999", "-999.25", "9999.99", "99999"])
+def test_a_code_for_a_missing_value_is_no_reading(recording, code):
+    rows = [f"{0.1 * k:.1f},{4 + 0.01 * (k % 3)},{7 + 0.02 * (k % 2)}" for k in range(40)]
+    whole = read(recording("time (s),Ft (N),Fn (N)", *rows))
+    for k in (10, 11, 12, 30):
+        rows[k] = f"{0.1 * k:.1f},{4 + 0.01 * (k % 3)},{code}"
+    trace = read(recording("time (s),Ft (N),Fn (N)", *rows))
+    assert names(trace) == ["missing code", "missing values"]
+    assert trace.findings[0].number == 4
+    load, kept = trace.channels["Fn"].values, np.isfinite(trace.channels["Fn"].values)
+    np.testing.assert_array_equal(np.flatnonzero(~kept), [10, 11, 12, 30])
+    np.testing.assert_array_equal(load[kept], whole.channels["Fn"].values[kept])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [1000, 1001, 999, 1000, 1002],  # nines among readings of their size
+        [0, 1500, 300, -999, 700],  # no further from the others than they are from zero
+        [0.6, 0.61, -5000, 0.6, 0.61],  # far off, but no nines
+    ],
+)
+def test_nines_among_readings_are_readings(recording, values):
+    rows = [f"{0.1 * k:.1f},{v}" for k, v in enumerate(8 * values)]
+    trace = read(recording("time (s),Fn (N)", *rows))
+    assert "missing code" not in names(trace)
+    np.testing.assert_array_equal(trace.channels["Fn"].values, 8 * values)

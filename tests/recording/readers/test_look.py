@@ -77,7 +77,7 @@ def test_a_short_channel_is_padded_and_named(tmp_path, planted):
     channels = experiment(planted)
     channels[1] = ("Shr_stress", "MPa", planted.F[:390])
     trace = read(write_look(tmp_path / "p655l", channels, 32, "<f8"))
-    assert [f.name for f in trace.findings] == ["short column", "nan"]
+    assert [f.name for f in trace.findings] == ["short column", "missing values"]
     assert trace.findings[0].number == 10
     assert np.array_equal(np.isnan(trace.channel("F").values), np.arange(400) >= 390)
 

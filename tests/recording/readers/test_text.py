@@ -112,7 +112,7 @@ def test_a_delimiter_at_the_end_of_every_line_makes_no_column(tmp_path, planted)
 def test_a_named_column_may_be_empty(tmp_path, planted):
     trace = read(written(tmp_path, "time_s;W_N;F_N;T_K\n" + table(planted, ";", last=";")))
     assert list(trace.channels) == ["W", "F", "T"]
-    assert names(trace) == ["nan"]
+    assert names(trace) == ["missing values"]
 
 
 def test_without_a_header_the_first_column_is_time_and_the_finding_says_so(tmp_path, planted):
@@ -184,7 +184,7 @@ def test_missing_cells_and_words_among_numbers_are_named(tmp_path, planted):
     lines[9] = "0.009000,NaN,2.8"
     lines[11] = "0.011000,overload,2.8"
     trace = read(written(tmp_path, "time_s,W_N,F_N\n" + "\n".join(lines) + "\n"))
-    assert names(trace) == ["text in numbers", "nan"]
+    assert names(trace) == ["text in numbers", "missing values"]
     text, nan = trace.findings
     assert (text.number, nan.number) == (1, 3)
     assert "'overload' in row 11" in text.sentence

@@ -67,7 +67,7 @@ def check(question: MapQuestion) -> None:
     """Raise `InputError` for what cannot be mapped, before a process is started."""
     advice, axes = "a map has epsilon on the contacts", "choose another one for y"
     require(question.air is None, "map.air", "be left out", "an air layer", advice)
-    one_of(question.show, SHOWN, "map.show")
+    one_of(question.show, SHOWN, "show")
     x, y = question.axes(2)
     require(x.name != y.name, "axes", "be two numbers", f"'{x.name}' on both", axes)
     refuse_foreign(question.law, {x.name: "", y.name: ""})

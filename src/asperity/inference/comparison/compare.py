@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, enumerated, require
 from asperity.inference.comparison.evidence import (
     DISFAVOURED,
     EXCLUDED,
@@ -311,8 +311,8 @@ def _without_numbers(not_compared: Mapping[str, str]) -> str:
     if not not_compared:
         return ""
     return (
-        f" Not compared: {_listed(list(not_compared))}, for want of numbers that are neither free "
-        "nor given, or of samples."
+        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither "
+        "free nor given, or of samples."
     )
 
 
@@ -351,8 +351,8 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
 
     which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
     said = (
-        f"No law describes {_listed(rows)} together with the other rows; check that measurement. "
-        f"With it, {which} are excluded. Without it: "
+        f"No law describes {enumerated(rows)} together with the other rows; check that "
+        f"measurement. With it, {which} are excluded. Without it: "
     )
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 
@@ -501,21 +501,21 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
             f"No law describes these data within their uncertainties: the best, {best}, has "
             f"chi-squared {f.chi2:.4g} for {f.dof} degrees of freedom; either all laws are wrong "
             f"or the uncertainties are too small by a factor of about {factor:.3g}; with that "
-            + (f"the data exclude {_listed(out)}" if out else "the data exclude no law")
+            + (f"the data exclude {enumerated(out)}" if out else "the data exclude no law")
         )
     elif len(left) == 1 and not unknown:
-        parts.append(f"These data favour {left[0]} and exclude {_listed(out)}")
+        parts.append(f"These data favour {left[0]} and exclude {enumerated(out)}")
     else:
         lowest = min(judged[name].fit.aicc for name in left)
         behind = {name: judged[name].fit.aicc - lowest for name in left}
         near = [name for name in left if behind[name] < DISFAVOURED]
         far = [f"{name} (AICc {behind[name]:.3g} above)" for name in left if name not in near]
         words = [
-            f"exclude {_listed(out)}" if out else "",
-            f"disfavour {_listed(far)}" if far else "",
-            f"cannot tell {_listed(near)} apart" if len(near) > 1 else f"prefer {near[0]}",
+            f"exclude {enumerated(out)}" if out else "",
+            f"disfavour {enumerated(far)}" if far else "",
+            f"cannot tell {enumerated(near)} apart" if len(near) > 1 else f"prefer {near[0]}",
         ]
-        parts.append(f"These data {_listed([word for word in words if word])}")
+        parts.append(f"These data {enumerated([word for word in words if word])}")
     parts += [f"{name}: {judged[name].why}" for name in out if judged[name].fit.judged_by_chi2]
     by_likelihood = [name for name in out if not judged[name].fit.judged_by_chi2]
     if by_likelihood:
@@ -528,14 +528,10 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
         gap = judged[nearest].fit.aicc - judged[best].fit.aicc
         parts.append(f"{which} {gap:.3g} above that of {best}, and {EXCLUDED:g} excludes")
     if unknown:
-        parts.append(f"{_listed(unknown)} cannot be judged: no fit converged")
+        parts.append(f"{enumerated(unknown)} cannot be judged: no fit converged")
     if describes and len(left) > 1:
         parts.append(what_would_tell(judged[left[0]].fit, judged[left[1]].fit))
     return "; ".join(p for p in parts if p) + "."
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _value(result: Fit, name: str) -> Any:

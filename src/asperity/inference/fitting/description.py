@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import Argument
+from asperity.errors import Argument, enumerated
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -144,9 +144,9 @@ def described_fit(
         names = [objective.names[i] for i in sorted(profiled)]
         also = [n for n in names if n not in (*bent, *at_edge)]
         said.append(
-            f"chi-squared is no parabola in {' and '.join(bent)}: "
+            f"chi-squared is no parabola in {enumerated(bent)}: "
             + (
-                f"intervals of {' and '.join([*bent, *also])} are by profile likelihood"
+                f"intervals of {enumerated([*bent, *also])} are by profile likelihood"
                 f"{' but for those named before' if at_edge else ''}; take the intervals, not the "
                 "standard errors"
                 if profiled
@@ -159,8 +159,8 @@ def described_fit(
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
     """A sentence on intervals whose profile likelihood runs along the edge of the orbits."""
-    whole = " and ".join(n for n in names if n in odd)
-    normal = " and ".join(n for n in names if n not in odd)
+    whole = enumerated([n for n in names if n in odd])
+    normal = enumerated([n for n in names if n not in odd])
     ends = [
         f"intervals of {whole} are the whole range" if whole else "",
         f"intervals of {normal} are of the normal approximation, and may be too short"
@@ -537,7 +537,7 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     ]
     if partners:
         return (
-            f"{name} is not determined by these data together with {' and '.join(partners)}: they "
+            f"{name} is not determined by these data together with {enumerated(partners)}: they "
             "change the predictions in the same way; fix one, give a prior, or measure what tells "
             "them apart"
         )

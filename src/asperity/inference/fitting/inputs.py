@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, MistakesError, require
 from asperity.inference.cycles.cycle import AveragedCycle
 from asperity.inference.holds.table import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
@@ -267,9 +267,9 @@ def require_motion(
         ("eta", "radiation_damping", "radiation damping"),
     ):
         if name in free and not motion[option]:
-            switch = f"--{option.replace('_', '-')} ({option}=True in Python)"
+            switch = f"{option} = true" if plan else Argument(option, value="True")
             got = f"'{name}', which has no influence without {word}"
-            advice = f"add {f'{option} = true' if plan else switch} or fix {name}"
+            advice = f"add {switch} or fix {name}"
             raise InputError(label, "be parameters that count", got, advice)
 
 
@@ -323,7 +323,13 @@ def priors_of(
                 rule, got = f"go with {Argument('free')}", "no free parameters"
                 advice = "name those that the priors of the material are meant for"
                 raise InputError(f"{Argument('prior', value=name)}", rule, got, advice)
-            result |= material_priors(load_material(name), free)
+            try:
+                material = load_material(name)
+            except MistakesError:
+                raise
+            except InputError as error:
+                raise error.about("prior") from None
+            result |= material_priors(material, free)
             continue
         parameter = known.get(name.partition("[")[0])
         if parameter is None:

@@ -13,10 +13,11 @@ from asperity._version import __version__
 from asperity.arrays import Float
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
+from asperity.inference.runs.levels import LevelChange, level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
-from asperity.outputs.tables import rounded
+from asperity.outputs.tables import rounded, two_digits
 from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit
@@ -83,7 +84,7 @@ class Shown(NamedTuple):
 
     def error(self, se: float) -> str:
         """A standard error in SI as text."""
-        return f"{float(f'{se * 10.0**-self.power:.2g}'):g}"
+        return two_digits(se * 10.0**-self.power)
 
     def interval(self, ends: Interval) -> str:
         """An interval in SI in words; one that the data do not bound on either side is none."""
@@ -174,6 +175,12 @@ class Fit(Drawn):
         return [(term, residuals) for term, residuals in pairs if isinstance(term, kind)]
 
     @property
+    def level_change(self) -> LevelChange | None:
+        """D mu/d ln V by the steady friction of the recordings, measured without a law."""
+        runs = [term.run for term in self.objective.terms_of(RunTerm)]
+        return level_change([rate for run in runs for rate in run.level_rates])
+
+    @property
     def judged_by_chi2(self) -> bool:
         """Whether chi-squared judges the law.
 
@@ -262,6 +269,7 @@ def fit_record(fit: Fit) -> dict[str, Any]:
             name: {"chi2": chi2, "n": n} for name, (chi2, n) in fit.observables.items()
         },
         "noise": _noise(fit),
+        "level_change": None if fit.level_change is None else fit.level_change._asdict(),
         "optima": [vars(other) for other in fit.optima],
         "data": " and ".join(term.name for term in fit.objective.terms),
         "asperity_version": __version__,

@@ -260,7 +260,8 @@ def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
         return prior
     if prior.unit == "1/m":
         return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
-    rule = f"be in {run.stiffness_unit} or 1/m for {run.name}"
+    units = " or ".join(dict.fromkeys((run.stiffness_unit, "1/m")))
+    rule = f"be in {units} for {run.name}"
     raise InputError("prior of K", rule, prior.unit, "convert it")
 
 

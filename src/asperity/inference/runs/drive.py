@@ -164,7 +164,7 @@ def _given_or_measured(
     if velocities is not None:
         if steps is None or len(velocities) != len(steps) + 1:
             got = f"{len(velocities)} for {len(steps or ())}"
-            raise InputError(f"{name}.velocities", "be one more than the steps", got, "give both")
+            raise InputError("velocities", "be one more than the steps", got, "give both")
         speeds = [float(v) for v in velocities]
         result = partition_at(time, displacement, np.array(steps), speeds)
         return result, list(result.velocities), list(result.holds)
@@ -194,8 +194,9 @@ def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:
     for begin, end in pairwise(edges):
         count = int(np.sum((time >= begin) & (time <= end))) if end > begin else 0
         if count < _SAMPLES:
-            raise InputError(
-                f"{name}.steps must rise, with {_SAMPLES} samples or more between them and the "
-                f"ends of the recording ({edges[0]:.6g} to {edges[-1]:.6g} s), got {count} between "
-                f"{begin:.6g} and {end:.6g} s; correct the steps, or the window"
+            rule = (
+                f"rise, with {_SAMPLES} samples or more between them and the ends of {name} "
+                f"({edges[0]:.6g} to {edges[-1]:.6g} s)"
             )
+            got = f"{count} between {begin:.6g} and {end:.6g} s"
+            raise InputError("steps", rule, got, "correct them, or the window")

@@ -17,6 +17,7 @@ from scipy.special import ndtri
 from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.inference.runs.drive import Drive, constant_velocities
+from asperity.inference.runs.levels import LevelRate, level_rates
 from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
@@ -24,6 +25,7 @@ from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
 from asperity.recording.defects.sampling import even_times, rate_stretches
 from asperity.recording.readers import read
+from asperity.units import quantity_text
 
 #: A load that varies by less than this share of its mean is taken as constant.
 _CONSTANT_LOAD = 1e-3
@@ -114,6 +116,9 @@ class RecordedRun:
         is another one; None where they have not been looked for.
     blocks : Blocks or None
         None where `friction` is that of single samples.
+    level_rates : tuple of (float, float)
+        d mu/d ln V by the steady friction before and after each velocity step, measured without a
+        law, and its standard uncertainty; none where it cannot be read.
     """
 
     name: str
@@ -134,6 +139,7 @@ class RecordedRun:
     spikes: tuple[float, ...] | None = None
     jumps: tuple[float, ...] | None = None
     blocks: Blocks | None = None
+    level_rates: tuple[LevelRate, ...] = ()
 
     @property
     def at(self) -> Float:
@@ -240,6 +246,7 @@ def recorded_run(
         doubts=tuple(doubts),
         spikes=_of_the_user(spikes, origin, times, "spikes"),
         jumps=_of_the_user(jumps, origin, times, "jumps"),
+        level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
     )
 
 
@@ -332,9 +339,9 @@ def recorded_load(
     if t.size < 2:
         return None
     if not (W > 0).all():
-        raise InputError(
-            f"{subject} must be under a positive load, got {W.min():.4g} {channel.unit}; {advice}"
-        )
+        lowest = int(np.argmin(W))
+        got = f"{quantity_text(W[lowest], channel.unit)} at {t[lowest]:.6g} s"
+        raise InputError(subject, "be under a positive load", got, advice)
     order = np.argsort(t, kind="stable")
     return t[order], W[order]
 

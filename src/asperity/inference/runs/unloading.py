@@ -18,6 +18,7 @@ from asperity.inference.runs.run import recorded_load
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
+from asperity.parameters.arguments import rising
 from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
 from asperity.recording.defects.sampling import even_times
@@ -120,8 +121,7 @@ def measured_stiffness(
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
     low, high = span
-    rule = "end after it begins"
-    require(low < high, "span", rule, f"{low:g} s to {high:g} s", "give its two times")
+    rising(span, "span", "give its two times")
     signals = sliding_signals(trace, load, force, None)
     if signals.displacement is None:
         rule = "have the displacement of the load point"

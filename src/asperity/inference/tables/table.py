@@ -194,7 +194,7 @@ def read_table(
     path = Path(path)
     shown = name or path.name
     require_rereadable(path, "data")
-    with readable(path, "data"):
+    with readable(path, "data", "file"):
         text = file_content(path).decode("utf-8-sig")
         if path.suffix.lower() == ".json":
             return table_of(_given(_reading(shown, text), given), name=shown)
@@ -211,8 +211,8 @@ def read_table(
     if not kept.any():
         raise InputError(
             f"{shown} must have lock-in readings, got none: every row is another kind of "
-            "measurement or has a reason why it could not be measured; measure a modulated "
-            "recording"
+            "measurement or has a reason why it could not be measured; fit the recordings "
+            "themselves, or measure modulated ones"
         )
     if not kept.all():
         remarks.append(

@@ -19,6 +19,7 @@ from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
+from asperity.parameters.arguments import rising
 from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
@@ -236,14 +237,8 @@ def _given_cuts(
     if steps is None and holds is None:
         return None
     cuts = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
-    for what, (start, end) in (("holds", hold) for hold in holds or ()):
-        if not start < end:
-            raise InputError(
-                f"measure.{what}",
-                "end after they begin",
-                f"{start:g} s to {end:g} s",
-                "write them like 100:110",
-            )
+    for hold in holds or ():
+        rising(hold, "measure.holds")
     for at in cuts:
         if not time[0] < at < time[-1]:
             raise InputError(

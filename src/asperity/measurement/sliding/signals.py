@@ -19,6 +19,7 @@ from asperity.measurement.samples import (
     shear_channel,
     too_few,
 )
+from asperity.parameters.arguments import rising
 from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.roles import candidates, words
@@ -99,7 +100,7 @@ def sliding_signals(
     """
     trace = with_normalised_force(trace)
     if window is not None:
-        _check_window(window, trace)
+        rising(window, "measure.window")
     friction, weight, unit, read, signs = _friction(trace, load, force)
     moved, is_velocity, no_motion = _motion(trace)
     motion = None if moved is None else moved.values
@@ -158,13 +159,6 @@ def with_normalised_force(trace: Trace) -> Trace:
     if "".join(words(name)) not in _NORMALISED or trace.channels[name].kind not in _PURE:
         return trace
     return replace(trace, roles={"friction": name})
-
-
-def _check_window(window: tuple[float, float], trace: Trace) -> None:
-    if not window[0] < window[1]:
-        rule = "end after it begins"
-        advice = f"the recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s"
-        raise InputError("measure.window", rule, f"{window[0]:g} s to {window[1]:g} s", advice)
 
 
 def _friction(

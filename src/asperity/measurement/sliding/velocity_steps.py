@@ -10,7 +10,7 @@ uncertainty.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import stdtrit
@@ -107,7 +107,7 @@ class VelocityStep:
     slope_before: float
     slope_after: float
     settling_slip: float
-    choices: tuple[StepChoice, ...]
+    choices: tuple[StepChoice, ...] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)

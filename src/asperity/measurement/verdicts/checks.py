@@ -28,7 +28,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "saturation": (0.0, 0.01),
     "spike": (0.0, 0.001),
     "repeated time": (0.0, 0.05),
-    "nan": (0.0, 0.25),
+    "missing values": (0.0, 0.25),
     "infinite": (0.0, 0.25),
     "gap": (0.0, 0.25),
     "uneven sampling": (20.0, 1000.0),
@@ -223,7 +223,7 @@ def _finding(finding: Finding, samples: int, span: float) -> Check:
     # Shares of the window, where the number of the finding can be made one.
     shares = {
         "saturation": 1.0,
-        **dict.fromkeys(("spike", "repeated time", "nan", "infinite"), 1 / samples),
+        **dict.fromkeys(("spike", "repeated time", "missing values", "infinite"), 1 / samples),
         "gap": 1 / span,
     }
     if finding.name in shares:

@@ -29,7 +29,7 @@ CHECKED = frozenset(
         "constant",
         "gap",
         "infinite",
-        "nan",
+        "missing values",
         "repeated time",
         "rounded time",
         "saturation",
@@ -51,7 +51,7 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     -------
     tuple of Finding
         ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
-        ``"uneven sampling"``, ``"nan"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
+        ``"uneven sampling"``, ``"missing values"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
         ``"saturation"``; at most one of each name for time and for each channel. Empty without a
         defect.
 
@@ -78,12 +78,12 @@ def _missing(values: Float, time: Float, name: str) -> list[Finding]:
     if np.isfinite(values.sum()):
         return []
     findings = []
-    for slug, bad in (("nan", np.isnan(values)), ("infinite", np.isinf(values))):
+    for slug, bad in (("missing values", np.isnan(values)), ("infinite", np.isinf(values))):
         count = int(bad.sum())
         if not count:
             continue
         first = int(np.argmax(bad))
-        what = "not a number" if slug == "nan" else "infinite"
+        what = "not a number" if slug == "missing values" else "infinite"
         findings.append(
             Finding(
                 slug,

@@ -13,6 +13,7 @@ from asperity.parameters.arguments import shown
 from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
+from asperity.recording.readers.missing import without_codes
 from asperity.recording.readers.raw import refuse_truncated
 from asperity.recording.readers.units import (
     Unit,
@@ -22,7 +23,7 @@ from asperity.recording.readers.units import (
     split_labels,
     understood,
 )
-from asperity.recording.roles import ROLES, candidates, role_of
+from asperity.recording.roles import ROLES, candidates, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
@@ -74,8 +75,10 @@ def assemble(
     for name, column in zip(names, recorded.columns, strict=True):
         if name in numbers and name != clock.column:
             unit, text = known.get(name), texts[name]
+            recorded_values, missing = without_codes(column.values, name)
+            findings += [missing] if missing else []
             channels[name] = Channel(
-                in_si(column.values, unit),
+                in_si(recorded_values, unit),
                 unit.kind if unit else None,
                 unit.si if unit else "",
                 column.label,
@@ -141,8 +144,8 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
         if kind is not None and kind not in fitting:
             raise InputError(
                 Argument("columns", role),
-                f"be a {' or '.join(sorted(fitting))}",
-                f"'{name}', a {kind}",
+                f"be {nouns(fitting)}",
+                f"'{name}', {nouns([kind])}",
                 f"choose another column, or correct its unit with {Argument('units', name, '...')}",
             )
 

@@ -78,8 +78,8 @@ class Axis:
             raise InputError(f"axis of {self.name}", rule, got, advice)
 
     @classmethod
-    def parse(cls, text: str, log: bool = False) -> Axis:
-        """Read ``NAME=LOW:HIGH:COUNT UNIT``, as ``K=0.05:0.5:200 N/um``.
+    def parse(cls, text: str, log: bool = False, label: str = "axis") -> Axis:
+        """Read ``NAME=LOW:HIGH:COUNT UNIT``, as ``K=0.05:0.5:200 N/um``; messages call it `label`.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class Axis:
         match = _AXIS.fullmatch(text + " ")
         if match is None:
             advice = "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
-            raise InputError("axis", "be NAME=LOW:HIGH:COUNT UNIT", f"'{text}'", advice)
+            raise InputError(label, "be NAME=LOW:HIGH:COUNT UNIT", f"'{text}'", advice)
         name, low, high, count, unit = (part.strip() for part in match.groups())
         parameter = _parameter(name)
         advice = f"write it like '{name}={low}:{high}:{count} {parameter.unit}'"

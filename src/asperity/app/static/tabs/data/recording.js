@@ -181,7 +181,7 @@ export class RecordingCard {
         tick("Whole periods only", Boolean(options.whole_periods), (on) => { if (on) options.whole_periods = true; else delete options.whole_periods; again(); }).element,
         choice("Drift", ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", (v) => { options.detrend = v; again(); }).element,
         text("Velocity steps (s)", options.steps?.join(", "), several("steps"), "detected, or 12.5, 60"),
-        text("Velocities between the steps", options.velocities?.join(", "), several("velocities"), "measured, or 1 um/s, 10 um/s"),
+        text("Velocities between steps", options.velocities?.join(", "), several("velocities"), "measured, or 1 um/s, 10 um/s"),
         text("Holds (s)", options.holds?.join(", "), several("holds"), "detected, or 100:110"),
         ...[["Spring stiffness K", "stiffness", "for slips and energies, 168 N/m"], ["Pulling velocity V", "velocity", "of stick-slip, 42 um/s"], ["Mass M", "mass", "of stick-slip, 30.7 g"], ["Normal load W0", "normal_load", "M g, or 3 N"]]
           .map(([label, key, example]) => text(label, options[key], optional(options, key), example)),

@@ -1,0 +1,79 @@
+"""What the steady friction of a recorded run says of its rate dependence without a law.
+
+A fit of a law uses the whole motion, transients included. The levels before and after each velocity
+step, which `asperity.measure` reads, are another estimate of d mu/d ln V from the same samples: the
+two belong next to each other, and no test decides between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Float
+from asperity.errors import InputError
+from asperity.measurement.sliding.measure import measure_sliding
+from asperity.recording.trace import Channel, Trace
+
+#: d mu/d ln V of a velocity step, and its standard uncertainty.
+LevelRate = tuple[float, float]
+
+
+class LevelChange(NamedTuple):
+    """Change of steady friction over ln V.
+
+    Attributes
+    ----------
+    value, uncertainty : float
+        Weighted mean of the steps, and its standard uncertainty by those of the steps or by their
+        scatter, whichever is larger.
+    steps : int
+    """
+
+    value: float
+    uncertainty: float
+    steps: int
+
+
+def level_change(rates: Sequence[LevelRate]) -> LevelChange | None:
+    """Of several steps; None of none."""
+    if not rates:
+        return None
+    values, errors = np.array(rates).T
+    weights = 1 / errors**2
+    mean = float(np.average(values, weights=weights))
+    scatter = float(weights @ (values - mean) ** 2) / max(values.size - 1, 1)
+    return LevelChange(mean, math.sqrt(max(scatter, 1.0) / weights.sum()), values.size)
+
+
+def level_rates(
+    time: Float, friction: Float, load: Float, steps: Sequence[float], velocities: Sequence[float]
+) -> tuple[LevelRate, ...]:
+    """Of each velocity step whose levels can be read; none under a load that is not steady.
+
+    Parameters
+    ----------
+    time, friction, load : array, shape (n,)
+        Seconds; F/W; the load in any unit.
+    steps : sequence of float
+        Times (s) at which the pulling velocity changes.
+    velocities : sequence of float
+        Between them (m/s), 0 in a hold.
+    """
+    channels = {"mu": Channel(friction, "dimensionless"), "load": Channel(load, "dimensionless")}
+    trace = Trace(time, channels, roles={"friction": "mu", "W": "load"})
+    try:
+        measured = measure_sliding(trace, steps=steps, velocities=velocities)
+    except InputError:
+        # The levels are an addition to the fit: what they lack is no mistake of the user.
+        return ()
+    if any(check.name == "load" and check.verdict != "ok" for check in measured.checks):
+        return ()
+    return tuple(
+        (step.rate_dependence, step.rate_uncertainty)
+        for step in measured.steps
+        if step.rate_uncertainty > 0
+    )
