@@ -277,6 +277,27 @@ def test_a_force_over_the_weight_goes_by_its_name() -> None:
         asp.measure(recorded(saw(0).force, name="signal"))
 
 
+@pytest.mark.parametrize(
+    ("sign", "zero", "said"),
+    [
+        (1, 0.0, None),
+        (-1, 0.0, "with the other sign"),
+        (-1, 1.0, "with the other sign"),
+        (1, -1.0, "zero of the gauge"),
+    ],
+)
+def test_sign_and_zero_of_the_gauge_change_no_drop(sign, zero, said) -> None:
+    truth = saw(0, events=40, noise=0.01)
+    result = asp.measure(recorded(sign * truth.force + zero))
+    assert result.kind == "regular stick-slip"
+    assert len(result.events) == 40
+    assert np.mean(result.events.drop) == pytest.approx(0.1, rel=0.01)
+    sentences = [check.sentence for check in result.checks if check.name == "sign"]
+    assert (said is None) == (not sentences)
+    assert all(said in sentence for sentence in sentences)
+    assert result.verdict == ("ok" if said is None else "suspicious")
+
+
 @pytest.mark.parametrize("ending", ["csv", "nc", "json"])
 def test_the_catalogue_holds_every_event(ending, tmp_path) -> None:
     result = measure_stick_slip(recorded(saw(0, events=20).force))

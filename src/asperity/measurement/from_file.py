@@ -193,6 +193,11 @@ def _either(
     try:
         measurement = sliding()
     except InputError as error:
+        # W0 is known of slip events alone.
+        if events is not None and _rather_events(events, 0):
+            return events, f"{what}: {events.kind} is read."
+        if unread is not None and question.normal_load is not None:
+            raise unread from None
         if not constant and len(trace.channels) == 1:
             raise _which_force(trace) from None
         raise error from None

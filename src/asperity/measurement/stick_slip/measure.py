@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 _FEW = 2
 #: Share of the displacement in the slips above which it is the slider's.
 SLIDER = 0.5
+#: Evidence of `Falls` that many slips give.
+_MANY_SLIPS = 3
 #: Ratio to the smallest drop that is seen within which events may have smaller companions.
 _NEAR = 1.5
 #: Usual intervals of uneven times up to which the force between two samples is a straight line.
@@ -200,13 +202,23 @@ def measure_stick_slip(
     Samples at uneven times are interpolated to even ones.
     """
     machine = machine or Machine()
+    # A lone F/(m g) is known by its name before it has company.
+    trace = with_normalised_force(trace)
     if machine.load is not None:
         trace = _with_load(trace, machine.load)
     signals = _at_even_times(sliding_signals(trace, load, force, window))
     time = signals.time
     machine = _completed(machine, signals)
     friction, impulses = without_impulses(signals.friction)
-    falls = find_falls(friction, estimate(friction))
+    noise = estimate(friction)
+    falls, upside_down = find_falls(friction, noise), False
+    if falls.evidence < _MANY_SLIPS:
+        other = find_falls(-friction, noise)
+        # A negative mean comes of the sign of the gauge or of its zero: few slips tell which.
+        enough = 1 if signals.turned else _MANY_SLIPS - 1
+        upside_down = other.evidence > max(falls.evidence, enough)
+        if upside_down:
+            friction, falls = -friction, other
     events = read_events(time, friction, falls)
     slope, slope_doubt = _loading(events)
     smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
@@ -254,6 +266,15 @@ def measure_stick_slip(
         cut_off = saturation(trace.channel(name).values, trace.time, name, crowded)
         about += [f for f in cut_off if f.name == "saturation"]
     checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
+    if signals.turned or upside_down:
+        text = (
+            "the force is recorded with the other sign, in which it falls slowly and rises fast, "
+            "and was turned"
+            if signals.turned != upside_down
+            else "the force is negative on average, though it rises slowly and falls fast: drops "
+            "stand, but forces before and after lack the zero of the gauge"
+        )
+        checks.append(judged("sign", 1.0, (0.5, np.inf), text))
     steps = coarsely_rounded(signals.friction)
     if steps and len(events):
         coarse = steps[1] / float(np.median(events.drop))
@@ -290,8 +311,6 @@ def _with_load(trace: Trace, load: float) -> Trace:
     try:
         trace.channel("W")
     except InputError:
-        # A lone F/(m g) is known by its name before it has company.
-        trace = with_normalised_force(trace)
         constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
         return replace(trace, channels={**trace.channels, "load": constant})
     return trace
