@@ -67,7 +67,8 @@ class SlipEvents:
     creep, creep_uncertainty : array, (k,)
         What the force at onset lacks to the line of that slope; NaN of the first.
     fall_rate : array, (k,)
-        Steepest fall of the force over a quarter of the slip (1/s times the unit).
+        Steepest fall of the force over a quarter of the slip (1/s times the unit), by the mean
+        slip of the recording.
     """
 
     onset: Array
@@ -603,6 +604,9 @@ def _of_mean(scatter: Array, samples: Index | Array) -> Array:
 def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
     """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
 
+    Slips have one shape, whose steepest quarter is that of their mean: the largest of the rates of
+    one slip would be what noise makes it.
+
     Parameters
     ----------
     force : array, (n,)
@@ -622,4 +626,8 @@ def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
 
     # Means over the halves before and after a place lie half a width apart.
     rate = (mean(places - reach, places) - mean(places, places + reach)) / reach
-    return np.where(end - onset < 2.0, drop, rate.max(1))
+    resolved = end - onset >= 2.0
+    if not resolved.any():
+        return drop
+    times_mean = (rate * duration[:, None])[resolved].sum(0).max() / drop[resolved].sum()
+    return np.where(resolved, times_mean * drop / duration, drop)
