@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from benchmarks.stick_slip import saw
+from benchmarks.stick_slip_recordings import saw
 from scipy.io import savemat
 
 from asperity import Slider, laws
