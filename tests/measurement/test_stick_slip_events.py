@@ -72,7 +72,7 @@ def test_durations_slopes_and_creep_are_those_planted() -> None:
     _, events = read(truth.force)
     assert np.median(events.slip_duration) == pytest.approx(20 / 2000, rel=0.05)
     # Creep of a tenth over a tenth of the stick reaches into its middle half by a share exp(-2.5).
-    assert np.nanmedian(events.loading_slope) == pytest.approx(truth.loading_slope, rel=0.015)
+    assert np.nanmedian(events.loading_slope) == pytest.approx(truth.loading_slope[0], rel=0.015)
     assert np.nanmedian(events.creep) == pytest.approx(0.1 * 0.1, rel=0.1)
     # Half a cosine falls pi/2 times as fast as its mean; over a quarter of it 5 % less.
     steepest = np.pi / 2 * truth.drop[0] / (20 / 2000)

@@ -7,8 +7,7 @@ slider at constant friction moves by half a cosine, while the drive goes on.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,6 @@ _CANDIDATES = 8
 _ZOOMS = 4
 #: Events that are searched together: their arrays fit the cache.
 _TOGETHER = 64
-#: Readings of the falls, each without those that the one before has not confirmed.
-_READINGS = 4
 #: A stick shorter than this many slips may be the rise of an oscillation about sliding.
 STICKING = 2.0
 #: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
@@ -119,24 +116,19 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         Without impulses.
     falls : Falls
     """
-    least = falls.thresholds.min()
-    for _ in range(_READINGS):
-        if not len(falls):
-            break
-        events, visible, farther = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading. Where lines
-        # from farther off are nearer to no drop at all, impulses have tilted those next to the
-        # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
-        # zero; in an oscillation about sliding they all do. The others are read again without it.
-        clear = events.drop > 1.96 * events.drop_uncertainty
-        cycles = events.stick_duration[1:] / events.slip_duration[1:]
-        sticks = cycles.size > 0 and np.median(cycles) >= STICKING
-        real = (visible > least) & (farther > events.drop / 2) & (clear | (not sticks))
-        if real.all():
-            return events
-        falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
-    none: dict[str, Any] = {f.name: np.empty(0) for f in fields(SlipEvents)}
-    return events if len(falls) else SlipEvents(**none)
+    if not len(falls):
+        return SlipEvents(*(np.empty(0) for _ in fields(SlipEvents)))
+    events, visible, farther = _read(time, force, falls)
+    # What a line before and a line after do not confirm is a bend in the loading. Where lines
+    # from farther off are nearer to no drop at all, impulses have tilted those next to the
+    # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
+    # zero; in an oscillation about sliding they all do. The lines of the others still end there:
+    # it may be a slip that noise hides.
+    clear = events.drop > 1.96 * events.drop_uncertainty
+    cycles = events.stick_duration[1:] / events.slip_duration[1:]
+    sticks = cycles.size > 0 and np.median(cycles) >= STICKING
+    real = (visible > falls.thresholds.min()) & (farther > events.drop / 2) & (clear | (not sticks))
+    return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
 def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, Array]:
