@@ -131,6 +131,16 @@ def test_a_drop_above_the_stated_threshold_is_seen_and_one_far_below_is_not() ->
         assert seen >= share if share else seen < 0.2
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_slips_that_noise_hides_do_not_take_those_that_are_seen_with_them(seed) -> None:
+    """Drops of the size of the threshold, of which noise lifts one half above it."""
+    truth = saw(seed, events=100, cycle=120, slip=6, noise=0.28, impulses=0.0)
+    falls, events = read(truth.force)
+    assert 30 < len(falls) < 70
+    true, _ = matched(truth, events)
+    assert true.size == len(events) > 5
+
+
 def test_turning_points_are_those_of_a_walk_with_hysteresis() -> None:
     """Against the definition, sample by sample."""
     values = np.cumsum(np.random.default_rng(2).standard_normal(3000))
