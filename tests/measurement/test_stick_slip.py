@@ -277,6 +277,15 @@ def test_a_force_over_the_weight_goes_by_its_name() -> None:
         asp.measure(recorded(saw(0).force, name="signal"))
 
 
+def test_stick_slip_that_ends_in_sliding_is_read_by_itself() -> None:
+    force = saw(2, events=20, noise=0.02, impulses=0.0).force
+    slides = steady(2 * force.size, level=force[-1], noise=0.002)
+    result = asp.measure(recorded(np.r_[force, slides]))
+    assert result.kind == "regular stick-slip, then steady sliding"
+    assert len(result.events) == 20
+    assert result.verdict == "ok"
+
+
 @pytest.mark.parametrize("noise", [0.01, 0.1])
 def test_noise_makes_no_slip_velocity(noise) -> None:
     truth = saw(3, events=100, noise=noise, impulses=0.0)
