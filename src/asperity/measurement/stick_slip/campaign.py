@@ -86,8 +86,8 @@ class StickSlipSeries:
         if healing.reason:
             return none, healing.reason
         condition = (
-            "where the law alone damps slips (B - A is up to twice as large where the machine stops "
-            "them), K is below half of the critical stiffness and "
+            "where the law alone damps slips (B - A is up to twice as large where the machine "
+            "stops them), K is below half of the critical stiffness and "
         )
         energy = self.mass(np.nan) * float(np.nanmax(self.column("V"), initial=-np.inf)) ** 2
         if not np.isfinite(energy * self.W0):
