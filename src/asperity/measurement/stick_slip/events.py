@@ -118,21 +118,19 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     """
     if not len(falls):
         return SlipEvents(*(np.empty(0) for _ in fields(SlipEvents)))
-    events, visible, farther = _read(time, force, falls)
-    # What a line before and a line after do not confirm is a bend in the loading. Where lines
-    # from farther off are nearer to no drop at all, impulses have tilted those next to the
-    # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
-    # zero; in an oscillation about sliding they all do. The lines of the others still end there:
-    # it may be a slip that noise hides.
+    events = _read(time, force, falls)
+    # What a line before and a line after do not confirm is a bend in the loading. Hum and a ringing
+    # gauge make falls next to which lines bend, so that the drop may be zero; in an oscillation
+    # about sliding they all do. The lines of the others still end there: it may be a slip that
+    # noise hides.
     clear = events.drop > 1.96 * events.drop_uncertainty
     cycles = events.stick_duration[1:] / events.slip_duration[1:]
     sticks = cycles.size > 0 and np.median(cycles) >= STICKING
-    real = (visible > falls.thresholds.min()) & (farther > events.drop / 2) & (clear | (not sticks))
+    real = (events.drop > 0) & (clear | (not sticks))
     return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
-def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, Array]:
-    """Events, falls from the highest to the lowest force of each slip, drops by distant lines."""
+def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -167,22 +165,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     ]
     onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
     empty = _empty_falls(sums, edges[1:-1], (onset, end), (first, stop), sticks.slope, scatter)
-    events = _measured(
-        time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty
-    )
-    # Lines as far from the fall as two of its lengths, where they are as long or longer.
-    away = 2 * (trough - peak)
-    first = np.maximum(edges[:-1], peak - 2 * length)
-    stop = np.minimum(edges[1:], trough + 2 * length)
-    until, since = np.maximum(peak - away, first + 2), np.minimum(trough + away, stop - 2)
-    short = np.minimum(until - first, stop - since) < away
-    (high, rise, *_), (low, other, *_) = sums.line(first, until), sums.line(since, stop)
-    farther = high - low + (rise - other) * away / 4
-    u = np.linspace(0, 1, _BINS)[None]
-    fallen = np.maximum(events.drop, np.finfo(float).tiny)
-    loaded = np.repeat((rate * (end - onset) / fallen)[:, None], _BINS, axis=1)
-    visible = events.drop * np.ptp(shape(u, loaded), axis=1)
-    return events, visible, np.where(short, events.drop, farther)
+    return _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty)
 
 
 def _onset_and_end(
