@@ -121,12 +121,12 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     events = _read(time, force, falls)
     # What a line before and a line after do not confirm is a bend in the loading. Hum and a ringing
     # gauge make falls next to which lines bend, so that the drop may be zero; in an oscillation
-    # about sliding they all do. The lines of the others still end there: it may be a slip that
-    # noise hides.
+    # about sliding they all do, and the drop counts, which is a third too small of a sine. The
+    # lines of the others still end there: it may be a slip that noise hides.
     clear = events.drop > 1.96 * events.drop_uncertainty
     cycles = events.stick_duration[1:] / events.slip_duration[1:]
     sticks = cycles.size > 0 and np.median(cycles) >= STICKING
-    real = (events.drop > 0) & (clear | (not sticks))
+    real = clear if sticks else events.drop > falls.thresholds.min() * 2 / 3
     return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
