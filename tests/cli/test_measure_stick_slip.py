@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from benchmarks.stick_slip import saw
+from benchmarks.stick_slip_recordings import saw
 from scipy.io import savemat
 
 from asperity import Slider, laws
@@ -65,6 +65,17 @@ def test_a_campaign_has_one_row_a_file(asperity, recording, tmp_path) -> None:
 )
 def test_bad_input_is_one_sentence(asperity, recording, options, message) -> None:
     refused(asperity("measure", recording, *options), message)
+
+
+def test_a_force_alone_is_read_with_the_load_that_is_given(asperity, tmp_path) -> None:
+    truth = saw(0, events=20)
+    path = tmp_path / "slips.csv"
+    np.savetxt(path, np.stack([truth.time, 5 * truth.force], 1), "%.9g", ";",
+               header="time (s);friction force (N)", comments="")  # fmt: skip
+    result = asperity("measure", path, "--set", "W0=5 N", "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["drop"] == pytest.approx(0.1, rel=0.01)
+    refused(asperity("measure", path), "--column friction=NAME must name the friction")
 
 
 def test_a_column_without_a_meaning_is_asked_for(asperity, tmp_path) -> None:

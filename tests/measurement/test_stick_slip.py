@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from benchmarks.stick_slip import saw
+from benchmarks.stick_slip_recordings import saw
 
 import asperity as asp
 from asperity import Slider, laws
@@ -133,7 +133,7 @@ def test_slips_velocities_and_energies_are_those_of_the_spring() -> None:
     """K, V and W0 of a quasi-static cycle: V = s W0/K with the loading slope s."""
     truth = saw(0, events=50, noise=0.01)
     load, stiffness = 5.0, 2e4
-    velocity = truth.loading_slope * load / stiffness
+    velocity = truth.loading_slope[0] * load / stiffness
     trace = recorded(truth.force)
     machine = Machine(stiffness, velocity, None, load)
     result = measure_stick_slip(trace, machine=machine)
@@ -277,6 +277,57 @@ def test_a_force_over_the_weight_goes_by_its_name() -> None:
         asp.measure(recorded(saw(0).force, name="signal"))
 
 
+def test_stick_slip_that_ends_in_sliding_is_read_by_itself() -> None:
+    force = saw(2, events=20, noise=0.02, impulses=0.0).force
+    slides = steady(2 * force.size, level=force[-1], noise=0.002)
+    result = asp.measure(recorded(np.r_[force, slides]))
+    assert result.kind == "regular stick-slip, then steady sliding"
+    assert len(result.events) == 20
+    assert result.verdict == "ok"
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.1])
+def test_noise_makes_no_slip_velocity(noise) -> None:
+    truth = saw(3, events=100, noise=noise, impulses=0.0)
+    result = asp.measure(recorded(truth.force), stick_slip=True)
+    # Half a cosine of 10 ms, in the mean over its steepest quarter.
+    steepest = 0.1 * np.pi / 2 / 0.01 * np.sin(np.pi / 8) / (np.pi / 8)
+    assert np.mean(result.events.fall_rate) == pytest.approx(steepest, rel=0.04)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.3])
+def test_a_gauge_that_rings_as_slowly_as_the_slider_slips_is_said(amplitude) -> None:
+    truth = saw(1, events=60, slip=8, noise=0.02, ringing=amplitude)
+    (check,) = (c for c in asp.measure(recorded(truth.force)).checks if c.name == "ringing")
+    # Means over two samples of the ringing that the recording was made with.
+    j = np.arange(1, 25)
+    ring = -amplitude * np.exp(-j / 20) * np.sin(2 * np.pi * j / 6)
+    largest = np.abs(ring.reshape(-1, 2).mean(1)).max()
+    assert check.number == pytest.approx(largest, abs=0.03)
+    assert check.verdict == ("suspicious" if amplitude else "ok")
+
+
+@pytest.mark.parametrize(
+    ("sign", "zero", "said"),
+    [
+        (1, 0.0, None),
+        (-1, 0.0, "with the other sign"),
+        (-1, 1.0, "with the other sign"),
+        (1, -1.0, "zero of the gauge"),
+    ],
+)
+def test_sign_and_zero_of_the_gauge_change_no_drop(sign, zero, said) -> None:
+    truth = saw(0, events=40, noise=0.01)
+    result = asp.measure(recorded(sign * truth.force + zero))
+    assert result.kind == "regular stick-slip"
+    assert len(result.events) == 40
+    assert np.mean(result.events.drop) == pytest.approx(0.1, rel=0.01)
+    sentences = [check.sentence for check in result.checks if check.name == "sign"]
+    assert (said is None) == (not sentences)
+    assert all(said in sentence for sentence in sentences)
+    assert result.verdict == ("ok" if said is None else "suspicious")
+
+
 @pytest.mark.parametrize("ending", ["csv", "nc", "json"])
 def test_the_catalogue_holds_every_event(ending, tmp_path) -> None:
     result = measure_stick_slip(recorded(saw(0, events=20).force))
@@ -311,8 +362,8 @@ def test_the_loading_slope_holds_with_and_without_a_drifting_gauge(drift) -> Non
     changed = truth.force + drift * 0.1 * np.linspace(0, 1, truth.force.size)
     result = measure_stick_slip(recorded(changed))
     slope, doubt = result.loading_slope, result.loading_slope_uncertainty
-    assert abs(slope - truth.loading_slope) < 1.96 * doubt
-    assert doubt < 0.52 * abs(drift) / 60 * truth.loading_slope + 0.005 * truth.loading_slope
+    assert abs(slope - truth.loading_slope[0]) < 1.96 * doubt
+    assert doubt < 0.52 * abs(drift) / 60 * truth.loading_slope[0] + 0.005 * truth.loading_slope[0]
 
 
 def test_recordings_at_several_velocities_tell_the_growth_of_the_drop() -> None:

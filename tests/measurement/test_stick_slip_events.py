@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.stick_slip import judged, matched, saw
+from benchmarks.stick_slip_recordings import judged, matched, random_saw, saw
 from scipy.io import loadmat
 from scipy.signal import butter, sosfilt
 
@@ -42,13 +42,12 @@ CASES = {
 def test_every_event_is_read_and_no_other(case, seed) -> None:
     truth = saw(seed, **CASES[case])
     _, events = read(truth.force)
-    tolerance = 0.6 * (truth.end - truth.onset)[0] + 0.01
-    true, found = matched(truth, events, tolerance)
+    true, found = matched(truth, events)
     # Where the spread makes some smaller than noise shows, few are missed.
     assert true.size >= 0.97 * truth.drop.size
     # Where the gauge rings by 30 % of the drop one in a hundred may be a bump of the ringing.
     false = 0.01 if case == "ringing" else 0.0
-    assert len(events) - np.unique(found).size <= false * truth.drop.size
+    assert len(events) - found.size <= false * truth.drop.size
     off = float(np.median(events.drop[found] - truth.drop[true])) / truth.drop.max()
     assert abs(off) < (0.03 if case == "ringing" else 0.02)
 
@@ -73,7 +72,7 @@ def test_durations_slopes_and_creep_are_those_planted() -> None:
     _, events = read(truth.force)
     assert np.median(events.slip_duration) == pytest.approx(20 / 2000, rel=0.05)
     # Creep of a tenth over a tenth of the stick reaches into its middle half by a share exp(-2.5).
-    assert np.nanmedian(events.loading_slope) == pytest.approx(truth.loading_slope, rel=0.015)
+    assert np.nanmedian(events.loading_slope) == pytest.approx(truth.loading_slope[0], rel=0.015)
     assert np.nanmedian(events.creep) == pytest.approx(0.1 * 0.1, rel=0.1)
     # Half a cosine falls pi/2 times as fast as its mean; over a quarter of it 5 % less.
     steepest = np.pi / 2 * truth.drop[0] / (20 / 2000)
@@ -123,13 +122,23 @@ def test_a_drop_above_the_stated_threshold_is_seen_and_one_far_below_is_not() ->
     truth = saw(5, events=100, noise=0.05)
     falls, _ = read(truth.force)
     widths = 2.0 ** np.arange(falls.thresholds.size)
-    least = (falls.thresholds + widths * truth.loading_slope / 2000).min()
+    least = (falls.thresholds + widths * truth.loading_slope[0] / 2000).min()
     for size, share in ((1.2 * least, 0.9), (0.2 * least, None)):
         both = saw(6, events=200, noise=0.05, small=0.5, small_size=size / 0.1)
         _, events = read(both.force)
         true, _ = matched(both, events)
         seen = np.isin(np.flatnonzero(both.drop < 0.099), true).mean()
         assert seen >= share if share else seen < 0.2
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_slips_that_noise_hides_do_not_take_those_that_are_seen_with_them(seed) -> None:
+    """Drops of the size of the threshold, of which noise lifts one half above it."""
+    truth = saw(seed, events=100, cycle=120, slip=6, noise=0.28, impulses=0.0)
+    falls, events = read(truth.force)
+    assert 30 < len(falls) < 70
+    true, _ = matched(truth, events)
+    assert true.size == len(events) > 5
 
 
 def test_turning_points_are_those_of_a_walk_with_hysteresis() -> None:
@@ -174,7 +183,7 @@ def test_onsets_are_as_certain_as_they_say(correlation) -> None:
     for seed in range(5, 11):
         truth = saw(seed, events=40, cycle=1500, slip=150, noise=0.02, correlation=correlation)
         _, events = read(truth.force)
-        true, found = matched(truth, events, 0.05)
+        true, found = matched(truth, events)
         late.append(events.onset[found] - truth.onset[true])
         scores.append(late[-1] / events.timing_uncertainty[found])
     assert np.mean(np.abs(np.concatenate(scores)) < 1.96) > 0.9
@@ -212,10 +221,10 @@ def test_the_noise_of_a_filtered_recorder_has_no_events(seed) -> None:
 
 
 def test_random_recordings_are_read_right_or_flagged() -> None:
-    answers = [judged(seed) for seed in (2, 9, 12, 20)]
-    assert not any(answer["wrong"] and not answer["flagged"] for answer in answers)
-    assert np.mean([answer["recurrence"] for answer in answers]) > 0.88
-    assert np.mean([answer["drop"] for answer in answers]) > 0.88
+    answers = [judged(random_saw(seed)) for seed in (2, 9, 12, 20)]
+    assert not any(answer["faults"] and not answer["flags"] for answer in answers)
+    for name in ("recurrence", "drop"):
+        assert np.mean([answer["held"][name] for answer in answers]) > 0.88
 
 
 def test_onsets_of_damped_slips_lie_within_their_uncertainty():

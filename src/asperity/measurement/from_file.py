@@ -193,6 +193,11 @@ def _either(
     try:
         measurement = sliding()
     except InputError as error:
+        # W0 is known of slip events alone.
+        if events is not None and _rather_events(events, 0):
+            return events, f"{what}: {events.kind} is read."
+        if unread is not None and question.normal_load is not None:
+            raise unread from None
         if not constant and len(trace.channels) == 1:
             raise _which_force(trace) from None
         raise error from None
@@ -222,11 +227,14 @@ def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
 
     Where the displacement is the slider's, each stick looks like a hold.
     """
-    if not events.clear:
+    kinds = {regime.kind for regime in events.regimes}
+    sticks = any(regime.sticks for regime in events.regimes)
+    # Stick-slip may begin or end in a recording of one velocity.
+    if not (events.clear or (sticks and not changes and "cannot tell" not in kinds)):
         return False
     if not changes or events.slip_share > SLIDER:
         return True
-    return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
+    return sticks and len(events.events) > _EVENTS * changes
 
 
 def _which_force(trace: Trace) -> InputError:

@@ -158,7 +158,10 @@ def with_normalised_force(trace: Trace) -> Trace:
     (name,) = trace.channels
     if "".join(words(name)) not in _NORMALISED or trace.channels[name].kind not in _PURE:
         return trace
-    return replace(trace, roles={"friction": name})
+    # The name says the unit.
+    known = {name: replace(trace.channels[name], kind="dimensionless")}
+    findings = tuple(f for f in trace.findings if (f.name, f.where) != ("unknown unit", name))
+    return replace(trace, channels=known, roles={"friction": name}, findings=findings)
 
 
 def _friction(

@@ -80,12 +80,15 @@ class StickSlipSeries:
 
         The factors between growth and B - A are those of M V^2 < A D0 W0, at the fastest recording,
         and K < (B - A) W0/(2 D0): together A > 2 K M V^2/((B - A) W0^2), which is no friction where
-        it exceeds the peak force.
+        it exceeds the peak force. A slip that damping stops without an overshoot drops by half.
         """
         none = float("nan"), float("nan")
         if healing.reason:
             return none, healing.reason
-        condition = "where K is below half of the critical stiffness and "
+        condition = (
+            "where the law alone damps slips (B - A is up to twice as large where the machine "
+            "stops them), K is below half of the critical stiffness and "
+        )
         energy = self.mass(np.nan) * float(np.nanmax(self.column("V"), initial=-np.inf)) ** 2
         if not np.isfinite(energy * self.W0):
             return healing.b_minus_a, f"{condition}M V^2 < A D0 W0: M is not known"

@@ -93,12 +93,17 @@ class Falls:
         Standard deviation of means over 2^j samples.
     thresholds : array, (m,)
         Smallest fall between such means that is no noise.
+    evidence : int
+        What speaks for loading and slip, rather than for a symmetrical signal: 3 where rises of
+        many falls are longer, 2 where they are less clearly or of few falls, 1 where falls come
+        back regularly, else 0.
     """
 
     peak: Index
     trough: Index
     scatter: Array
     thresholds: Array
+    evidence: int
 
     def __len__(self) -> int:
         return self.peak.size
@@ -132,10 +137,10 @@ def find_falls(force: Array, noise: Noise) -> Falls:
         likely = [c for c in candidates if c[0] == evidence]
         ratio = max(c[1] for c in likely)
         _, _, octave, falls = next(c for c in likely if c[1] > ratio / _BLUNTER)
-        return _at_all_widths(averages, noise, octave, falls)
+        return _at_all_widths(averages, noise, octave, falls, evidence)
     empty = np.empty(0, dtype=np.intp)
     scatter = noise.of_means(most, most)
-    return Falls(empty, empty, scatter, _thresholds(noise, scatter))
+    return Falls(empty, empty, scatter, _thresholds(noise, scatter), 0)
 
 
 def _thresholds(noise: Noise, scatter: Array) -> Array:
@@ -210,7 +215,7 @@ class _Averages:
 
 
 def _at_all_widths(
-    averages: _Averages, noise: Noise, octave: int, first: tuple[Index, Index]
+    averages: _Averages, noise: Noise, octave: int, first: tuple[Index, Index], evidence: int
 ) -> Falls:
     """Falls at all widths up to an eighth of a cycle, which is longer the fewer falls are false."""
     most, longest, (peak, trough) = noise.longest, -1, first
@@ -232,7 +237,7 @@ def _at_all_widths(
             peak = trough = np.empty(0, dtype=np.intp)
             break
         peak, trough = _without_ringing(force, *_most_resolved(sets))
-    return Falls(*_steep_part(averages, peak, trough, thresholds), scatter, thresholds)
+    return Falls(*_steep_part(averages, peak, trough, thresholds), scatter, thresholds, evidence)
 
 
 def _steep_part(

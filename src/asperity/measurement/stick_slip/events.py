@@ -7,8 +7,7 @@ slider at constant friction moves by half a cosine, while the drive goes on.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +32,6 @@ _CANDIDATES = 8
 _ZOOMS = 4
 #: Events that are searched together: their arrays fit the cache.
 _TOGETHER = 64
-#: Readings of the falls, each without those that the one before has not confirmed.
-_READINGS = 4
 #: A stick shorter than this many slips may be the rise of an oscillation about sliding.
 STICKING = 2.0
 #: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
@@ -67,7 +64,8 @@ class SlipEvents:
     creep, creep_uncertainty : array, (k,)
         What the force at onset lacks to the line of that slope; NaN of the first.
     fall_rate : array, (k,)
-        Steepest fall of the force over a quarter of the slip (1/s times the unit).
+        Steepest fall of the force over a quarter of the slip (1/s times the unit), by the mean
+        slip of the recording.
     """
 
     onset: Array
@@ -118,28 +116,21 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         Without impulses.
     falls : Falls
     """
-    least = falls.thresholds.min()
-    for _ in range(_READINGS):
-        if not len(falls):
-            break
-        events, visible, farther = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading. Where lines
-        # from farther off are nearer to no drop at all, impulses have tilted those next to the
-        # fall. Hum and a ringing gauge make falls next to which lines bend, so that the drop may be
-        # zero; in an oscillation about sliding they all do. The others are read again without it.
-        clear = events.drop > 1.96 * events.drop_uncertainty
-        cycles = events.stick_duration[1:] / events.slip_duration[1:]
-        sticks = cycles.size > 0 and np.median(cycles) >= STICKING
-        real = (visible > least) & (farther > events.drop / 2) & (clear | (not sticks))
-        if real.all():
-            return events
-        falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
-    none: dict[str, Any] = {f.name: np.empty(0) for f in fields(SlipEvents)}
-    return events if len(falls) else SlipEvents(**none)
+    if not len(falls):
+        return SlipEvents(*(np.empty(0) for _ in fields(SlipEvents)))
+    events = _read(time, force, falls)
+    # What a line before and a line after do not confirm is a bend in the loading. Hum and a ringing
+    # gauge make falls next to which lines bend, so that the drop may be zero; in an oscillation
+    # about sliding they all do, and the drop counts, which is a third too small of a sine. The
+    # lines of the others still end there: it may be a slip that noise hides.
+    clear = events.drop > 1.96 * events.drop_uncertainty
+    cycles = events.stick_duration[1:] / events.slip_duration[1:]
+    sticks = cycles.size > 0 and np.median(cycles) >= STICKING
+    real = clear if sticks else events.drop > falls.thresholds.min() * 2 / 3
+    return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
-def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, Array]:
-    """Events, falls from the highest to the lowest force of each slip, drops by distant lines."""
+def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -174,22 +165,7 @@ def _read(time: Array, force: Array, falls: Falls) -> tuple[SlipEvents, Array, A
     ]
     onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
     empty = _empty_falls(sums, edges[1:-1], (onset, end), (first, stop), sticks.slope, scatter)
-    events = _measured(
-        time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty
-    )
-    # Lines as far from the fall as two of its lengths, where they are as long or longer.
-    away = 2 * (trough - peak)
-    first = np.maximum(edges[:-1], peak - 2 * length)
-    stop = np.minimum(edges[1:], trough + 2 * length)
-    until, since = np.maximum(peak - away, first + 2), np.minimum(trough + away, stop - 2)
-    short = np.minimum(until - first, stop - since) < away
-    (high, rise, *_), (low, other, *_) = sums.line(first, until), sums.line(since, stop)
-    farther = high - low + (rise - other) * away / 4
-    u = np.linspace(0, 1, _BINS)[None]
-    fallen = np.maximum(events.drop, np.finfo(float).tiny)
-    loaded = np.repeat((rate * (end - onset) / fallen)[:, None], _BINS, axis=1)
-    visible = events.drop * np.ptp(shape(u, loaded), axis=1)
-    return events, visible, np.where(short, events.drop, farther)
+    return _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty)
 
 
 def _onset_and_end(
@@ -603,6 +579,9 @@ def _of_mean(scatter: Array, samples: Index | Array) -> Array:
 def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
     """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
 
+    Slips have one shape, whose steepest quarter is that of their mean: the largest of the rates of
+    one slip would be what noise makes it.
+
     Parameters
     ----------
     force : array, (n,)
@@ -622,4 +601,8 @@ def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
 
     # Means over the halves before and after a place lie half a width apart.
     rate = (mean(places - reach, places) - mean(places, places + reach)) / reach
-    return np.where(end - onset < 2.0, drop, rate.max(1))
+    resolved = end - onset >= 2.0
+    if not resolved.any():
+        return drop
+    times_mean = (rate * duration[:, None])[resolved].sum(0).max() / drop[resolved].sum()
+    return np.where(resolved, times_mean * drop / duration, drop)
