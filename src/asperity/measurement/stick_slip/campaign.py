@@ -71,9 +71,9 @@ class StickSlipSeries:
             ]
         )
         numbers = ("stick_duration", "drop", "drop_uncertainty")
-        stick, drop, doubt = (self.column(name) for name in numbers)
-        kept = clear & (doubt > 0) & (stick > 0)
-        return of_campaign(stick[kept], drop[kept], doubt[kept])
+        stick, drop, uncertainty = (self.column(name) for name in numbers)
+        kept = clear & (uncertainty > 0) & (stick > 0)
+        return of_campaign(stick[kept], drop[kept], uncertainty[kept])
 
     def b_minus_a(self, healing: StickSlipHealing) -> tuple[tuple[float, float], str]:
         """95 % interval of B - A, and the condition on which it holds, or why it does not.

@@ -156,14 +156,14 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
                     spread / math.sqrt(values.size), common * name.endswith("_duration")
                 ),
             }
-    stiffness, doubt = measurement.stiffness_from_slope
+    stiffness, uncertainty = measurement.stiffness_from_slope
     machine = measurement.machine
     row |= {
         "force_before": float(np.mean(events.force_before)) if len(events) else math.nan,
         "loading_slope": measurement.loading_slope,
         "loading_slope_uncertainty": measurement.loading_slope_uncertainty,
         "stiffness_from_slope": stiffness,
-        "stiffness_from_slope_uncertainty": doubt,
+        "stiffness_from_slope_uncertainty": uncertainty,
         "smallest_drop": measurement.smallest_drop,
     }
     K, V, W0 = (

@@ -437,30 +437,30 @@ def _measured(
     # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
     # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
     # loaded before, a ringing gauge to the drop.
-    before_doubt = slow * 2 * _of_mean(scatter, until - first)
-    doubt_of_noise = np.hypot(before_doubt, slow * 2 * _of_mean(scatter, stop - since))
+    before_error = slow * 2 * _of_mean(scatter, until - first)
+    of_noise = np.hypot(before_error, slow * 2 * _of_mean(scatter, stop - since))
     # The level of a line may lie anywhere within a step of the recorder.
     rounding = resolution(force) / np.sqrt(6.0)
-    doubt_of_noise = np.hypot(doubt_of_noise, rounding)
+    of_noise = np.hypot(of_noise, rounding)
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()
     rise = high - np.concatenate([low[:1], low[:-1]])
     bend = creeps / rise.sum() * rise - rings / drop.sum() * drop
-    doubt = np.hypot(doubt_of_noise, bend)
+    error = np.hypot(of_noise, bend)
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
     timing = timing_of.factor * _of_mean(scatter, long / 2) / least
     # A line that ends too low meets the slip later by as large a share of it; what noise of the
     # spectrum of the sticks does to lines is in the factor.
-    slowly = np.hypot(doubt_of_noise * np.sqrt(1 - slow**-2), rounding) / least
+    slowly = np.hypot(of_noise * np.sqrt(1 - slow**-2), rounding) / least
     timing = np.linalg.norm(
         [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
     )
     timing = np.hypot(long * timing, _SAMPLING)
     # Slips unlike their shape begin earlier and end later, or the reverse.
-    doubt = np.hypot(doubt, (np.abs(before) + np.abs(after)) * timing)
+    error = np.hypot(error, (np.abs(before) + np.abs(after)) * timing)
     reach = onset[1:] - sticks.centre
-    lag_doubt = np.hypot(np.hypot(sticks.mean_doubt, sticks.doubt * reach), before_doubt[1:])
+    lag_error = np.hypot(np.hypot(sticks.mean_error, sticks.slope_error * reach), before_error[1:])
     samples = np.arange(force.size, dtype=float)
     none = [np.nan]
     return SlipEvents(
@@ -469,12 +469,12 @@ def _measured(
         timing_uncertainty=timing * step,
         force_before=high,
         force_after=low,
-        drop_uncertainty=doubt,
+        drop_uncertainty=error,
         loading_slope=np.concatenate([none, sticks.slope / step]),
-        slope_uncertainty=np.concatenate([none, np.hypot(sticks.doubt, sticks.bend) / step]),
+        slope_uncertainty=np.concatenate([none, np.hypot(sticks.slope_error, sticks.bend) / step]),
         slope_bend=np.concatenate([none, sticks.bend / step]),
         creep=np.concatenate([none, sticks.mean + sticks.slope * reach - high[1:]]),
-        creep_uncertainty=np.concatenate([none, lag_doubt]),
+        creep_uncertainty=np.concatenate([none, lag_error]),
         fall_rate=steepest_fall(force, onset, end, drop) / step,
     )
 
@@ -487,7 +487,7 @@ class _Sticks:
     ----------
     centre, mean, slope : array, (k - 1,)
         In samples.
-    mean_doubt, doubt : array, (k - 1,)
+    mean_error, slope_error : array, (k - 1,)
         Standard uncertainty of mean and slope in noise.
     bend : array, (k - 1,)
         What of the slope is open in all sticks, as they bend.
@@ -496,8 +496,8 @@ class _Sticks:
     centre: Array
     mean: Array
     slope: Array
-    mean_doubt: Array
-    doubt: Array
+    mean_error: Array
+    slope_error: Array
     bend: Array
 
 
@@ -509,18 +509,18 @@ def _sticks(force: Array, first: Index, stop: Index, scatter: Array) -> _Sticks:
     sums = Sums(force, first, middle)
     level, slope, _, away = sums.line(first, stop)
     count = (stop - first).astype(float)
-    mean_doubt = _of_mean(scatter, count)
+    mean_error = _of_mean(scatter, count)
     # The slope of n samples has a variance of 12/n^2 of that of their mean.
-    doubt = np.sqrt(12.0) * mean_doubt / count
+    slope_error = np.sqrt(12.0) * mean_error / count
     # Slopes of halves, in white noise, differ by four times as much as the slope scatters.
-    change = (sums.line(first, middle)[1] - sums.line(middle, stop)[1]) / (4 * doubt)
+    change = (sums.line(first, middle)[1] - sums.line(middle, stop)[1]) / (4 * slope_error)
     usual = np.median(change)
-    doubt = doubt * max(1.0, float(np.median(np.abs(change - usual))) / 0.6745)
+    slope_error = slope_error * max(1.0, float(np.median(np.abs(change - usual))) / 0.6745)
     # Creep bends the second half: what it does to the whole is of the size of the difference.
     error = np.sqrt(np.pi / 2 / first.size)
-    bend = 4 * doubt * np.sqrt(max(usual**2 - error**2, 0.0))
+    bend = 4 * slope_error * np.sqrt(max(usual**2 - error**2, 0.0))
     mean = level + slope * away + sums.level
-    return _Sticks(sums.origin + away, mean, slope, mean_doubt, doubt, bend)
+    return _Sticks(sums.origin + away, mean, slope, mean_error, slope_error, bend)
 
 
 def _empty_falls(
@@ -553,9 +553,9 @@ def _empty_falls(
     high = before + left * (until - sums.origin[cells]) + sums.level[cells]
     low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
     drop = high - low + slope[long] * (since - until)
-    doubt = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
+    error = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
     # By the median, as some sticks hold slips that were not seen.
-    return max(1.0, float(np.median(np.abs(drop) / doubt)) / 0.6745)
+    return max(1.0, float(np.median(np.abs(drop) / error)) / 0.6745)
 
 
 def _noise(force: Array, first: Index, stop: Index) -> Autoregression:

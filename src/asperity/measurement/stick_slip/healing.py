@@ -78,13 +78,13 @@ def of_campaign(stick_durations: Array, drops: Array, uncertainties: Array) -> S
     the line is added to each (Mandel and Paule, Anal. Chem. 42, 1194, 1970).
     """
     x = np.log(np.asarray(stick_durations, float))
-    y, doubt = np.asarray(drops, float), np.asarray(uncertainties, float)
+    y, uncertainty = np.asarray(drops, float), np.asarray(uncertainties, float)
     n = x.size
     if n < _FEWEST:
         return _untold(n, f"{n} recordings are too few; {_FEWEST} can tell")
     extra = 0.0
     for _ in range(_PASSES):
-        weight = 1 / (doubt**2 + extra)
+        weight = 1 / (uncertainty**2 + extra)
         centre = float(weight @ x) / float(weight.sum())
         power = float(weight @ (x - centre) ** 2)
         if power == 0:

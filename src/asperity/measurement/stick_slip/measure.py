@@ -222,7 +222,7 @@ def measure_stick_slip(
         if upside_down:
             friction, falls = -friction, other
     events = read_events(time, friction, falls)
-    slope, slope_doubt = _loading(events)
+    slope, slope_uncertainty = _loading(events)
     smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
     period = None
     if machine.mass and machine.stiffness:
@@ -248,7 +248,7 @@ def measure_stick_slip(
         regimes=parts,
         machine=machine,
         loading_slope=slope,
-        loading_slope_uncertainty=slope_doubt,
+        loading_slope_uncertainty=slope_uncertainty,
         smallest_drop=smallest,
         noise=float(falls.scatter[0]),
         impulses=impulses,
@@ -339,13 +339,13 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     """
     if len(events) < 2:
         return np.nan, np.nan
-    slope, doubt = events.loading_slope[1:], events.slope_uncertainty[1:]
-    clear = doubt < 0.3 * np.abs(slope)
+    slope, uncertainty = events.loading_slope[1:], events.slope_uncertainty[1:]
+    clear = uncertainty < 0.3 * np.abs(slope)
     if not clear.any():
         return np.nan, np.nan
-    slope, doubt, usual = slope[clear], doubt[clear], float(np.median(slope[clear]))
+    slope, uncertainty, usual = slope[clear], uncertainty[clear], float(np.median(slope[clear]))
     rate = float(np.polyfit(events.onset, events.force_before + events.force_after, 1)[0]) / 2
-    scatter = max(1.4826 * float(np.median(np.abs(slope - usual))), float(np.median(doubt)))
+    scatter = max(1.4826 * float(np.median(np.abs(slope - usual))), float(np.median(uncertainty)))
     # The median of n normal values scatters by sqrt(pi/2 n).
     one = scatter * np.sqrt(np.pi / 2 / slope.size)
     bend = float(np.median(events.slope_bend[1:][clear]))

@@ -292,9 +292,9 @@ def _train(
     return Regime(kind, *span, first, stop, text)
 
 
-def _spread(values: Array, doubt: Array) -> float:
+def _spread(values: Array, uncertainty: Array) -> float:
     """Relative standard deviation without what noise adds."""
-    variance = float(np.var(values)) - float(np.mean(doubt**2))
+    variance = float(np.var(values)) - float(np.mean(uncertainty**2))
     return float(np.sqrt(max(variance, 0.0))) / float(np.mean(values))
 
 

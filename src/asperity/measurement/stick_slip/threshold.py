@@ -126,23 +126,23 @@ def linear_frequency(events: SlipEvents, loading: float) -> tuple[float, float]:
         x = (drop[near] ** 2 + drop[near - 1] ** 2) / 2
         if x.max() < _RANGE**2 * x.min():
             continue
-        doubt = np.hypot(events.timing_uncertainty[near], events.timing_uncertainty[near - 1])
-        value, error = _without_drop(x, period[near], doubt)
+        uncertainty = np.hypot(events.timing_uncertainty[near], events.timing_uncertainty[near - 1])
+        value, error = _without_drop(x, period[near], uncertainty)
         if not np.isfinite(best[1]) or error / value < best[1] / best[0]:
             best = value, error
     return 1 / best[0], best[1] / best[0] ** 2
 
 
-def _without_drop(square: Array, period: Array, doubt: Array) -> tuple[float, float]:
+def _without_drop(square: Array, period: Array, uncertainty: Array) -> tuple[float, float]:
     """Period at no drop, by a weighted line, and its standard uncertainty.
 
     Half of what the line adds to the period of the smallest drop counts as uncertain.
     """
-    doubt = np.maximum(doubt, 1e-12 * period)
-    matrix = np.stack([np.ones_like(square), square / square.max()], 1) / doubt[:, None]
+    uncertainty = np.maximum(uncertainty, 1e-12 * period)
+    matrix = np.stack([np.ones_like(square), square / square.max()], 1) / uncertainty[:, None]
     inverse = np.linalg.pinv(matrix.T @ matrix)
-    beta = inverse @ (matrix.T @ (period / doubt))
-    left = period / doubt - matrix @ beta
+    beta = inverse @ (matrix.T @ (period / uncertainty))
+    left = period / uncertainty - matrix @ beta
     scatter = max(float(left @ left) / max(period.size - 2, 1), 1.0)
     extrapolated = beta[1] * square.min() / square.max() / 2
     return float(beta[0]), float(np.hypot(np.sqrt(inverse[0, 0] * scatter), extrapolated))
@@ -195,16 +195,16 @@ def _threshold(group: list[Mapping[str, Any]]) -> Threshold:
     if reason:
         none = float("nan")
         return Threshold(V, none, none, none, none, low, high, reason)
-    centre, doubt = (low + high) / 2, abs(high - low) / np.sqrt(12.0)
+    centre, uncertainty = (low + high) / 2, abs(high - low) / np.sqrt(12.0)
     frequency, error = _frequency(group, centre)
     if not np.isfinite(frequency):
         reason = f"at {V:.4g} m/s no cycles near the threshold are small enough for its frequency"
-    return Threshold(V, centre, doubt, frequency, error, low, high, reason)
+    return Threshold(V, centre, uncertainty, frequency, error, low, high, reason)
 
 
 def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, float]:
     """Frequency (Hz) at the threshold, and its standard uncertainty."""
-    values, doubts, squares, periods, errors = [], [], [], [], []
+    values, uncertainties, squares, periods, errors = [], [], [], [], []
     for row in group:
         ratio = row["K"] / row["W0"] / centre
         if not 1 / _NEAR < ratio < _NEAR:
@@ -214,7 +214,7 @@ def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, fl
         if frequency is not None and np.isfinite(frequency):
             values.append(frequency / root)
             # Half of the step to the threshold counts as uncertain.
-            doubts.append(np.hypot(error / root, values[-1] * abs(root - 1) / 2))
+            uncertainties.append(np.hypot(error / root, values[-1] * abs(root - 1) / 2))
         elif (
             row["regime"] == "regular stick-slip"
             and np.pi * row["drop"] < _SLOPE * row["K"] / row["W0"] * row["V"] * row["recurrence"]
@@ -223,16 +223,16 @@ def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, fl
             periods.append(row["recurrence"] * root)
             errors.append(row["recurrence_uncertainty"])
     if values:
-        weight = 1 / np.array(doubts) ** 2
+        weight = 1 / np.array(uncertainties) ** 2
         mean = float(weight @ np.array(values) / weight.sum())
         scatter = float(weight @ (np.array(values) - mean) ** 2) / max(len(values) - 1, 1)
         return mean, float(np.sqrt(max(scatter, 1.0) / weight.sum()))
     if len(squares) < 2:
         return np.nan, np.nan
-    period, doubt = _without_drop(*(np.array(a) for a in (squares, periods, errors)))
+    period, uncertainty = _without_drop(*(np.array(a) for a in (squares, periods, errors)))
     if period < (1 - _FARTHEST) * min(periods):
         return np.nan, np.nan
-    return 1 / period, doubt / period**2
+    return 1 / period, uncertainty / period**2
 
 
 def write_thresholds(path: Path, table: Sequence[Threshold]) -> None:
