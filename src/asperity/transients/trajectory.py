@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 
 from asperity.arrays import Float
@@ -160,6 +160,9 @@ def row_bytes(law_states: int) -> int:
     return 8 * (7 + 3 + law_states)
 
 
+_log_age = jax.jit(lambda law, state, w: law.log_age(state, w))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Drawn):
     """Motion of a slider under a programme, or a block of it.
@@ -234,9 +237,9 @@ class Trajectory(Drawn):
         if not isinstance(law, RiceRuina) or law.state_names[:1] not in ages:
             return None
         first = len(self.motion.mechanical)
-        states = tuple(jnp.asarray(self.states[:, first:]).T)
-        w = jnp.asarray(self.load / float(self.motion.slider.W0))
-        return np.asarray(law.D0 / law.V0 * jnp.exp(law.log_age(states, w)))
+        w = self.load / float(self.motion.slider.W0)
+        log_age = _log_age(law, tuple(self.states[:, first:].T), w)
+        return np.asarray(law.D0) / np.asarray(law.V0) * np.exp(log_age)
 
     @property
     def stopped(self) -> str | None:
