@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from asperity.arrays import Float
@@ -160,7 +161,7 @@ def row_bytes(law_states: int) -> int:
     return 8 * (7 + 3 + law_states)
 
 
-_log_age = jax.jit(lambda law, state, w: law.log_age(state, w))
+_age = jax.jit(lambda law, state, w: law.D0 / law.V0 * jnp.exp(law.log_age(state, w)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -238,8 +239,7 @@ class Trajectory(Drawn):
             return None
         first = len(self.motion.mechanical)
         w = self.load / float(self.motion.slider.W0)
-        log_age = _log_age(law, tuple(self.states[:, first:].T), w)
-        return np.asarray(law.D0) / np.asarray(law.V0) * np.exp(log_age)
+        return np.asarray(_age(law, tuple(self.states[:, first:].T), w))
 
     @property
     def stopped(self) -> str | None:
