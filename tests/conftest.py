@@ -37,7 +37,8 @@ BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 #: however it was compiled, so that these come last: what is left to them is optimised, while
 #: programs of theirs would cost the others several times as long.
 BRIEF = (
-    *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "papers/bureau2000/"),
+    *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "study/"),
+    "papers/bureau2000/",
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
     *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
     *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
