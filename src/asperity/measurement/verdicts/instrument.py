@@ -348,15 +348,20 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
     best = _Level(np.inf, 0.0, "")
     for harmonics in range(1, min(_CUT, most // 2) + 1):
         for side in ("at its top", "at its bottom", "at its top and bottom"):
+            seen: set[bytes] = set()
             for share in _STARTS:
-                level = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share)
+                level = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share, seen)
                 if level.criterion < best.criterion:
                     best = level
     return least - best.criterion, best
 
 
-def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float) -> _Level:
-    """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns."""
+def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float, seen: set[bytes]) -> _Level:
+    """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns.
+
+    What is beyond a level decides all that follows: where that was `seen` from another start, the
+    end is the same, and is not computed again.
+    """
     value, weight = cycle.value, 1 / cycle.doubt
     squares, rows, right = weight**2, columns * weight[:, None], value * weight
     sides = [s for s, word in ((1, "top"), (-1, "bottom")) if word in side]
@@ -365,9 +370,11 @@ def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float) -> _Level:
     beyond = [s * value >= end for s, end in zip(sides, ends, strict=True)]
     fitted, fits = value, False
     for _ in range(_ROUNDS):
-        inside = ~(beyond[0] | beyond[-1])
-        if inside.sum() <= columns.shape[1] + 2 or not all(b.any() for b in beyond):
+        inside, place = ~(beyond[0] | beyond[-1]), np.packbits(beyond).tobytes()
+        few = inside.sum() <= columns.shape[1] + 2 or not all(b.any() for b in beyond)
+        if few or place in seen:
             return _Level(np.inf, 0.0, side)
+        seen.add(place)
         kept = rows[inside]
         gram = kept.T @ kept
         gram.flat[:: len(gram) + 1] *= 1 + 1e-10
