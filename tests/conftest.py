@@ -33,9 +33,12 @@ LONGEST = (
 BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 
 #: Beginnings of the names of files whose programs take longer to be optimised than they run, in
-#: processes that their tests start too. Others run what users run.
+#: processes that their tests start too. Others run what users run. JAX keeps a program in memory
+#: however it was compiled, so that these come last: what is left to them is optimised, while
+#: programs of theirs would cost the others several times as long.
 BRIEF = (
-    *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "papers/bureau2000/"),
+    *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "study/"),
+    "papers/bureau2000/",
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
     *(f"cli/test_{name}.py" for name in ("other_commands", "response", "run")),
     *(f"inference/{name}/" for name in ("comparison", "design", "posterior", "tables")),
@@ -49,20 +52,28 @@ def room(nodeid):
     return nodeid.split("::")[0].split("/")[1]
 
 
+def is_brief(nodeid):
+    """Whether the programs of a test are compiled in half the time."""
+    return nodeid.partition("/")[2].startswith(BRIEF)
+
+
 def scope(nodeid):
-    """What one process of xdist runs at a time: a room, or a file."""
-    return nodeid.split("::")[0] if room(nodeid) in BY_FILE else room(nodeid)
+    """What one process of xdist runs at a time: a file, or the part of a room compiled alike."""
+    if room(nodeid) in BY_FILE:
+        return nodeid.split("::")[0]
+    return f"{room(nodeid)} brief" if is_brief(nodeid) else room(nodeid)
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items):
-    """Rooms in order, and the first short test of each file marked for `make quick`."""
+    """Sort rooms, briefly compiled ones last, and mark the tests of `make quick`."""
     for _, file in groupby(items, key=lambda item: item.path):
         short = (i for i in file if not any(map(i.get_closest_marker, ("slow", "long"))))
         for first in islice(short, 1):
             first.add_marker("quick")
     order = {name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: order.get(room(item.nodeid), len(order)))
+    last = len(order)
+    items.sort(key=lambda i: (is_brief(i.nodeid), order.get(room(i.nodeid), last)))
 
 
 def pytest_collection_finish():
@@ -97,7 +108,7 @@ def pytest_runtest_setup(item):
     """Programs are compiled in half the time, and run several times as long, in some rooms."""
     import jax
 
-    brief = item.nodeid.partition("/")[2].startswith(BRIEF)
+    brief = is_brief(item.nodeid)
     jax.config.update(_SWITCH, brief)
     if brief:
         os.environ[_SWITCH.upper()] = "1"

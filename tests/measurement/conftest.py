@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from asperity.recording import Channel, Trace
-from references.spring_slider import spring_slider
+from references.spring_slider import pulled_in_parts, spring_slider
 
 LAW = {"A": 0.010, "B": 0.014, "D0": 8e-6, "k": 3e3}
 
@@ -30,15 +30,10 @@ def pulled():
     def make(velocities, lengths, rates, *, resolution=5e-8, seed=0, noise=None, slope=0.0, **law):
         """Time, displacement, friction without noise, the same with noise, and the bounds.
 
-        Lengths are slips (m), or the seconds of a hold; rates are samples per second of each part.
+        Parts as in `pulled_in_parts`.
         """
         rng = np.random.default_rng(seed)
-        spans = [s / v if v else s for v, s in zip(velocities, lengths, strict=True)]
-        bounds = np.concatenate([[0.0], np.cumsum(spans)])
-        parts = zip(bounds[:-1], bounds[1:], rates, strict=True)
-        time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
-        slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
-        slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
+        bounds, time, slip, _ = pulled_in_parts(velocities, lengths, rates)
         clean = spring_slider(velocities, bounds, time, **LAW | law) + slope * slip
         added = rig_noise(rng, time.size, max(rates)) if noise is None else 0.0
         if noise:

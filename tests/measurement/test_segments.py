@@ -8,22 +8,15 @@ from asperity.errors import InputError
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.measurement.sliding.segments import displacement_noise, partition
 from references.populations import population
+from references.spring_slider import pulled_in_parts
 
 UM = 1e-6
 
 
 def stepped(velocities, lengths, rates, *, resolution=2e-8, seed=0, jump=0.01):
-    """Time, displacement, friction that jumps at every step, and the times of the steps.
-
-    Lengths are slips (m), or seconds where the velocity is zero.
-    """
+    """Time, displacement, friction that jumps at every step, and the times of the steps."""
     rng = np.random.default_rng(seed)
-    spans = [s / v if v else s for v, s in zip(velocities, lengths, strict=True)]
-    bounds = np.concatenate([[0.0], np.cumsum(spans)])
-    parts = zip(bounds[:-1], bounds[1:], rates, strict=True)
-    time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
-    slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
-    slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
+    bounds, time, slip, slips = pulled_in_parts(velocities, lengths, rates)
     friction = np.full(time.size, 0.6)
     for k, at in enumerate(bounds[1:-1]):
         if velocities[k] and velocities[k + 1]:

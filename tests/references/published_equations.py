@@ -383,13 +383,13 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
     n, shape = start.shape[0], start.shape[1:]
     length = np.broadcast_to(1 / (p.frequency * shape[1]), (shape[0], 1))
     begin = np.arange(shape[1]) * length
-    count = n + n**2 + 4
+    count = n + n**2 + 6
     step = 1e-30
 
     def rates(s: float, packed: np.ndarray) -> np.ndarray:
-        y = packed.view(complex).reshape(count, *shape)
-        state, t = start + y[:n].real, begin + s * length
-        maps = y[n : n + n**2].real.reshape(n, n, *shape)
+        y = packed.reshape(count, *shape)
+        state, t = start + y[:n], begin + s * length
+        maps = y[n : n + n**2].reshape(n, n, *shape)
         columns = []
         for k in range(n):
             moved = state.astype(complex)
@@ -401,27 +401,24 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
         jacobian = np.stack([c.imag / step / scale for c in columns], axis=1)
         turn = np.exp(-1j * p.omega * t)
         away = (state[0] - start[0, :, :1]) * p.frequency
-        return length * np.concatenate(
-            [
-                columns[0].real,
-                np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(n**2, *shape),
-                np.stack([away, away * turn, away * turn**2, np.trace(jacobian)]),
-            ]
-        )
+        waves = away * turn, away * turn**2
+        moved_maps = np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(n**2, *shape)
+        parts = [part for wave in waves for part in (wave.real, wave.imag)]
+        integrals = np.stack([away, *parts, np.trace(jacobian)])
+        return (length * np.concatenate([columns[0].real, moved_maps, integrals])).ravel()
 
-    def flat(s: float, packed: np.ndarray) -> np.ndarray:
-        return rates(s, packed).astype(complex).ravel().view(float)
-
-    first = np.zeros((count, *shape), dtype=complex)
+    first = np.zeros((count, *shape))
     first[n : n + n**2 : n + 1] = 1
     size = np.ones((count, *shape))
     size[:n] = scale
-    size[n + n**2 : n + n**2 + 3] = scale[0]
-    bound = np.repeat(1e-12 * size.ravel(), 2)
-    run = solve_ivp(flat, (0, 1), first.ravel().view(float), "DOP853", rtol=1e-11, atol=bound)
-    last = run.y[:, -1].copy().view(complex).reshape(count, *shape)
-    maps = last[n : n + n**2].real.reshape(n, n, *shape)
-    return start + last[:n].real, maps, last[n + n**2 :]
+    size[n + n**2 : -1] = scale[0]
+    bound = 1e-12 * size.ravel()
+    run = solve_ivp(rates, (0, 1), first.ravel(), "DOP853", rtol=1e-11, atol=bound)
+    last = run.y[:, -1].reshape(count, *shape)
+    maps = last[n : n + n**2].reshape(n, n, *shape)
+    away, real, imag, real_2, imag_2, trace = last[n + n**2 :]
+    integrals = np.stack([away, real + 1j * imag, real_2 + 1j * imag_2, trace])
+    return start + last[:n], maps, integrals
 
 
 def _around_the_period(maps: np.ndarray, gap: np.ndarray) -> np.ndarray:

@@ -4,6 +4,20 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 
+def pulled_in_parts(velocities, lengths, rates):
+    """Bounds, times and slip of parts, each of a velocity (m/s); slips in each part come last.
+
+    Lengths are slips (m), or seconds where the velocity is zero; rates are samples per second.
+    """
+    spans = [s / v if v else s for v, s in zip(velocities, lengths, strict=True)]
+    bounds = np.concatenate([[0.0], np.cumsum(spans)])
+    parts = zip(bounds[:-1], bounds[1:], rates, strict=True)
+    time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
+    slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
+    slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
+    return bounds, time, slip, slips
+
+
 def spring_slider(velocities, bounds, times, *, A, B, D0, k, mu0=0.6, V0=1e-6, rtol=1e-8):
     """Friction at `times` between the bounds; the stiffness `k` is in friction per metre."""
 

@@ -13,6 +13,10 @@ import click
 from asperity._version import __version__
 from asperity.cli.shell import Shell
 
+# Set before NumPy is imported. Matrices are small here: the threads of a BLAS spend their time on
+# waiting for each other, and beside other work a recording takes several times as long to be read.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 _EPILOG = """\b
 Examples:
   asperity samples velocity_steps --out steps.csv

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -39,6 +40,7 @@ _MAX_STEPS = 100
 Tangent = Callable[[Array], tuple[Array, Array]]
 
 
+@partial(jax.jit, inline=True)  # on the host one program, not one for every operation
 def invert_friction(law: Law, friction: ArrayLike, state: tuple[Array, ...], w: ArrayLike) -> Array:
     """ln(v in m/s) at which `law` carries F_i/W = `friction`.
 

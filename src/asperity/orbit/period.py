@@ -80,17 +80,13 @@ def over_a_period(response: PeriodicResponse) -> Period:
     age = None
     has_age = slider.law.state_names == ("log_age",) or isinstance(slider.law, LinkerDieterich)
     if isinstance(response.load, Harmonic) and has_age:
-        state = _state(slider.law, jnp.asarray(V * slip), friction / load, load)
-        log_age = state
-        if isinstance(slider.law, LinkerDieterich):
-            log_age = slider.law.log_age((state,), jnp.asarray(load))
-        age = np.asarray(jnp.exp(log_age - slider.law.steady_state(V)[0])).reshape(-1)
+        age = np.asarray(_relative_age(slider.law, V, V * slip, friction / load, load)).reshape(-1)
     return Period(response.theta / (2 * np.pi), load, force, velocity, slip, age)
 
 
 @jax.jit
-def _state(law: Law, v: Array, friction: Array, w: Array) -> Array:
-    """The state at which the law carries F_i/W = `friction` at the velocity `v`."""
+def _relative_age(law: Law, V: Array, v: Array, friction: Array, w: Array) -> Array:
+    """Age over that of steady sliding at `V` where the law carries F_i/W = `friction` at `v`."""
 
     def excess(state: Array) -> Array:
         return law.friction(v, (state,), w) - friction
@@ -100,7 +96,9 @@ def _state(law: Law, v: Array, friction: Array, w: Array) -> Array:
         return state - value / slope
 
     first = jnp.broadcast_to(law.steady_state(v)[0], friction.shape)
-    result: Array = jax.lax.fori_loop(0, _STEPS, step, first)
+    state: Array = jax.lax.fori_loop(0, _STEPS, step, first)
+    log_age = law.log_age((state,), w) if isinstance(law, LinkerDieterich) else state
+    result: Array = jnp.exp(log_age - law.steady_state(V)[0])
     return result
 
 

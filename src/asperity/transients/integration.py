@@ -23,11 +23,10 @@ from types import ModuleType
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from asperity.loads import Programme
-from asperity.loads.programme.segment import ProgrammeSegment
+from asperity.loads.programme.segment import ProgrammeSegment, load_of
 from asperity.slider import Inertial, Motion, RadiatingAsperities, ReversingInertial, StiffInertial
 from asperity.transients import explicit, implicit
 from asperity.transients.dense_output import STEPS, UNDERFLOW, DenseOutput, StepChunk
@@ -438,7 +437,7 @@ def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]
     from scipy.optimize import brentq
 
     def load(t: np.ndarray | float) -> np.ndarray:
-        return np.asarray(segment.load(jnp.asarray(t))[0])
+        return np.asarray(load_of(segment, t))
 
     spacing = segment.longest_step / 16
     first = segment.surely_above(floor)

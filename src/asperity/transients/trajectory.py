@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -160,6 +161,9 @@ def row_bytes(law_states: int) -> int:
     return 8 * (7 + 3 + law_states)
 
 
+_age = jax.jit(lambda law, state, w: law.D0 / law.V0 * jnp.exp(law.log_age(state, w)))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Drawn):
     """Motion of a slider under a programme, or a block of it.
@@ -234,9 +238,8 @@ class Trajectory(Drawn):
         if not isinstance(law, RiceRuina) or law.state_names[:1] not in ages:
             return None
         first = len(self.motion.mechanical)
-        states = tuple(jnp.asarray(self.states[:, first:]).T)
-        w = jnp.asarray(self.load / float(self.motion.slider.W0))
-        return np.asarray(law.D0 / law.V0 * jnp.exp(law.log_age(states, w)))
+        w = self.load / float(self.motion.slider.W0)
+        return np.asarray(_age(law, tuple(self.states[:, first:].T), w))
 
     @property
     def stopped(self) -> str | None:

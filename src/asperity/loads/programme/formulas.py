@@ -9,7 +9,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.loads.modulation import Excitation, Modulation
-from asperity.loads.programme.segment import ProgrammeSegment, Scalar, number
+from asperity.loads.programme.segment import ProgrammeSegment, Scalar, load_of, number, pull_of
 
 
 class HarmonicSegment(ProgrammeSegment):
@@ -222,12 +222,12 @@ class PeriodicSegment(ProgrammeSegment):
     @property
     def lowest_load(self) -> float:
         """Of 512 instants of a period."""
-        return float(np.min(self.load(self._over_a_period())[0]))
+        return float(np.min(load_of(self, self._over_a_period())))
 
     @property
     def fastest_pull(self) -> float:
         """Of 512 instants of a period."""
-        return float(np.max(np.abs(self.pull(self._over_a_period()))))
+        return float(np.max(np.abs(pull_of(self, self._over_a_period()))))
 
     @property
     def longest_step(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.errors import require
-from asperity.loads.programme.segment import ProgrammeSegment
+from asperity.loads.programme.segment import ProgrammeSegment, load_of, pull_of
 from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
 from asperity.parameters.arguments import number, typed
 
@@ -108,11 +108,11 @@ class Programme:
 
     def load(self, t: ArrayLike) -> np.ndarray:
         """W (N) at times `t` (s); at a break point that after it."""
-        return self._evaluate(t, _load)
+        return self._evaluate(t, load_of)
 
     def velocity(self, t: ArrayLike) -> np.ndarray:
         """Pulling velocity (m/s) at times `t` (s); at a break point that after it."""
-        return self._evaluate(t, _pull)
+        return self._evaluate(t, pull_of)
 
     def position(self, t: ArrayLike) -> np.ndarray:
         """Displacement of the far end of the spring since t = 0 (m) at times `t` (s)."""
@@ -139,6 +139,4 @@ class Programme:
         return values
 
 
-_load = jax.jit(lambda segment, t: segment.load(t)[0])
-_pull = jax.jit(lambda segment, t: segment.pull(t))
 _position = jax.jit(lambda segment, t: segment.position(t))

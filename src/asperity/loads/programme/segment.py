@@ -11,6 +11,7 @@ from abc import abstractmethod
 from typing import Any, TypeAlias
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
@@ -95,3 +96,8 @@ class ProgrammeSegment(eqx.Module):
         W, W_rate = self.load(t)
         S, S_rate = self.shear(t)
         return Excitation(W / W0, W_rate / W0, S / W0, S_rate / W0, self.pull(t) / V)
+
+
+#: W (N) and the pulling velocity (m/s) of a segment at times (s), each by one program.
+load_of = jax.jit(lambda segment, t: segment.load(t)[0])
+pull_of = jax.jit(lambda segment, t: segment.pull(t))

@@ -348,38 +348,47 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
     best = _Level(np.inf, 0.0, "")
     for harmonics in range(1, min(_CUT, most // 2) + 1):
         for side in ("at its top", "at its bottom", "at its top and bottom"):
+            seen: set[bytes] = set()
             for share in _STARTS:
-                level = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share)
+                level = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share, seen)
                 if level.criterion < best.criterion:
                     best = level
     return least - best.criterion, best
 
 
-def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float) -> _Level:
-    """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns."""
+def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float, seen: set[bytes]) -> _Level:
+    """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns.
+
+    What is beyond a level decides all that follows: where that was `seen` from another start, the
+    end is the same, and is not computed again.
+    """
     value, weight = cycle.value, 1 / cycle.doubt
+    squares, rows, right = weight**2, columns * weight[:, None], value * weight
     sides = [s for s, word in ((1, "top"), (-1, "bottom")) if word in side]
-    share /= len(sides)
-    beyond = {s: s * value >= np.quantile(s * value, 1 - share) for s in sides}
+    shares = np.linspace(0, 1, value.size)
+    ends = [np.interp(1 - share / len(sides), shares, np.sort(s * value)) for s in sides]
+    beyond = [s * value >= end for s, end in zip(sides, ends, strict=True)]
     fitted, fits = value, False
     for _ in range(_ROUNDS):
-        inside = ~np.logical_or.reduce(list(beyond.values()))
-        if inside.sum() <= columns.shape[1] + 2 or not all(b.any() for b in beyond.values()):
+        inside, place = ~(beyond[0] | beyond[-1]), np.packbits(beyond).tobytes()
+        few = inside.sum() <= columns.shape[1] + 2 or not all(b.any() for b in beyond)
+        if few or place in seen:
             return _Level(np.inf, 0.0, side)
-        rows = columns[inside] * weight[inside, None]
-        gram = rows.T @ rows
-        gram[np.diag_indices_from(gram)] *= 1 + 1e-10
-        smooth = columns @ np.linalg.solve(gram, rows.T @ (value[inside] * weight[inside]))
-        fitted, again = smooth, {}
-        for s, where in beyond.items():
-            level = float(np.average(value[where], weights=weight[where] ** 2))
-            again[s] = s * smooth > s * level
-            fitted = np.where(again[s], level, fitted)
-        fits = all(np.array_equal(again[s], beyond[s]) for s in sides)
+        seen.add(place)
+        kept = rows[inside]
+        gram = kept.T @ kept
+        gram.flat[:: len(gram) + 1] *= 1 + 1e-10
+        smooth = columns @ np.linalg.solve(gram, kept.T @ right[inside])
+        fitted, again = smooth, []
+        for s, where in zip(sides, beyond, strict=True):
+            level = squares[where] @ value[where] / squares[where].sum()
+            again.append(s * smooth > s * level)
+            fitted = np.where(again[-1], level, fitted)
+        fits = all(map(np.array_equal, again, beyond))
         beyond = again
         if fits:
             break
-    taken = float(np.mean(np.logical_or.reduce(list(beyond.values()))))
+    taken = float(np.mean(beyond[0] | beyond[-1]))
     if not fits or not _SHARES[0] <= taken <= _SHARES[1] * len(sides):
         return _Level(np.inf, 0.0, side)
     left = float(np.sum(((value - fitted) * weight) ** 2))
