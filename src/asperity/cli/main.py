@@ -16,6 +16,8 @@ from asperity.cli.shell import Shell
 # Set before NumPy is imported. Matrices are small here: the threads of a BLAS spend their time on
 # waiting for each other, and beside other work a recording takes several times as long to be read.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Set before JAX looks for accelerators, which takes seconds and most of their memory.
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
 
 _EPILOG = """\b
 Examples:
@@ -69,8 +71,6 @@ def main(context: click.Context) -> None:
     A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI
     numbers, or have units in their headings.
     """
-    # Before JAX looks for accelerators, which takes seconds and most of their memory.
-    os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
