@@ -261,7 +261,7 @@ def test_of_its_file_is_read_what_an_instrument_records(physical, tmp_path) -> N
     ("options", "words"),
     [
         ({"rtol": 0.1}, "rtol must lie between"),
-        ({"method": "euler"}, "choose one of auto"),
+        ({"method": "euler"}, "must be one of auto, explicit, implicit"),
         ({"sampling": "0 Hz"}, "sampling must be positive"),
         ({"sampling": [0.0, 9.0]}, "sampling must lie within the programme"),
         ({"sampling": [0.2, 0.1]}, "rising order"),
