@@ -14,7 +14,7 @@ from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
-from asperity.outputs.tables import Section, rounded, two_digits
+from asperity.outputs.tables import Section, two_digits
 from asperity.units import quantity_text
 
 #: Probability of chi-squared below which law or uncertainties are wrong.
@@ -42,6 +42,12 @@ def fit_report(fit: Fit) -> list[Section]:
     ]
 
 
+def _with_error(value: float, error: float) -> str:
+    """Both with as many decimals as the error bears: two uncertain digits."""
+    places = max(0, 1 - math.floor(math.log10(error))) if error else 6
+    return f"{value:.{places}f} +- {error:.{places}f}"
+
+
 def fit_in_words(fit: Fit) -> tuple[str, ...]:
     """What a fit says of the friction, before its numbers."""
     if not fit.converged:
@@ -55,9 +61,6 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     difference = rate_dependence(fit)
     if difference is not None:
         value, error = difference
-        # Both with as many decimals as the error bears: two uncertain digits.
-        places = max(0, 1 - math.floor(math.log10(error))) if error else 6
-        shown = f"{value:.{places}f} +- {error:.{places}f}"
         kind = "velocity weakening" if value < 0 else "velocity strengthening"
         # A minimum that the data allow as well may have the other sign.
         others = [
@@ -66,14 +69,14 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
             if other.chi2 - fit.chi2 < _KNOWN_SIGN**2
         ]
         known = abs(value) > _KNOWN_SIGN * error and all(value * other > 0 for other in others)
-        sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
+        sign = kind if known else "its sign is not determined"
+        sentences.append(f"A - B = {_with_error(value, error)}: {sign}")
     if fit.level_change is not None:
         value, error, steps = fit.level_change
-        number, doubt = rounded(value, error)
         which = "its step" if steps == 1 else f"its {steps} steps"
         sentences.append(
-            f"steady friction alone, before and after {which}: d mu/d ln V = {number} {doubt}, "
-            "measured without a law"
+            f"steady friction alone, before and after {which}: d mu/d ln V = "
+            f"{_with_error(value, error)}, measured without a law"
         )
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
