@@ -11,6 +11,7 @@ from asperity.orbit.floquet import (
     from_logs,
     kind_of_crossing,
     log_multipliers,
+    multiplier_gap,
     sorted_logs,
     without_lost_arguments,
 )
@@ -291,3 +292,14 @@ def test_stability_of_fast_and_small_modulation(methods, rate):
     assert list(r.stable) == [False, False, True, True]
     np.testing.assert_allclose(r.log_multipliers[:, 0], expected, rtol=1e-6)
     np.testing.assert_allclose(r.growth_rate, expected.real * frequency, rtol=1e-5)
+
+
+def test_a_multiplier_that_vanishes_is_known_and_one_without_a_logarithm_is_not():
+    before = np.array([[-1.0, -1.0, -1.0, -1.0, 800.0], [-np.inf, -np.inf, np.nan, np.inf, -1.0]])
+    now = np.array([[-1.0, -2.0, -1.0, -1.0, 801.0], [-np.inf, -40.0, -40.0, np.inf, -1.0]])
+    same, differs, lost, overflow, beyond = multiplier_gap(before + 0j, now + 0j)
+    assert same == 0
+    # exp(-1) for exp(-2); beyond doubles the logarithms are compared.
+    assert differs == pytest.approx(np.e - 1, rel=1e-12)
+    assert (lost, overflow) == (np.inf, np.inf)
+    assert beyond == pytest.approx(1 / 801, rel=1e-12)

@@ -248,7 +248,7 @@ def from_logs(logs: Complex) -> Complex:
 
 
 def multiplier_gap(before: Complex, now: Complex) -> Float:
-    """Largest relative change of multipliers, shape (points,); inf where not finite.
+    """Largest relative change of multipliers, shape (points,); inf where one is not known.
 
     Parameters
     ----------
@@ -265,8 +265,8 @@ def multiplier_gap(before: Complex, now: Complex) -> Float:
         turned = np.abs(np.exp(1j * (before.imag - now.imag)) - 1)
         changes = np.abs(before.real - now.real) / np.abs(now.real)
         gaps = np.where(now.real > LARGEST_LOG, np.maximum(changes, turned), gaps)
-    finite = (np.isfinite(before) & np.isfinite(now)).all(0)
-    return np.where(finite, gaps.max(0, initial=0.0), np.inf)
+    # The logarithm of a multiplier that vanishes is -inf, which is no lack of knowledge.
+    return np.where(np.isnan(gaps), np.inf, gaps).max(0, initial=0.0)
 
 
 #: Bifurcations by the argument of the leading multiplier where it leaves the unit circle.
