@@ -106,14 +106,14 @@ def jit_large(function: Callable[P, T], static_argnames: tuple[str, ...] = ()) -
 def known_options(names: tuple[str, ...]) -> tuple[str, ...]:
     """Those of the options of `jit_large` that this XLA knows: releases differ in them."""
 
-    def known(name: str) -> bool:
+    def known(*some: str) -> bool:
         try:
-            jax.jit(lambda x: x + 1, compiler_options={name: _LARGE[name]})(1.0)
+            jax.jit(lambda x: x + 1, compiler_options={n: _LARGE[n] for n in some})(1.0)
         except jax.errors.JaxRuntimeError:
             return False
         return True
 
-    return tuple(name for name in names if known(name))
+    return names if known(*names) else tuple(name for name in names if known(name))
 
 
 @cache
