@@ -24,8 +24,9 @@ from asperity.inference import table_of
 from asperity.loads import Programme, Slide
 from asperity.measurement.stick_slip.campaign import StickSlipCampaign
 from asperity.measurement.stick_slip.catalogue import stick_slip_row
-from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
+from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.measurement.stick_slip.threshold import thresholds
+from asperity.questions.recording import Measurement
 from asperity.transients import transient
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
 from benchmarks.stick_slip_recordings import judged, random_saw, saw, tables, trace_of
@@ -51,8 +52,8 @@ def campaign_numbers(seed):
             motion = transient(slider, drive, sampling=2e4 / seconds, inertia=True, rtol=1e-6)
             friction = motion.force / W0 + 5e-4 * rng.standard_normal(motion.force.size)
             trace = trace_of(motion.time, friction)
-            machine = Machine(float(K), V, None, W0)
-            rows.append(stick_slip_row(Path("made"), measure_stick_slip(trace, machine=machine)))
+            machine = Measurement(stiffness=float(K), velocity=V, normal_load=W0)
+            rows.append(stick_slip_row(Path("made"), measure_stick_slip(trace, machine)))
     ends = [end for end in thresholds(rows) if not end.reason]
     level = [row for row in rows if row["kind"] == "level"]
     columns = {n: [row[n] for row in level] for n in ("V", "K", "mean_friction", "epsilon")}
@@ -92,8 +93,8 @@ def healing_interval(seed):
         force = (cycle.force(place) - cycle.lowest) * size[(place // cycle.period).astype(int)]
         force = force + cycle.lowest + noise * cycle.drop * rng.standard_normal(t.size)
         trace = trace_of(t, force)
-        machine = Machine(float(K), float(v), float(M), W0)
-        rows.append(stick_slip_row(Path("made"), measure_stick_slip(trace, machine=machine)))
+        machine = Measurement(stiffness=float(K), velocity=float(v), mass=float(M), normal_load=W0)
+        rows.append(stick_slip_row(Path("made"), measure_stick_slip(trace, machine)))
     if not rows:
         return np.nan, np.nan, "no limit cycle"
     (series,) = StickSlipCampaign.of(rows).series

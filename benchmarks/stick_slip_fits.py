@@ -18,7 +18,8 @@ import numpy as np
 from asperity import Slider
 from asperity.inference import averaged_cycle, fit
 from asperity.laws import RiceRuina
-from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
+from asperity.measurement.stick_slip.measure import measure_stick_slip
+from asperity.questions.recording import Measurement
 from asperity.recording import Channel, Trace
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
 
@@ -52,7 +53,7 @@ def averaged(truth, V, V0, rng, spread=0.0):
     force = force + noise * rng.standard_normal(t.size)
     trace = Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
     return averaged_cycle(
-        measure_stick_slip(trace, machine=Machine(velocity=V, load=W0)), f"{V:.3g} m/s"
+        measure_stick_slip(trace, Measurement(velocity=V, normal_load=W0)), f"{V:.3g} m/s"
     )
 
 

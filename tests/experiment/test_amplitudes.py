@@ -1,6 +1,7 @@
 """The paper's protocol on the virtual tribometer, against the periodic response."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import asperity as asp
 from asperity.air import AirLayer, transfer_function
 from asperity.errors import InputError
 from asperity.experiment import Exciter, amplitude_series
-from asperity.measurement.measure import measure
 from asperity.tribometer.sensors import LoadCell, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
+
+measure = partial(asp.measure, modulated=True)
 
 PMMA = asp.materials.load("bureau2000")
 # Stiffer than the critical stiffness: it slides steadily without modulation.

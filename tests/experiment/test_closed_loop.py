@@ -5,7 +5,7 @@ seeds differ in the noise of the sensors.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -23,11 +23,12 @@ from asperity.experiment import (
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Programme, Slide
 from asperity.lock_in import demodulation as lock_in
-from asperity.measurement.measure import measure
 from asperity.recording import read
 from asperity.recording.writers import write
 from asperity.tribometer.sensors import LoadCell, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
+
+measure = partial(asp.measure, modulated=True)
 
 pytestmark = pytest.mark.long
 

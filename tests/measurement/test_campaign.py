@@ -14,7 +14,7 @@ from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes
 from asperity.outputs import Interrupted
-from asperity.questions.recording import Measurement as Question, Source
+from asperity.questions.recording import Measurement, Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
 AMPLITUDES, STARTS = (0.05, 0.1, 0.2), (5.0, 17.0, 29.0)
@@ -64,7 +64,7 @@ def table_of(path: Path) -> list[dict[str, str]]:
 
 
 def test_every_amplitude_of_a_recording_has_its_delta_mu(amplitudes) -> None:
-    found = measure_amplitudes(read(amplitudes), harmonics=2)
+    found = measure_amplitudes(read(amplitudes), Measurement(harmonics=2))
     assert len(found) == 3
     for measurement, epsilon, start in zip(found, AMPLITUDES, STARTS, strict=True):
         reading = measurement.reading

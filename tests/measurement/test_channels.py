@@ -1,16 +1,19 @@
 """Which columns a measurement takes for load and shear, and with which sign."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.errors import InputError
 from asperity.inference.runs.run import recorded_run
-from asperity.measurement.measure import measure
-from asperity.measurement.sliding.measure import measure_sliding
 from asperity.recording import Channel, Trace, read
 from references.populations import population
+
+measure = partial(asp.measure, modulated=True)
+measure_sliding = partial(asp.measure, modulated=False)
 
 UM = 1e-6
 

@@ -1,16 +1,19 @@
 """Recordings that are not what they seem: each is named, with a number, and nothing else is."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import asperity as asp
 from asperity.lock_in.demodulation import lock_in
-from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
 from asperity.recording import check
 from references.populations import draws
+
+measure = partial(asp.measure, modulated=True)
 
 RATE, END = 2000.0, 10.0
 

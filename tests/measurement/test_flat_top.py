@@ -1,14 +1,17 @@
 """Signals cut off before the recorder's noise are named; smooth ones, be they flat, are not."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from asperity.measurement.measure import measure
+import asperity as asp
 from asperity.recording import Channel, Trace, check
 from references.populations import population
+
+measure = partial(asp.measure, modulated=True)
 
 W0, EPSILON, MU1 = 7.0, 0.24, 2e-3
 

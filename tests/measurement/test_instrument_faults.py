@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from asperity.measurement.measure import measure
+import asperity as asp
 from asperity.recording import Channel, Trace, check
 from references.populations import population
+
+measure = partial(asp.measure, modulated=True)
 
 RATE, F = 2000.0, 37.013
 

@@ -1,13 +1,17 @@
 """`measure`: the window, F(0) about it, and every planted defect found."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import lock_in
-from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
 from asperity.recording import Channel, Trace
+
+measure = partial(asp.measure, modulated=True)
 
 NAMES = {
     *("modulation", "periods", "signal", "leakage", "drift", "transient"),

@@ -1,14 +1,18 @@
 """Where recordings are cut: over decades of velocity, changes of sampling rate, short holds."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import asperity as asp
 from asperity.errors import InputError
-from asperity.measurement.sliding.measure import measure_sliding
 from asperity.measurement.sliding.segments import displacement_noise, partition
 from references.populations import population
 from references.spring_slider import pulled_in_parts
+
+measure_sliding = partial(asp.measure, modulated=False)
 
 UM = 1e-6
 

@@ -1,10 +1,14 @@
 """What is measured is what the force settles to, or the verdict says that it cannot be told."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
-from asperity.measurement.measure import measure
+import asperity as asp
 from references.populations import draws
+
+measure = partial(asp.measure, modulated=True)
 
 LEVEL, DROP = 0.43, -0.005
 MU1 = 0.02 * np.exp(-0.5j)

@@ -1,12 +1,16 @@
 """Recordings without modulation: segments, levels, steps and holds with known truth."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.errors import InputError
-from asperity.measurement.sliding.measure import measure_sliding
 from asperity.recording import Channel, Trace
 from references.populations import draws
+
+measure_sliding = partial(asp.measure, modulated=False)
 
 STRESS = 20e6
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,16 +18,14 @@ from asperity.measurement.stick_slip.campaign import StickSlipCampaign
 from asperity.measurement.stick_slip.catalogue import COLUMNS, write_catalogue
 from asperity.measurement.stick_slip.events import SlipEvents
 from asperity.measurement.stick_slip.healing import of_campaign
-from asperity.measurement.stick_slip.measure import (
-    Machine,
-    StickSlipMeasurement,
-    measure_stick_slip,
-)
+from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 from asperity.measurement.stick_slip.threshold import linear_frequency, thresholds
 from asperity.recording import Channel, Trace
 from asperity.recording.defects.check import check
 from asperity.theory import healing_drop
 from references.populations import population
+
+measure_stick_slip = partial(asp.measure, stick_slip=True)
 
 
 def recorded(friction, rate=2000.0, name="mu"):
@@ -135,8 +134,8 @@ def test_slips_velocities_and_energies_are_those_of_the_spring() -> None:
     load, stiffness = 5.0, 2e4
     velocity = truth.loading_slope[0] * load / stiffness
     trace = recorded(truth.force)
-    machine = Machine(stiffness, velocity, None, load)
-    result = measure_stick_slip(trace, machine=machine)
+    machine = {"velocity": velocity, "normal_load": load}
+    result = measure_stick_slip(trace, stiffness=stiffness, **machine)
     estimate, doubt = result.stiffness_from_slope
     assert abs(estimate - stiffness) < 4 * doubt
     # Over a cycle the spring's end and the slider move alike: slip = V recurrence.
@@ -145,7 +144,7 @@ def test_slips_velocities_and_energies_are_those_of_the_spring() -> None:
     high, low = load * events.force_before, load * events.force_after
     assert result.energy == pytest.approx((high**2 - low**2) / (2 * stiffness))
     assert {c.name: c.verdict for c in result.checks}["stiffness"] == "ok"
-    wrong = measure_stick_slip(trace, machine=replace(machine, stiffness=1.5 * stiffness))
+    wrong = measure_stick_slip(trace, stiffness=1.5 * stiffness, **machine)
     assert {c.name: c.verdict for c in wrong.checks}["stiffness"] == "bad"
 
 
@@ -257,7 +256,9 @@ def test_the_slip_is_that_of_the_recorded_slider() -> None:
     channels = {**trace.channels, "x": Channel(gauge, "length", "m", "displacement", "m")}
     result = measure_stick_slip(
         Trace(trace.time, channels, roles={"displacement": "x"}),
-        machine=Machine(2e4, 1e-5, None, 5.0),
+        stiffness=2e4,
+        velocity=1e-5,
+        normal_load=5.0,
     )
     np.testing.assert_allclose(result.slip, slips, atol=1.2e-7)
     # Half a cosine is steepest in its middle: pi/2 of its mean, by a quarter of it 0.97 of that;

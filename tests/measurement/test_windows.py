@@ -1,14 +1,18 @@
 """Where to read: stretches, what has settled, clean runs, slow modulation; a noisy level."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.lock_in.reference import fit_frequency, strongest_line
-from asperity.measurement.measure import measure
 from asperity.measurement.series import mean_level, steady_from
-from asperity.measurement.verdicts.verdict import judged, worst
+from asperity.measurement.verdicts.verdict import Limits, worst
 from asperity.measurement.window import clean_run, stretches, whole_periods
 from references.populations import population
+
+measure = partial(asp.measure, modulated=True)
 
 
 def test_stretches_are_cut_where_the_amplitude_changes() -> None:
@@ -68,18 +72,14 @@ def test_a_mean_covers_its_truth_in_slow_noise(red_noise) -> None:
 
 
 def test_verdicts_follow_the_limits() -> None:
-    assert [judged("x", n, (1, 2), "").verdict for n in (0.5, 1.5, 2.5)] == [
-        "ok",
-        "suspicious",
-        "bad",
-    ]
-    assert [judged("x", n, (2, 1), "").verdict for n in (0.5, 1.5, 2.5)] == [
-        "bad",
-        "suspicious",
-        "ok",
-    ]
-    assert judged("x", 9, (1, 2), "", significant=False).verdict == "ok"
-    assert worst([judged("x", n, (1, 2), "") for n in (0, 1.5)]) == "suspicious"
+    limits = Limits(large_is_bad=(1, 2), small_is_bad=(2, 1))
+    for name, verdicts in {
+        "large_is_bad": ["ok", "suspicious", "bad"],
+        "small_is_bad": ["bad", "suspicious", "ok"],
+    }.items():
+        assert [limits.check(name, n, "").verdict for n in (0.5, 1.5, 2.5)] == verdicts
+    assert limits.check("large_is_bad", 9, "", significant=False).verdict == "ok"
+    assert worst([limits.check("large_is_bad", n, "") for n in (0, 1.5)]) == "suspicious"
     assert worst([]) == "ok"
 
 

@@ -275,11 +275,11 @@ def measure(
 
 def _amplitudes(recording: Path, source: Source, question: Question, output: Output) -> int:
     from asperity.measurement.campaign import modulated_rows
-    from asperity.measurement.from_file import modulated_parts
+    from asperity.measurement.measure import measure_amplitudes
     from asperity.measurement.report import amplitude_sections
     from asperity.recording.readers.from_file import read_source
 
-    rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
+    rows = modulated_rows(recording, measure_amplitudes(read_source(recording, source), question))
     output.answer(
         lambda: {"recording": str(recording), "amplitudes": rows},
         lambda: amplitude_sections(rows, recording.name),

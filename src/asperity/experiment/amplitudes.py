@@ -21,6 +21,7 @@ from asperity.errors import InputError, require
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
 from asperity.measurement.measure import Measurement, measure
+from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -261,14 +262,13 @@ class AmplitudeMotion:
             self.time, {FORCE: self.force, LOAD: self.load}, seed=seed, provenance=self.provenance
         )
         frequency = self.exciter.frequency
+        question = Question(load=LOAD, force=FORCE, frequency=frequency, harmonics=harmonics)
         points = []
         for i, epsilon in enumerate(self.epsilons):
             begin = i * (self.sliding + self.modulated)
             end = begin + 2 * self.sliding + self.modulated
             part = trace.slice(begin, end)
-            measurement = measure(
-                part, load=LOAD, force=FORCE, frequency=frequency, harmonics=harmonics
-            )
+            measurement = measure(part, question)
             points.append(AmplitudePoint(epsilon, begin, end, measurement))
         return AmplitudeSeries(
             trace, tuple(points), self.velocity, frequency, self.exciter.transfer

@@ -25,11 +25,12 @@ from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law, known_law, registered
 from asperity.measurement.measure import modulation_of
-from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
+from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions import fit as questions
+from asperity.questions.recording import Measurement as Measured
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
 
@@ -166,8 +167,10 @@ def _stick_slip(
         except InputError:
             # The reader of runs takes K over the load.
             K, over_load = None, True
-        machine = Machine(K, V, given.get("M"), given.get("W0"))
-        measurement = measure_stick_slip(trace, window=data.window, machine=machine)
+        machine = {"stiffness": K, "velocity": V}
+        machine |= {"mass": given.get("M"), "normal_load": given.get("W0")}
+        question = Measured(window=data.window, **machine)
+        measurement = measure_stick_slip(trace, question)
     except InputError:
         # The reader of runs checks the numbers again.
         return None

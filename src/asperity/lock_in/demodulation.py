@@ -208,7 +208,7 @@ def _check(time: Float, load: Float, force: Float, harmonics: int, degree: int) 
 def _check_finite(blocks: BlockSums) -> BlockSums:
     """Refuse samples that are not finite: their sums are not either."""
     got = "values that are not"
-    advice = "leave out their samples, as asperity.measurement.measure does"
+    advice = "leave out their samples, as asperity.measure does"
     require(np.isfinite(blocks.moments).all(), "lock_in.load and force", "be finite", got, advice)
     return blocks
 

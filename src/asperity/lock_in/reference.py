@@ -67,7 +67,7 @@ def strongest_line(
     """
     step, thinned = _evenly(time, values, _SPECTRUM)
     got = "values that are not"
-    advice = "leave out their samples, as asperity.measurement.measure does"
+    advice = "leave out their samples, as asperity.measure does"
     require(np.isfinite([step, thinned.sum()]).all(), "lock_in.load", "be finite", got, advice)
     spectra = [_spectrum(step, thinned)]
     if time.size > _SPECTRUM:

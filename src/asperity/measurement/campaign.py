@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from asperity._processes import process_pool
 from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
+from asperity.measurement.verdicts.verdict import doubts_text
 from asperity.outputs import UnfinishedText, output_file, write_table, written_file
 from asperity.parameters.columns import read_headed_columns
 
@@ -206,7 +207,7 @@ def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError])
             "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
             "delta_mu_interval_95": measurement.delta_mu_interval_95,
             "unit": measurement.samples.unit,
-            "checks": _named(measurement.checks),
+            "checks": doubts_text(measurement.checks),
         }
         observed, covariance = observable_covariance(measurement)
         row |= {
@@ -239,18 +240,13 @@ def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
         "healing_per_decade_uncertainty": measurement.healing.uncertainty
         if measurement.healing
         else math.nan,
-        "checks": _named(measurement.checks),
+        "checks": doubts_text(measurement.checks),
     }
     return [common | {"part": k} | row | more for k, row in enumerate(rows, 1)]
 
 
 def _columns_of(reading: VelocityStep | HoldReading) -> Row:
     return {f.name: getattr(reading, f.name) for f in fields(reading) if f.name not in _LEFT_OUT}
-
-
-def _named(checks: Iterable[Any]) -> str:
-    """Checks that are not ok, as ``name: verdict; ...``."""
-    return "; ".join(f"{c.name}: {c.verdict}" for c in checks if c.verdict != "ok")
 
 
 def _columns(table: list[Row]) -> list[str]:

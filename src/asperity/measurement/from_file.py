@@ -10,7 +10,6 @@ from asperity.measurement.measure import Measurement, measure, measure_amplitude
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.measurement.stick_slip.measure import (
     SLIDER,
-    Machine,
     StickSlipMeasurement,
     measure_stick_slip,
 )
@@ -126,58 +125,30 @@ def answer_measurement(
     InputError
         As of `measure_recording`.
     """
-    return _either(
-        trace,
-        question,
-        lambda: measure(trace, window=question.window, **_lock_in(question)),
-        plain=plain,
-    )
+    return _either(trace, question, measure, plain=plain)
 
 
 def measured_parts(
     trace: Trace, question: Question
 ) -> list[Measurement | InputError] | SlidingMeasurement | StickSlipMeasurement:
     """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
-    return _either(trace, question, lambda: modulated_parts(trace, question))[0]
-
-
-def modulated_parts(trace: Trace, question: Question) -> list[Measurement | InputError]:
-    """Every modulated stretch of a recording; that of the window, if one is given."""
-    if question.window is not None:
-        return [measure(trace, window=question.window, **_lock_in(question))]
-    return measure_amplitudes(trace, **_lock_in(question))
+    return _either(trace, question, measure_amplitudes)[0]
 
 
 def _either(
-    trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
+    trace: Trace,
+    question: Question,
+    modulated: Callable[[Trace, Question], Read],
+    *,
+    plain: bool = False,
 ) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
     """What `modulated` reads, the sliding or the slip events, as question or recording says."""
-    where: dict[str, Any] = {
-        "load": question.load,
-        "force": question.force,
-        "window": question.window,
-    }
-
-    def sliding() -> SlidingMeasurement:
-        return measure_sliding(
-            trace,
-            **where,
-            detrend=question.detrend,
-            steps=question.steps,
-            velocities=question.velocities,
-            holds=question.holds,
-        )
-
-    def slips() -> StickSlipMeasurement:
-        numbers = question.stiffness, question.velocity, question.mass, question.normal_load
-        return measure_stick_slip(trace, **where, machine=Machine(*numbers))
-
     if question.stick_slip:
-        return slips(), ""
+        return measure_stick_slip(trace, question), ""
     if question.modulated is False:
-        return sliding(), ""
+        return measure_sliding(trace, question), ""
     try:
-        return modulated(), ""
+        return modulated(trace, question), ""
     except InputError as error:
         constant = isinstance(error, ConstantLoadError)
         known = question.modulated or question.frequency is not None
@@ -187,11 +158,11 @@ def _either(
     what = "The normal load is not modulated" if constant else "No channel is the normal load"
     events, unread = None, None
     try:
-        events = slips() if question.stick_slip is None else None
+        events = measure_stick_slip(trace, question) if question.stick_slip is None else None
     except InputError as error:
         unread = error
     try:
-        measurement = sliding()
+        measurement = measure_sliding(trace, question)
     except InputError as error:
         # W0 is known of slip events alone.
         if events is not None and _rather_events(events, 0):
@@ -214,12 +185,6 @@ def _either(
             raise unread
         raise _without_motion(measurement, events)
     return measurement, f"{what}: steady sliding is read."
-
-
-def _lock_in(question: Question) -> dict[str, Any]:
-    same = {"load", "force", "frequency", "harmonics", "detrend"}
-    own = {"only_whole_periods": question.whole_periods, "refine": not question.exact_frequency}
-    return question.model_dump(include=same) | own
 
 
 def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import Argument, ConstantLoadError, InputError, require
+from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -28,7 +27,7 @@ from asperity.measurement.series import (
 )
 from asperity.measurement.verdicts import checks, instrument, steadiness
 from asperity.measurement.verdicts.checks import drift_rate
-from asperity.measurement.verdicts.verdict import Check, Verdict, worst
+from asperity.measurement.verdicts.verdict import LOCK_IN, Check, Judged
 from asperity.measurement.window import (
     LoadInterval,
     clean_run,
@@ -38,13 +37,14 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
-from asperity.parameters.arguments import rising
-from asperity.parameters.parameter import Drawn, SummaryLine
+from asperity.parameters.parameter import SummaryLine
+from asperity.questions.recording import Measurement as Question
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
 
+_DEFAULTS = Question()
 #: A line this often above its background is a modulation.
 _LINE = 8.0
 #: A drift of so many standard uncertainties is one.
@@ -59,7 +59,7 @@ _PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Measurement(Drawn):
+class Measurement(Judged):
     """A reading of one modulated stretch, what was around it, and what is to be thought of it.
 
     Attributes
@@ -98,66 +98,35 @@ class Measurement(Drawn):
     window: tuple[int, int]
     chosen_by: str
 
-    def summary(self) -> tuple[str, list[SummaryLine]]:
-        """The window, its observables, and the checks that are not good."""
-        reading = self.reading
+    def numbers(self) -> list[SummaryLine]:
+        """The window and its observables."""
+        reading, change = self.reading, "none"
+        if math.isfinite(self.delta_mu):
+            change = f"{self.delta_mu:.4g} +- {self.delta_mu_uncertainty:.1g}"
         lines = [
             SummaryLine("window", f"{reading.start:.6g} to {reading.end:.6g}", "s"),
             SummaryLine("epsilon", f"{reading.epsilon:.6g}"),
             SummaryLine("frequency", f"{reading.frequency:.9g}", "Hz"),
             SummaryLine("mean_friction", f"{reading.mean_friction:.6g}"),
-            SummaryLine(
-                "delta_mu",
-                f"{self.delta_mu:.4g} +- {self.delta_mu_uncertainty:.1g}"
-                if math.isfinite(self.delta_mu)
-                else "none",
-            ),
-            *(
-                SummaryLine(f"mu{n}", f"{abs(c):.4g}")
-                for n, c in enumerate(reading.harmonics[:2], 1)
-            ),
-            SummaryLine("verdict", str(self.verdict)),
+            SummaryLine("delta_mu", change),
         ]
-        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
-        return "Measurement", lines + [d for d in doubts if d.value in ("suspicious", "bad")]
-
-    @property
-    def verdict(self) -> Verdict:
-        """The gravest of all."""
-        return worst(self.checks)
+        harmonics = enumerate(reading.harmonics[:2], 1)
+        lines += [SummaryLine(f"mu{n}", f"{abs(c):.4g}") for n, c in harmonics]
+        return [*lines, SummaryLine("verdict", self.verdict)]
 
 
-def measure(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    frequency: float | None = None,
-    harmonics: int = 4,
-    window: tuple[float, float] | None = None,
-    detrend: str = "linear",
-    only_whole_periods: bool = False,
-    refine: bool = True,
-) -> Measurement:
+def measure(trace: Trace, question: Question = _DEFAULTS) -> Measurement:
     """Read the response to a modulated load out of a recording, and judge it.
+
+    Without a window the longest modulated stretch is read, without what has not settled where that
+    leaves half of it, and away from gaps and saturation where the longest run between them is long
+    enough. What settles in the window is fitted.
 
     Parameters
     ----------
     trace : Trace
-    load, force : str
-        Channels, by name or role.
-    frequency : float, optional
-        Hz, to start from; None finds it.
-    harmonics : int
-    window : (float, float), optional
-        First and last time (s) to read. None takes the longest modulated stretch, without what has
-        not settled where that leaves half of it, and away from gaps and saturation where the
-        longest run between them is long enough. What settles in the window is fitted.
-    detrend : {"none", "linear", "quadratic"}
-    only_whole_periods : bool
-        Cut the window to whole periods. The fit does not need it.
-    refine : bool
-        Fit the frequency. If not, `frequency` is taken to be exact.
+    question : asperity.questions.recording.Measurement
+        Its fields of a modulated load; all have defaults.
 
     Returns
     -------
@@ -169,27 +138,17 @@ def measure(
         If channels, window or frequency do not fit the recording, or no modulation stands out and
         no frequency is given.
     """
-    options = dict(locals())
-    del options["window"]
-    return _measured(_prepared(**options), None, window)
+    return _measured(_prepared(trace, question), None)
 
 
 def measure_amplitudes(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    frequency: float | None = None,
-    harmonics: int = 4,
-    detrend: str = "linear",
-    only_whole_periods: bool = False,
-    refine: bool = True,
+    trace: Trace, question: Question = _DEFAULTS
 ) -> list[Measurement | InputError]:
-    """Read every modulated stretch of a recording, in their order.
+    """Read every modulated stretch of a recording, in their order; that of the window, if given.
 
     Parameters
     ----------
-    trace, load, force, frequency, harmonics, detrend, only_whole_periods, refine
+    trace, question
         As in `measure`.
 
     Returns
@@ -202,13 +161,15 @@ def measure_amplitudes(
     InputError
         As `measure` where the recording as a whole cannot be read.
     """
-    recording = _prepared(**locals())
+    if question.window is not None:
+        return [measure(trace, question)]
+    recording = _prepared(trace, question)
     measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
             continue
         try:
-            measurements.append(_measured(recording, part, None))
+            measurements.append(_measured(recording, part))
         except InputError as error:
             measurements.append(error)
     return measurements
@@ -217,7 +178,7 @@ def measure_amplitudes(
 def modulation_of(trace: Trace) -> float | None:
     """Frequency (Hz) at which the recorded load is modulated; None of another recording."""
     try:
-        return _prepared(trace).frequency
+        return _prepared(trace, _DEFAULTS).frequency
     except InputError:
         return None
 
@@ -229,26 +190,14 @@ class _ModulatedRecording:
     samples: Samples
     parts: list[LoadInterval]
     frequency: float
-    only_whole_periods: bool
-    lock_in: Mapping[str, Any]
+    question: Question
 
 
-def _prepared(
-    trace: Trace,
-    load: str = "W",
-    force: str = "F",
-    frequency: float | None = None,
-    only_whole_periods: bool = False,
-    detrend: str = "linear",
-    refine: bool = True,
-    **lock_in: Any,
-) -> _ModulatedRecording:
-    rule = "be none, linear or quadratic"
-    require(detrend in DRIFTS, "measure.detrend", rule, f"'{detrend}'", "choose one")
-    samples = usable(trace, load, force)
-    line = modulation_line(samples.time, samples.load, frequency)
+def _prepared(trace: Trace, question: Question) -> _ModulatedRecording:
+    samples = usable(trace, question.load, question.force)
+    line = modulation_line(samples.time, samples.load, question.frequency)
     require_modulated(line, samples.load)
-    if frequency is None and line.amplitude < _LINE * line.background:
+    if question.frequency is None and line.amplitude < _LINE * line.background:
         raise ConstantLoadError(
             "measure.load",
             "be modulated",
@@ -256,27 +205,24 @@ def _prepared(
             f"{line.amplitude / line.background:.2g} times its surroundings",
             f"give the frequency if you know it, or choose {Argument('modulated', value='False')}",
         )
-    start = frequency if frequency is not None and not refine else line.frequency
-    options = {**lock_in, "detrend": detrend, "refine": refine}
-    parts = _parts(samples, line, start)
-    return _ModulatedRecording(samples, parts, start, only_whole_periods, options)
+    start = question.frequency if question.exact_frequency else line.frequency
+    return _ModulatedRecording(samples, _parts(samples, line, start), start, question)
 
 
-def _measured(
-    recording: _ModulatedRecording, part: LoadInterval | None, window: tuple[float, float] | None
-) -> Measurement:
+def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Measurement:
     """One stretch; the longest modulated one, or that of the window, if none is given."""
     samples, parts, start = recording.samples, recording.parts, recording.frequency
+    question, window = recording.question, recording.question.window
     if window is None:
         chosen = part or max(
             (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
         )
-        first, stop = _chosen(samples, chosen, start, DRIFTS[recording.lock_in["detrend"]])
+        first, stop = _chosen(samples, chosen, start, DRIFTS[question.detrend])
     else:
         first, stop = _given(samples.time, window)
         # F(0) is that next to the stretch that is read.
         chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
-    if recording.only_whole_periods:
+    if question.whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
     time, force_values = samples.time[cut], samples.force[cut]
@@ -285,8 +231,10 @@ def _measured(
         samples.load[cut],
         force_values,
         frequency=start,
+        harmonics=question.harmonics,
+        detrend=question.detrend,
+        refine=not question.exact_frequency,
         settles=True,
-        **recording.lock_in,
     )
     chosen_by = "program" if window is None else "user"
     before, after = _around(samples, parts, chosen, reading.W0)
@@ -294,7 +242,7 @@ def _measured(
     if after and before and rates[0] and rates[1]:
         # A pause that drifts as the one before the modulation does not has not recovered from it.
         change = rates[1].beyond(rates[0]) * (after[0].end - after[0].start)
-        if change > checks.LIMITS["transient"][0] * abs(after[0].value):
+        if change > LOCK_IN["transient"][0] * abs(after[0].value):
             after = None
     pauses = [rates[0]] if rates[0] else []
     if before and after:
@@ -394,15 +342,14 @@ def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int)
 
 
 def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
-    rising(window, "measure.window")
     start, end = window
-    first, stop = np.searchsorted(time, [start, end], side="left")
+    first = int(np.searchsorted(time, start, side="left"))
     stop = int(np.searchsorted(time, end, side="right"))
-    if stop - int(first) < 16:
+    if stop - first < 16:
         rule = "enclose at least 16 samples"
         advice = f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
         raise InputError("measure.window", rule, f"{start:g} s to {end:g} s", advice)
-    return int(first), stop
+    return first, stop
 
 
 def _around(
@@ -455,7 +402,7 @@ def _pause(time: Float, force: Float, load: Float, *, recovers: bool) -> _Pause 
             force = force - settling.at(time - time[0])
     level, of_load = mean_level(time, force), mean_level(time, load)
     if settling is not None and settling.possible and settling.present and not settling.determined:
-        limit = checks.LIMITS["transient"][0]
+        limit = LOCK_IN["transient"][0]
         if abs(settling.amplitude) > limit * abs(level.value):
             return None
     level = level._replace(

@@ -13,7 +13,6 @@ from asperity.inference.answers import read_data
 from asperity.inference.cycles.cycle import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.laws import RiceRuina
-from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
 from asperity.questions.fit import Fit
 from asperity.recording import Channel, Trace
 from asperity.transients.limit_cycle import limit_cycle
@@ -41,7 +40,7 @@ def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
     force = cycle.lowest + (force - cycle.lowest) * size[(place // cycle.period).astype(int)]
     force = force + noise * cycle.drop * rng.standard_normal(t.size)
     trace = Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
-    return measure_stick_slip(trace, machine=Machine(**{"velocity": V, "load": W0} | machine))
+    return asp.measure(trace, stick_slip=True, **{"velocity": V, "normal_load": W0} | machine)
 
 
 def test_residuals_at_the_truth_are_chi_squared():

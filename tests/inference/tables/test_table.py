@@ -1,11 +1,13 @@
 """Tables with covariances, as ``asperity measure`` writes them; readings that are far off."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+import asperity as asp
 from asperity import Slider, materials, periodic_response
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
@@ -13,10 +15,11 @@ from asperity.inference import fit, read_table, table_of
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.residuals import outlying_rows, standardised
 from asperity.measurement.campaign import run_campaign
-from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
 from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
+
+measure = partial(asp.measure, modulated=True)
 
 V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
 

@@ -1,15 +1,18 @@
 """Stamps that were rounded are a grid plus rounding; an irregular clock stays as it is."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+import asperity as asp
 from asperity.inference.runs.run import recorded_run
-from asperity.measurement.measure import measure
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Channel, Trace, check, read
 from asperity.recording.defects.sampling import even_times, rounded_grid
+
+measure = partial(asp.measure, modulated=True)
 
 SEEDS = range(6)
 

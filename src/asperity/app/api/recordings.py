@@ -163,11 +163,11 @@ def _modulated(
     trace: Any, measurement: Measurement, question: questions.Measurement, name: str
 ) -> dict[str, Any]:
     from asperity.measurement.campaign import modulated_rows
-    from asperity.measurement.from_file import modulated_parts
+    from asperity.measurement.measure import measure_amplitudes
     from asperity.measurement.record import mean_cycle, modulated_record, residual_spectrum
 
     several = question.window is None and sum(p.modulated for p in measurement.stretches) > 1
-    parts = modulated_parts(trace, question) if several else [measurement]
+    parts = measure_amplitudes(trace, question) if several else [measurement]
     samples, reading = measurement.samples, measurement.reading
     cycle = mean_cycle(measurement)
     frequencies, amplitudes = residual_spectrum(measurement)

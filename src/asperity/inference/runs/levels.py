@@ -16,6 +16,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.measurement.sliding.measure import measure_sliding
+from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Channel, Trace
 
 #: d mu/d ln V of a velocity step, and its standard uncertainty.
@@ -66,7 +67,9 @@ def level_rates(
     channels = {"mu": Channel(friction, "dimensionless"), "load": Channel(load, "dimensionless")}
     trace = Trace(time, channels, roles={"friction": "mu", "W": "load"})
     try:
-        measured = measure_sliding(trace, steps=steps, velocities=velocities)
+        measured = measure_sliding(
+            trace, Question(steps=tuple(steps), velocities=tuple(velocities))
+        )
     except InputError:
         # The levels are an addition to the fit: what they lack is no mistake of the user.
         return ()

@@ -18,9 +18,9 @@ from asperity.measurement.sliding.segments import Partition, partition, partitio
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
-from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
-from asperity.parameters.arguments import rising
-from asperity.parameters.parameter import Drawn, SummaryLine
+from asperity.measurement.verdicts.verdict import SLIDING, Check, Judged
+from asperity.parameters.parameter import SummaryLine
+from asperity.questions.recording import Measurement as Question
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,13 +28,7 @@ if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
 
-#: Where suspicious and bad begin.
-LIMITS = {
-    "load": (0.005, 0.02),
-    "drift": (0.02, 0.15),
-    "segments": (0.0, np.inf),
-    "settling": (0.3, np.inf),
-}
+_DEFAULTS = Question()
 #: Samples on each side that a step needs, and in a hold's surroundings.
 _FEWEST = 16
 
@@ -73,7 +67,7 @@ class SlidingSegment:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlidingMeasurement(Drawn):
+class SlidingMeasurement(Judged):
     """What a recording without modulation says.
 
     Attributes
@@ -123,55 +117,29 @@ class SlidingMeasurement(Drawn):
     unread: int
     checks: tuple[Check, ...]
 
-    def summary(self) -> tuple[str, list[SummaryLine]]:
+    def numbers(self) -> list[SummaryLine]:
         """Mean friction, and the numbers of segments, steps and holds."""
         friction = self.friction
-        lines = [
+        return [
             SummaryLine("friction", f"{friction.value:.6g} +- {friction.uncertainty:.1g}"),
             SummaryLine("segments", str(len(self.segments))),
             SummaryLine("steps", str(len(self.steps))),
             SummaryLine("holds", str(len(self.holds))),
         ]
-        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
-        return "SlidingMeasurement", lines + [d for d in doubts if d.value in ("suspicious", "bad")]
-
-    @property
-    def verdict(self) -> Verdict:
-        """The gravest of all."""
-        return worst(self.checks)
 
 
-def measure_sliding(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    window: tuple[float, float] | None = None,
-    detrend: str = "linear",
-    steps: Sequence[float] | None = None,
-    velocities: Sequence[float] | None = None,
-    holds: Sequence[tuple[float, float]] | None = None,
-) -> SlidingMeasurement:
+def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeasurement:
     """Friction, its velocity steps and its holds in a recording without modulation.
 
     Friction is F/W where both are recorded, and otherwise the recorded friction coefficient.
-    Segments are cut where the displacement, or the velocity, changes its rate.
+    Segments are cut where the displacement, or the velocity, changes its rate, or at the steps and
+    holds of the question. Levels are extrapolated to a step or a hold through a trend over slip.
 
     Parameters
     ----------
     trace : Trace
-    load, force : str
-        Channels, by name or role.
-    window : (float, float), optional
-        First and last time (s).
-    detrend : {"none", "linear", "quadratic"}
-        Trend over slip through which levels are extrapolated to a step or a hold.
-    steps : sequence of float, optional
-        Times (s) of the velocity steps, in place of those that the program finds.
-    velocities : sequence of float, optional
-        Of the drive between the steps (m/s), one more than these, 0 in a hold; measured by default.
-    holds : sequence of (float, float), optional
-        First and last times (s) of the holds, in place of those that the program finds.
+    question : asperity.questions.recording.Measurement
+        Its fields of sliding; all have defaults.
 
     Returns
     -------
@@ -183,17 +151,14 @@ def measure_sliding(
         If neither force and load nor friction is recorded, the window holds too little, or a given
         time lies outside of it.
     """
-    if detrend not in DRIFTS:
-        raise InputError(
-            "measure.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
-        )
-    signals = sliding_signals(trace, load, force, window)
+    steps, holds, detrend = question.steps, question.holds, question.detrend
+    signals = sliding_signals(trace, question.load, question.force, question.window)
     time, friction = signals.time, signals.friction
     times = _given_cuts(time, steps, holds)
     if times is None:
         cut = partition(time, signals.displacement)
     else:
-        cut = partition_at(time, signals.displacement, np.array(times), velocities)
+        cut = partition_at(time, signals.displacement, np.array(times), question.velocities)
         cut = _with_holds(cut, time, holds)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
     segments = tuple(
@@ -237,8 +202,6 @@ def _given_cuts(
     if steps is None and holds is None:
         return None
     cuts = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
-    for hold in holds or ():
-        rising(hold, "measure.holds")
     for at in cuts:
         if not time[0] < at < time[-1]:
             raise InputError(
@@ -387,10 +350,9 @@ def _checks(
     if borne is not None and borne.size:
         spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
         checks.append(
-            judged(
+            SLIDING.check(
                 "load",
                 spread,
-                LIMITS["load"],
                 f"the load's standard deviation is {100 * spread:.2g} % of its mean"
                 + _exchanged(signals, spread),
             )
@@ -398,22 +360,20 @@ def _checks(
     sliding = [s for s in segments if not s.hold] or list(segments)
     drift = max(abs(p.slope * (p.end - p.steady.start)) for p in sliding) / mean
     checks.append(
-        judged(
+        SLIDING.check(
             "drift",
             drift,
-            LIMITS["drift"],
             f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean",
         )
     )
     if signals.turned:
         checks.append(
-            judged("sign", 1.0, (0.5, np.inf), "friction is recorded as negative, and was turned")
+            SLIDING.check("sign", 1.0, "friction is recorded as negative, and was turned")
         )
     checks.append(
-        judged(
+        SLIDING.check(
             "segments",
             float(len(doubts)),
-            LIMITS["segments"],
             "; ".join(doubts) or "the recording can be cut in one way only",
         )
     )
@@ -421,10 +381,9 @@ def _checks(
         slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
         share = slow.settling_slip / slow.choices[0].window
         checks.append(
-            judged(
+            SLIDING.check(
                 "settling",
                 share,
-                LIMITS["settling"],
                 f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of "
                 "the slip that can be compared; a slower one cannot be distinguished from the "
                 "trend",

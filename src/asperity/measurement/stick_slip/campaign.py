@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.measurement.stick_slip.healing import StickSlipHealing, of_campaign
 from asperity.measurement.stick_slip.regimes import REPEATED
 from asperity.parameters.parameter import Drawn, SummaryLine
@@ -17,7 +17,6 @@ from asperity.units import format_si
 if TYPE_CHECKING:
     from asperity.experiment import StickSlip
 
-Array = NDArray[np.float64]
 
 #: Shares by which stiffnesses and loads of one machine differ at most.
 _SAME = 0.05
@@ -46,7 +45,7 @@ class StickSlipSeries:
         parts = [f"{name} = {format_si(v, kind, 4)}" for name, v, kind in known if np.isfinite(v)]
         return ", ".join(parts) or "K and W0 not known"
 
-    def column(self, name: str) -> Array:
+    def column(self, name: str) -> Float:
         """Numbers of the rows; NaN where they are not known."""
         values = [row.get(name) for row in self.rows]
         return np.array([np.nan if value is None else value for value in values], float)

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError
 from asperity.measurement.series import mean_level
 from asperity.measurement.stick_slip.threshold import linear_frequency
-from asperity.measurement.verdicts.verdict import percent
+from asperity.measurement.verdicts.verdict import doubts_text, percent
 from asperity.outputs import json, written_file
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
-Array = NDArray[np.float64]
 
 CONVENTIONS = (
     "forces are F/W; drop = force_before - force_after; recurrence and stick_duration run from the "
@@ -55,7 +54,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
 _OF_MEASUREMENT = ("slip", "slip_velocity", "energy")
 
 
-def column(measurement: StickSlipMeasurement, name: str) -> Array:
+def column(measurement: StickSlipMeasurement, name: str) -> Float:
     """Values of a column of `COLUMNS`, one for each event."""
     source: Any = measurement if name in _OF_MEASUREMENT else measurement.events
     return np.asarray(getattr(source, name), dtype=float)
@@ -188,7 +187,6 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
         mean = mean_level(measurement.time[part], measurement.friction[part])
         level = {"mean_friction": mean.value, "mean_friction_uncertainty": mean.uncertainty}
         level["epsilon"] = 0.0
-    doubts = "; ".join(f"{c.name}: {c.verdict}" for c in measurement.checks if c.verdict != "ok")
     return {
         "file": str(path),
         "part": 1,
@@ -200,7 +198,7 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
         "regime": measurement.kind,
         **level,
         **means(measurement),
-        "checks": doubts,
+        "checks": doubts_text(measurement.checks),
     }
 
 

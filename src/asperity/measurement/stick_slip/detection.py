@@ -7,13 +7,10 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float, Index
 from asperity.measurement.stick_slip.lines import lines
 from asperity.measurement.stick_slip.noise import Noise
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Means over an eighth of a cycle still show its peak and its trough; what lasts for less than a
 #: thirty-second of it is noise.
@@ -34,7 +31,7 @@ _BLUNTER = 3.0
 _REGULAR, _FEWEST_CYCLES = 0.25, 8
 
 
-def turning_points(values: Array, height: float) -> Index:
+def turning_points(values: Float, height: float) -> Index:
     """Alternating maxima and minima between which the values rise and fall by `height` or more.
 
     Parameters
@@ -101,15 +98,15 @@ class Falls:
 
     peak: Index
     trough: Index
-    scatter: Array
-    thresholds: Array
+    scatter: Float
+    thresholds: Float
     evidence: int
 
     def __len__(self) -> int:
         return self.peak.size
 
 
-def find_falls(force: Array, noise: Noise) -> Falls:
+def find_falls(force: Float, noise: Noise) -> Falls:
     """Every fall of the force that is loading's opposite, and no noise.
 
     Parameters
@@ -143,7 +140,7 @@ def find_falls(force: Array, noise: Noise) -> Falls:
     return Falls(empty, empty, scatter, _thresholds(noise, scatter), 0)
 
 
-def _thresholds(noise: Noise, scatter: Array) -> Array:
+def _thresholds(noise: Noise, scatter: Float) -> Float:
     return np.array([noise.threshold(s, 1 << k) for k, s in enumerate(scatter)])
 
 
@@ -185,12 +182,12 @@ def _returns(peak: Index) -> bool:
 class _Averages:
     """Means of a force over 1, 2, 4, ... samples, and their falls, each computed once."""
 
-    def __init__(self, force: Array, noise: Noise) -> None:
+    def __init__(self, force: Float, noise: Noise) -> None:
         self.force, self._noise = force, noise
         self._total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
         self.means, self.falls = cache(self._means), cache(self._falls)
 
-    def _means(self, octave: int) -> tuple[Array, int]:
+    def _means(self, octave: int) -> tuple[Float, int]:
         """Means over 2^octave samples, and the samples from one to the next."""
         width = 1 << octave
         hop = max(1, width // 4)
@@ -241,7 +238,7 @@ def _at_all_widths(
 
 
 def _steep_part(
-    averages: _Averages, peak: Index, trough: Index, thresholds: Array
+    averages: _Averages, peak: Index, trough: Index, thresholds: Float
 ) -> tuple[Index, Index]:
     """Falls from where they leave their upper quarter to where they reach their lower, and around.
 
@@ -277,7 +274,7 @@ def _octave(samples: float) -> int:
     return int(np.log2(max(samples, 1.0)))
 
 
-def _tilt(force: Array, peak: Index, trough: Index) -> float:
+def _tilt(force: Float, peak: Index, trough: Index) -> float:
     """Rate of fall between those of loading and of slip, per sample.
 
     The geometric mean of both: a pause in a fall is as far from loading as from slip.
@@ -305,7 +302,7 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
     return peak[kept], trough[kept]
 
 
-def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
+def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
     The slider does not move backwards: a rise twice as fast as the loading around it is the

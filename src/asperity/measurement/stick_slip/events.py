@@ -10,18 +10,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float, Index
 from asperity.measurement.stick_slip.detection import Falls
 from asperity.measurement.stick_slip.lines import Sums
 from asperity.measurement.stick_slip.noise import resolution
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: Of each event peak, trough, and the run around them that is read.
 Bounds = tuple[Index, ...]
-Shape = Callable[[Array, Array], Array]
+Shape = Callable[[Float, Float], Float]
 
 #: A line long enough that noise moves its end by this share of the drop; longer ones bend.
 _PRECISION = 0.01
@@ -68,44 +66,44 @@ class SlipEvents:
         slip of the recording.
     """
 
-    onset: Array
-    end: Array
-    timing_uncertainty: Array
-    force_before: Array
-    force_after: Array
-    drop_uncertainty: Array
-    loading_slope: Array
-    slope_uncertainty: Array
-    slope_bend: Array
-    creep: Array
-    creep_uncertainty: Array
-    fall_rate: Array
+    onset: Float
+    end: Float
+    timing_uncertainty: Float
+    force_before: Float
+    force_after: Float
+    drop_uncertainty: Float
+    loading_slope: Float
+    slope_uncertainty: Float
+    slope_bend: Float
+    creep: Float
+    creep_uncertainty: Float
+    fall_rate: Float
 
     def __len__(self) -> int:
         return self.onset.size
 
     @property
-    def drop(self) -> Array:
+    def drop(self) -> Float:
         """Fall of the force from onset to end."""
         return self.force_before - self.force_after
 
     @property
-    def slip_duration(self) -> Array:
+    def slip_duration(self) -> Float:
         """Seconds from onset to end."""
         return self.end - self.onset
 
     @property
-    def stick_duration(self) -> Array:
+    def stick_duration(self) -> Float:
         """Seconds from the end of the event before to the onset; NaN of the first."""
         return self.onset - np.concatenate([[np.nan], self.end])[:-1]
 
     @property
-    def recurrence(self) -> Array:
+    def recurrence(self) -> Float:
         """Seconds from the onset of the event before to the onset; NaN of the first."""
         return np.diff(self.onset, prepend=np.nan)
 
 
-def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
+def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     """Measure every fall.
 
     Parameters
@@ -130,7 +128,7 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
     return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
-def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
+def _read(time: Float, force: Float, falls: Falls) -> SlipEvents:
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -176,9 +174,9 @@ def _onset_and_end(
     first: Index,
     stop: Index,
     *,
-    rate: Array,
+    rate: Float,
     shape: Shape,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Float, Float, Float]:
     """Onset and end by least squares, on grids that zoom in.
 
     Returns
@@ -236,7 +234,7 @@ def _onset_and_end(
     return onset, end, np.where(np.isfinite(squares), squares, 0.0)
 
 
-def _free(u: Array, loaded: Array) -> Array:
+def _free(u: Float, loaded: Float) -> Float:
     """A free slider at constant friction: the cosine of a phase from -a to pi + a.
 
     It goes on with the slope of the loading: what the drive loads during the slip, over the drop,
@@ -290,10 +288,10 @@ def _timing(
     sums: Sums,
     part: Index,
     bounds: Bounds,
-    rate: Array,
-    drop: Array,
+    rate: Float,
+    drop: Float,
     noise: Autoregression,
-    scatter: Array,
+    scatter: Float,
 ) -> _Timing:
     """The shape of slips, which all fall alike, from made recordings of each.
 
@@ -313,10 +311,10 @@ def _timing(
     first, stop = bounds[2:]
     k = part.size
 
-    def read(sums: Sums, part: Index, bounds: Bounds, rate: Array) -> list[tuple[Array, ...]]:
+    def read(sums: Sums, part: Index, bounds: Bounds, rate: Float) -> list[tuple[Float, ...]]:
         return [_onset_and_end(sums, part, *bounds, rate=rate, shape=shape) for shape in _SHAPES]
 
-    def contrasts(fits: list[tuple[Array, ...]], drop: Array) -> Array:
+    def contrasts(fits: list[tuple[Float, ...]], drop: Float) -> Float:
         squares = np.array([fit[2] for fit in fits])
         return (squares[1:] - squares[0]) / drop**2
 
@@ -388,12 +386,12 @@ def _force_of(
     sums: Sums,
     part: Index,
     shape: Shape,
-    slips: tuple[Array, Array],
+    slips: tuple[Float, Float],
     bounds: tuple[Index, Index],
-    rate: Array,
+    rate: Float,
     place: Index,
     owner: Index,
-) -> Array:
+) -> Float:
     """Force at the samples `place` of the events `owner`: line, slip and line, as fitted."""
     (onset, end), (first, stop) = slips, bounds
     until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
@@ -411,11 +409,11 @@ def _force_of(
 
 
 def _measured(
-    time: Array,
-    force: Array,
-    scatter: Array,
+    time: Float,
+    force: Float,
+    scatter: Float,
     sums: Sums,
-    slips: tuple[Array, Array],
+    slips: tuple[Float, Float],
     bounds: tuple[Index, Index],
     sticks: _Sticks,
     timing_of: _Timing,
@@ -427,7 +425,7 @@ def _measured(
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
     since = np.clip(np.ceil(end).astype(np.intp), None, stop - 2)
 
-    def level(begin: Index, close: Index, at: Array) -> tuple[Array, Array]:
+    def level(begin: Index, close: Index, at: Float) -> tuple[Float, Float]:
         mean, slope, *_ = sums.line(begin, close)
         return mean + slope * (at - sums.origin) + sums.level, slope
 
@@ -493,15 +491,15 @@ class _Sticks:
         What of the slope is open in all sticks, as they bend.
     """
 
-    centre: Array
-    mean: Array
-    slope: Array
-    mean_error: Array
-    slope_error: Array
-    bend: Array
+    centre: Float
+    mean: Float
+    slope: Float
+    mean_error: Float
+    slope_error: Float
+    bend: Float
 
 
-def _sticks(force: Array, first: Index, stop: Index, scatter: Array) -> _Sticks:
+def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
     """Lines through runs of samples, and what lines through the halves of each say otherwise."""
     if not first.size:
         return _Sticks(*(np.empty(0),) * 6)
@@ -526,10 +524,10 @@ def _sticks(force: Array, first: Index, stop: Index, scatter: Array) -> _Sticks:
 def _empty_falls(
     sums: Sums,
     edges: Index,
-    slips: tuple[Array, Array],
+    slips: tuple[Float, Float],
     bounds: tuple[Index, Index],
-    slope: Array,
-    scatter: Array,
+    slope: Float,
+    scatter: Float,
 ) -> float:
     """Uncertainty of drops by the noise as it is, over that by the scatter of means.
 
@@ -558,7 +556,7 @@ def _empty_falls(
     return max(1.0, float(np.median(np.abs(drop) / error)) / 0.6745)
 
 
-def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
+def _noise(force: Float, first: Index, stop: Index) -> Autoregression:
     """Noise about straight lines through runs of sticks, of which short ones are left out."""
     from scipy.signal import detrend
 
@@ -568,7 +566,7 @@ def _noise(force: Array, first: Index, stop: Index) -> Autoregression:
     return fitted([detrend(part) for part in parts], parameters=2 * len(parts))
 
 
-def _of_mean(scatter: Array, samples: Index | Array) -> Array:
+def _of_mean(scatter: Float, samples: Index | Float) -> Float:
     """Scatter of the mean over so many samples, between and beyond the widths that are known."""
     known = np.arange(scatter.size)
     octave = np.log2(np.maximum(samples, 1))
@@ -576,7 +574,7 @@ def _of_mean(scatter: Array, samples: Index | Array) -> Array:
     return np.asarray(inside * 2.0 ** (-np.maximum(octave - known[-1], 0.0) / 2))
 
 
-def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
+def steepest_fall(force: Float, onset: Float, end: Float, drop: Float) -> Float:
     """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
 
     Slips have one shape, whose steepest quarter is that of their mean: the largest of the rates of
@@ -595,7 +593,7 @@ def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
     places = onset[:, None] + duration[:, None] * np.linspace(0.0, 1.0, 9)
     reach = np.broadcast_to(width[:, None] / 2, places.shape)
 
-    def mean(low: Array, high: Array) -> Array:
+    def mean(low: Float, high: Float) -> Float:
         first, last = (np.interp(at + 0.5, np.arange(total.size), total) for at in (low, high))
         return np.asarray((last - first) / (high - low))
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-Array = NDArray[np.float64]
+from asperity.arrays import Float
 
 #: Fewest recordings that tell a slope, and passes in which their scatter about it settles.
 _FEWEST, _PASSES = 3, 30
@@ -58,7 +57,7 @@ class StickSlipHealing:
         return float(low.min()), float(high.max())
 
 
-def of_campaign(stick_durations: Array, drops: Array, uncertainties: Array) -> StickSlipHealing:
+def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> StickSlipHealing:
     """Healing from the mean drops of recordings at several velocities or stiffnesses.
 
     Parameters

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from asperity.arrays import Float, Index
 
 
 class Sums:
@@ -16,7 +14,7 @@ class Sums:
     recordings lose no digits.
     """
 
-    def __init__(self, force: Array, edges: Index, origin: Index) -> None:
+    def __init__(self, force: Float, edges: Index, origin: Index) -> None:
         # What lies before the first edge belongs to the first cell.
         inner = np.minimum(edges[1:], force.size)
         cells = np.append(inner, force.size) - np.append(0, inner)
@@ -27,7 +25,7 @@ class Sums:
             np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)
         )
 
-    def line(self, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+    def line(self, first: Index, stop: Index) -> tuple[Float, Float, Float, Float]:
         """Level and slope at the origin of the cell, sum of squared residuals, mean of t.
 
         `first` and `stop` bound runs inside one cell each.
@@ -41,7 +39,7 @@ class Sums:
         return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
 
 
-def lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+def lines(force: Float, first: Index, stop: Index) -> tuple[Float, Float, Float, Float]:
     """Centre, mean, slope and number of samples of runs that do not overlap, in rising order."""
     sums = Sums(force, first, (first + stop) // 2)
     level, slope, _, away = sums.line(first, stop)

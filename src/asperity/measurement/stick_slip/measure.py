@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError
 from asperity.measurement.samples import about_channels
 from asperity.measurement.sliding.signals import (
@@ -20,8 +20,9 @@ from asperity.measurement.stick_slip.events import SlipEvents, read_events, stee
 from asperity.measurement.stick_slip.noise import estimate, resolution, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
-from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
-from asperity.parameters.parameter import Drawn, SummaryLine
+from asperity.measurement.verdicts.verdict import STICK_SLIP, Check, Judged, percent
+from asperity.parameters.parameter import SummaryLine
+from asperity.questions.recording import Measurement as Question
 from asperity.recording.defects.check import even_rate, saturation
 from asperity.recording.defects.levels import CROWDED, coarsely_rounded
 from asperity.recording.trace import Channel
@@ -29,8 +30,8 @@ from asperity.recording.trace import Channel
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
-Array = NDArray[np.float64]
 
+_DEFAULTS = Question()
 #: Events that tell no regime.
 _FEW = 2
 #: Share of the displacement in the slips above which it is the slider's.
@@ -46,19 +47,6 @@ _LONGEST_GAP = 4.0
 _CROWDED = 1.5
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
-#: Where suspicious and bad begin.
-LIMITS = {
-    "events": (10.0, 3.0),
-    "regime": (0.0, np.inf),
-    "sampling": (0.05, 0.5),
-    "threshold": (0.1, np.inf),
-    "hidden events": (0.02, np.inf),
-    # Of 144 made recordings whose other checks are ok, 14 are above: the gauges of all 14 ring.
-    "ringing": (0.04, np.inf),
-    "drift": (3.0, 30.0),
-    "stiffness": (0.05, 0.3),
-    "resolution": (0.1, np.inf),
-}
 
 
 @dataclass(frozen=True)
@@ -84,7 +72,7 @@ class Machine:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StickSlipMeasurement(Drawn):
+class StickSlipMeasurement(Judged):
     """Events of a recording and what they say.
 
     Attributes
@@ -119,8 +107,8 @@ class StickSlipMeasurement(Drawn):
 
     _drawn_by = "asperity.figures.stick_slip:draw_stick_slip"
 
-    time: Array
-    friction: Array
+    time: Float
+    friction: Float
     events: SlipEvents
     regimes: tuple[Regime, ...]
     machine: Machine
@@ -128,11 +116,11 @@ class StickSlipMeasurement(Drawn):
     loading_slope_uncertainty: float
     smallest_drop: float
     noise: float
-    impulses: NDArray[np.intp]
+    impulses: Index
     slip_share: float
-    slip: Array
-    slip_velocity: Array
-    energy: Array
+    slip: Float
+    slip_velocity: Float
+    energy: Float
     names: tuple[str, ...]
     checks: tuple[Check, ...]
 
@@ -148,11 +136,6 @@ class StickSlipMeasurement(Drawn):
         )
 
     @property
-    def verdict(self) -> Verdict:
-        """The gravest of all."""
-        return worst(self.checks)
-
-    @property
     def clear(self) -> bool:
         """Whether stick-slip, or an oscillation, takes more of the recording than all else."""
         moving = sum(r.end - r.start for r in self.regimes if r.stop - r.first > _FEW)
@@ -163,36 +146,22 @@ class StickSlipMeasurement(Drawn):
         """Kinds of the regimes, in their order."""
         return ", then ".join(regime.kind for regime in self.regimes)
 
-    def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Regimes, number and means of the events."""
+    def numbers(self) -> list[SummaryLine]:
+        """Regimes, number and mean drop of the events."""
         events = self.events
         lines = [SummaryLine("regime", self.kind), SummaryLine("events", str(len(events)))]
-        if len(events):
-            lines.append(SummaryLine("drop", f"{np.mean(events.drop):.4g}"))
-        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
-        return "StickSlipMeasurement", lines + [
-            d for d in doubts if d.value in ("suspicious", "bad")
-        ]
+        return lines + [SummaryLine("drop", f"{np.mean(events.drop):.4g}")] * (len(events) > 0)
 
 
-def measure_stick_slip(
-    trace: Trace,
-    *,
-    load: str = "W",
-    force: str = "F",
-    window: tuple[float, float] | None = None,
-    machine: Machine | None = None,
-) -> StickSlipMeasurement:
+def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSlipMeasurement:
     """Slip events of a recording, its regimes, and its loading.
 
     Parameters
     ----------
     trace : Trace
-    load, force : str
-        Channels, by name or role; a friction coefficient takes their place.
-    window : (float, float), optional
-        First and last time (s).
-    machine : Machine, optional
+    question : asperity.questions.recording.Measurement
+        Its channels, window and machine; all have defaults. A friction coefficient takes the place
+        of load and force.
 
     Raises
     ------
@@ -203,14 +172,14 @@ def measure_stick_slip(
     -----
     Samples at uneven times are interpolated to even ones.
     """
-    machine = machine or Machine()
     # A lone F/(m g) is known by its name before it has company.
     trace = with_normalised_force(trace)
-    if machine.load is not None:
-        trace = _with_load(trace, machine.load)
-    signals = _at_even_times(sliding_signals(trace, load, force, window))
+    if question.normal_load is not None and not trace.has("W"):
+        constant = Channel(np.full(len(trace), question.normal_load), "force", "N", "load", "N")
+        trace = replace(trace, channels={**trace.channels, "load": constant})
+    signals = _at_even_times(sliding_signals(trace, question.load, question.force, question.window))
     time = signals.time
-    machine = _completed(machine, signals)
+    machine = _machine(question, signals)
     friction, impulses = without_impulses(signals.friction)
     noise = estimate(friction)
     falls, upside_down = find_falls(friction, noise), False
@@ -276,12 +245,12 @@ def measure_stick_slip(
             else "the force is negative on average, though it rises slowly and falls fast: drops "
             "stand, but forces before and after lack the zero of the gauge"
         )
-        checks.append(judged("sign", 1.0, (0.5, np.inf), text))
+        checks.append(STICK_SLIP.check("sign", 1.0, text))
     steps = coarsely_rounded(signals.friction)
     if steps and len(events):
         coarse = steps[1] / float(np.median(events.drop))
         text = f"the recorder's steps, {steps[1]:.2g}, are {percent(coarse)} of the median drop"
-        checks.append(judged("resolution", coarse, LIMITS["resolution"], text))
+        checks.append(STICK_SLIP.check("resolution", coarse, text))
     return replace(result, checks=tuple(checks))
 
 
@@ -308,26 +277,17 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
     )
 
 
-def _with_load(trace: Trace, load: float) -> Trace:
-    """The recording with a constant load, where none is recorded."""
-    try:
-        trace.channel("W")
-    except InputError:
-        constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
-        return replace(trace, channels={**trace.channels, "load": constant})
-    return trace
-
-
-def _completed(machine: Machine, signals: SlidingSignals) -> Machine:
-    load, velocity = machine.load, machine.velocity
+def _machine(question: Question, signals: SlidingSignals) -> Machine:
+    """What the question says of the machine, completed by the recording."""
+    load, velocity = question.normal_load, question.velocity
     if load is None and signals.load is not None and signals.load_unit == "N":
         load = float(np.mean(signals.load))
-    if load is None and signals.load is None and machine.mass is not None:
-        load = machine.mass * GRAVITY
+    if load is None and signals.load is None and question.mass is not None:
+        load = question.mass * GRAVITY
     if velocity is None and signals.displacement is not None:
         moved = signals.displacement
         velocity = abs(float(moved[-1] - moved[0])) / float(signals.time[-1] - signals.time[0])
-    return replace(machine, load=load, velocity=velocity or None)
+    return Machine(question.stiffness, velocity or None, question.mass, load)
 
 
 def _loading(events: SlipEvents) -> tuple[float, float]:
@@ -368,7 +328,7 @@ def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
     return float(np.abs(at[1] - at[0]).sum()) / moved if moved else np.nan
 
 
-def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
+def _spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
     """Slip, largest slip velocity and energy from M = 0, F = K (Vt - x)."""
     if machine.stiffness is None or machine.load is None:
         none = np.full(len(events), np.nan)
@@ -381,7 +341,7 @@ def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
     return slip, speed, energy
 
 
-def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tuple[Array, Array]:
+def _recorded_slip(time: Float, displacement: Float, events: SlipEvents) -> tuple[Float, Float]:
     """Slip and largest slip velocity of each event from the displacement of the slider.
 
     Means over a quarter of its duration, before the onset and after the end, tell the slip: a
@@ -392,7 +352,7 @@ def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tupl
     onset, end = ((t - time[0]) / step for t in (events.onset, events.end))
     total = np.concatenate([[0.0], np.cumsum(forward - forward[0])])
 
-    def mean(low: Array, high: Array) -> Array:
+    def mean(low: Float, high: Float) -> Float:
         first = np.clip(np.rint(low).astype(np.intp), 0, time.size - 1)
         stop = np.clip(np.rint(high).astype(np.intp), first + 1, time.size)
         return np.asarray((total[stop] - total[first]) / (stop - first))
@@ -418,12 +378,12 @@ class _Middles:
         Of force, and of time (s), in the middle half.
     """
 
-    after: NDArray[np.intp]
-    total: Array
-    first: NDArray[np.intp]
-    stop: NDArray[np.intp]
-    mean: Array
-    centre: Array
+    after: Index
+    total: Float
+    first: Index
+    stop: Index
+    mean: Float
+    centre: Float
 
     @classmethod
     def of(cls, result: StickSlipMeasurement) -> _Middles:
@@ -474,7 +434,7 @@ def _hidden(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, floa
     few sticks.
     """
     events, time, after = result.events, result.time, sticks.after
-    if after.size < LIMITS["events"][1] or not result.loading_slope > 0:
+    if after.size < STICK_SLIP["events"][1] or not result.loading_slope > 0:
         return np.nan, np.nan
     total, first, stop = sticks.total, sticks.first, sticks.stop
     rise = sticks.mean - events.force_after[after - 1]
@@ -505,7 +465,7 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     checks: list[Check] = []
 
     def ask(name: str, number: float, sentence: str, doubt: str = "", error: float = 0.0) -> None:
-        check = judged(name, number, LIMITS[name], sentence, significant=abs(number) >= 3 * error)
+        check = STICK_SLIP.check(name, number, sentence, significant=abs(number) >= 3 * error)
         checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
 
     text = f"{count} complete event{'' if count == 1 else 's'}"

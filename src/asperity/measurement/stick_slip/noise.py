@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import ndtri
 
-Array = NDArray[np.float64]
+from asperity.arrays import Float, Index
 
 #: Median filter whose output two neighbouring impulses leave as it is.
 _FILTER = 5
@@ -46,7 +45,7 @@ class Noise:
         Of the recording.
     """
 
-    scatter: Array
+    scatter: Float
     samples: int
 
     @property
@@ -54,7 +53,7 @@ class Noise:
         """Exponent k of the longest means, over 2^k samples."""
         return self.scatter.shape[0] - 1
 
-    def of_means(self, longest: int, noisy: int) -> Array:
+    def of_means(self, longest: int, noisy: int) -> Float:
         """Standard deviation of means over 1, 2, 4, ... 2^longest samples.
 
         Parameters
@@ -91,7 +90,7 @@ class Noise:
         return float(np.sqrt(2.0) * scatter * -ndtri(FALSE_ALARM / means**2))
 
 
-def estimate(force: Array) -> Noise:
+def estimate(force: Float) -> Noise:
     """Noise from second differences of means, in which straight loading cancels.
 
     Parameters
@@ -133,7 +132,7 @@ def estimate(force: Array) -> Noise:
     return Noise(scatter, n)
 
 
-def _deviation(sizes: Array) -> float:
+def _deviation(sizes: Float) -> float:
     """Standard deviation of a normal variable, from its smaller absolute values.
 
     Values on the levels of a coarse recorder count up to the middle between two levels.
@@ -147,7 +146,7 @@ def _deviation(sizes: Array) -> float:
     return (level + float(above.min())) / 2 / float(ndtri(0.5 + share / 2))
 
 
-def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
+def without_impulses(force: Float) -> tuple[Float, Index]:
     """The force with impulses of one or two samples replaced by the median around them.
 
     Parameters
@@ -185,7 +184,7 @@ def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
     return clean, at
 
 
-def resolution(force: Array) -> float:
+def resolution(force: Float) -> float:
     """Smallest usual step between neighbouring samples that differ; zero for a fine recorder."""
     steps = np.abs(np.diff(force[: 1 << 16]))
     moving = steps[steps > 0]

@@ -11,12 +11,10 @@ from itertools import groupby
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from asperity.arrays import Bool, Float
 from asperity.measurement.stick_slip.events import STICKING, SlipEvents
-
-Array = NDArray[np.float64]
 
 #: Regimes whose mean drop is that of a cycle.
 REPEATED = ("regular stick-slip", "irregular stick-slip")
@@ -88,8 +86,8 @@ class Regime:
 
 
 def regimes(
-    time: Array,
-    force: Array,
+    time: Float,
+    force: Float,
     events: SlipEvents,
     smallest_drop: float,
     *,
@@ -148,7 +146,7 @@ def _without_single_events(parts: list[Regime]) -> list[Regime]:
     return merged
 
 
-def _usual(values: Array) -> Array:
+def _usual(values: Float) -> Float:
     """Median over the neighbours on both sides; NaN of a single event, which has no stick."""
     if values.size < 2:
         return values
@@ -156,7 +154,7 @@ def _usual(values: Array) -> Array:
     return np.asarray(median_filter(known, 2 * _NEAR - 1, mode="reflect"))
 
 
-def _other_velocity(slope: Array) -> NDArray[np.bool_]:
+def _other_velocity(slope: Float) -> Bool:
     """Whether the loading is another after an event: the velocity or the stiffness has changed.
 
     An entry for each stick; entry k is true where the events up to k load otherwise than those
@@ -184,7 +182,7 @@ def _other_velocity(slope: Array) -> NDArray[np.bool_]:
 
 
 def _without_events(
-    time: Array, force: Array, smallest_drop: float, falls: int, impulses: float
+    time: Float, force: Float, smallest_drop: float, falls: int, impulses: float
 ) -> Regime:
     mean = abs(float(np.mean(force)))
     share = smallest_drop / mean if mean else np.inf
@@ -216,8 +214,8 @@ def _without_events(
 
 
 def _between(
-    time: Array,
-    force: Array,
+    time: Float,
+    force: Float,
     span: tuple[float, float],
     event: int,
     cycle: float,
@@ -292,7 +290,7 @@ def _train(
     return Regime(kind, *span, first, stop, text)
 
 
-def _spread(values: Array, uncertainty: Array) -> float:
+def _spread(values: Float, uncertainty: Float) -> float:
     """Relative standard deviation without what noise adds."""
     variance = float(np.var(values)) - float(np.mean(uncertainty**2))
     return float(np.sqrt(max(variance, 0.0))) / float(np.mean(values))

@@ -20,11 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.measurement.stick_slip.events import SlipEvents
-
-Array = NDArray[np.float64]
 
 #: Periods of growing or dying cycles that are read together: up to this share longer than those of
 #: the smallest, and drops that change by this factor.
@@ -133,7 +131,7 @@ def linear_frequency(events: SlipEvents, loading: float) -> tuple[float, float]:
     return 1 / best[0], best[1] / best[0] ** 2
 
 
-def _without_drop(square: Array, period: Array, uncertainty: Array) -> tuple[float, float]:
+def _without_drop(square: Float, period: Float, uncertainty: Float) -> tuple[float, float]:
     """Period at no drop, by a weighted line, and its standard uncertainty.
 
     Half of what the line adds to the period of the smallest drop counts as uncertain.

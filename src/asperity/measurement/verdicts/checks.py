@@ -12,30 +12,11 @@ from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import slow_line
-from asperity.measurement.verdicts.verdict import Check, judged, percent
+from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
 from asperity.recording.finding import Finding
 
-#: Where suspicious and bad begin; friction has a lower and an upper side.
-LIMITS: dict[str, tuple[float, float]] = {
-    "modulation": (20.0, 5.0),
-    "periods": (5.0, 2.0),
-    "signal": (10.0, 3.0),
-    "drift": (0.005, 0.02),
-    "transient": (0.001, 0.01),
-    "stick-slip": (0.0005, 0.005),
-    "load harmonics": (0.05, 0.3),
-    "resolution": (0.1, 1.0),
-    "saturation": (0.0, 0.01),
-    "spike": (0.0, 0.001),
-    "repeated time": (0.0, 0.05),
-    "missing values": (0.0, 0.25),
-    "infinite": (0.0, 0.25),
-    "gap": (0.0, 0.25),
-    "uneven sampling": (20.0, 1000.0),
-    "contact": (0.95, 1.0),
-    "low friction": (0.02, -2.0),
-    "high friction": (2.0, 20.0),
-}
+#: Friction of contacts: limits of a small mean of F/W0, and of a large one.
+_LOW_FRICTION, _HIGH_FRICTION = (0.02, -2.0), (2.0, 20.0)
 
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
 _LINE = 6.0
@@ -44,10 +25,9 @@ _LINE = 6.0
 def modulation(reading: LockInReading) -> Check:
     """Whether the load is modulated at all."""
     number = abs(reading.epsilon) / max(reading.uncertainty("epsilon"), 1e-300)
-    return judged(
+    return LOCK_IN.check(
         "modulation",
         number,
-        LIMITS["modulation"],
         f"the load's amplitude is {_times(number)} its uncertainty, epsilon = "
         f"{reading.epsilon:.4g} at {reading.frequency:.6g} Hz",
     )
@@ -56,10 +36,9 @@ def modulation(reading: LockInReading) -> Check:
 def periods(reading: LockInReading) -> Check:
     """Whether the window holds enough of them."""
     number = reading.periods
-    return judged(
+    return LOCK_IN.check(
         "periods",
         number,
-        LIMITS["periods"],
         f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell "
         "apart",
     )
@@ -69,10 +48,9 @@ def signal(reading: LockInReading) -> Check:
     """Whether the first harmonic stands out of the noise."""
     phasor = reading.phasor(1)
     number = phasor.amplitude / max(phasor.amplitude_uncertainty, 1e-300)
-    return judged(
+    return LOCK_IN.check(
         "signal",
         number,
-        LIMITS["signal"],
         f"mu1 is {_times(number)} its standard uncertainty; below three its amplitude is "
         "biased and its phase unknown",
     )
@@ -81,15 +59,14 @@ def signal(reading: LockInReading) -> Check:
 def load_harmonics(reading: LockInReading) -> Check:
     """How much of mu2 can come from a second harmonic of the load."""
     if reading.harmonics.size < 2:
-        return judged("load harmonics", 0.0, LIMITS["load harmonics"], "mu2 was not asked for")
+        return LOCK_IN.check("load harmonics", 0.0, "mu2 was not asked for")
     second, response = reading.load_phasor(2), reading.phasor(2)
     share = second.amplitude
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
     number = effect / max(response.amplitude, 1e-300)
-    return judged(
+    return LOCK_IN.check(
         "load harmonics",
         number,
-        LIMITS["load harmonics"],
         f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
         f"{effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
@@ -114,7 +91,7 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
             "in the recording"
         )
         significant = abs(change) > 10 * reading.uncertainty("mean_force")
-    return judged("drift", abs(share), LIMITS["drift"], sentence, significant=significant)
+    return LOCK_IN.check("drift", abs(share), sentence, significant=significant)
 
 
 def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
@@ -145,7 +122,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
             else "its final value is not determined; record a longer stretch"
         )
         seen = chosen_by == "user" or not settling.determined
-        return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
+        return LOCK_IN.check("transient", number, sentence, significant=seen)
     away = [drift_rate(reading).beyond(pause) for pause in pauses if reading.drift.shape[1]]
     # A pause that recovers from a modulation may drift too: none of them may explain the window.
     number = min(away, default=0.0) * length / mean
@@ -155,7 +132,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
         if number
         else "no settling of the force stands out"
     )
-    return judged("transient", number, LIMITS["transient"], sentence)
+    return LOCK_IN.check("transient", number, sentence)
 
 
 def drift_rate(reading: LockInReading) -> Rate:
@@ -177,7 +154,7 @@ def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
                 f"the force oscillates at {line.frequency:.4g} Hz, no harmonic, by "
                 f"{percent(number)} of its mean"
             )
-    return judged("stick-slip", number, LIMITS["stick-slip"], sentence, significant=seen)
+    return LOCK_IN.check("stick-slip", number, sentence, significant=seen)
 
 
 def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
@@ -194,10 +171,9 @@ def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
         answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
     seen, number, name, noisy = max(answers)
-    return judged(
+    return LOCK_IN.check(
         "resolution",
         number,
-        LIMITS["resolution"],
         f"the {name} is recorded in steps of {number:.2g} of its first harmonic, with noise of "
         f"{noisy:.2g} steps",
         significant=seen,
@@ -222,18 +198,14 @@ def _finding(finding: Finding, samples: int, span: float) -> Check:
     sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
     # Shares of the window, where the number of the finding can be made one.
     shares = {
-        "saturation": 1.0,
         **dict.fromkeys(("spike", "repeated time", "missing values", "infinite"), 1 / samples),
         "gap": 1 / span,
     }
-    if finding.name in shares:
-        return judged(
-            finding.name, finding.number * shares[finding.name], LIMITS[finding.name], sentence
-        )
-    if finding.name in LIMITS:
-        return judged(finding.name, finding.number, LIMITS[finding.name], sentence)
+    if finding.name in FINDINGS:
+        number = finding.number * shares.get(finding.name, 1.0)
+        return FINDINGS.check(finding.name, number, sentence)
     grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[finding.severity]
-    return judged(finding.name, 1.0, grave, sentence)
+    return Limits({finding.name: grave}).check(finding.name, 1.0, sentence)
 
 
 def _nonzero(value: float) -> float:
@@ -246,10 +218,9 @@ def _times(number: float) -> str:
 
 def contact(reading: LockInReading) -> Check:
     """Whether the load stays above zero."""
-    return judged(
+    return LOCK_IN.check(
         "contact",
         reading.epsilon,
-        LIMITS["contact"],
         f"the load falls to {1 - reading.epsilon:.3g} W0 in each period; below zero contact is "
         "lost, or the load's zero or sign is not that of the recording",
     )
@@ -257,15 +228,14 @@ def contact(reading: LockInReading) -> Check:
 
 def friction(number: float) -> Check:
     """Whether a mean of F/W0 is a friction coefficient of contacts."""
-    limits = LIMITS["high friction" if number > LIMITS["low friction"][0] else "low friction"]
-    sentence = (
-        f"the mean of F/W0 is {number:.4g}, where contacts have {LIMITS['low friction'][0]:g} to 2"
-    )
+    low, high = _LOW_FRICTION[0], _HIGH_FRICTION[0]
+    sentence = f"the mean of F/W0 is {number:.4g}, where contacts have {low:g} to {high:g}"
     if number < 0:
         sentence += (
             "; load and force have opposite signs, which turns every phase by pi: a unit such as "
             "'-1 N' for one of them turns it back"
         )
-    elif number < LIMITS["low friction"][0] or number > LIMITS["high friction"][0]:
+    elif not low <= number <= high:
         sentence += "; check the units, the zeros and which column is which"
-    return judged("friction", number, limits, sentence)
+    limits = Limits(friction=_HIGH_FRICTION if number > low else _LOW_FRICTION)
+    return limits.check("friction", number, sentence)

@@ -16,20 +16,9 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
-from asperity.measurement.verdicts.verdict import Check, judged
+from asperity.measurement.verdicts.verdict import LOCK_IN, Check
 from asperity.measurement.window import LoadInterval
 from asperity.recording.defects.levels import held_length
-
-#: Where suspicious and bad begin; of a made force, small numbers are suspicious and none is bad; a
-#: mains line is judged by epsilon, small being bad.
-LIMITS: dict[str, tuple[float, float]] = {
-    "held samples": (0.01, 0.1),
-    "made force": (0.3, -1.0),
-    "mains": (0.02, 0.005),
-    "lines in the pauses": (0.02, 0.2),
-    "hum": (0.05, 0.5),
-    "flat top": (0.0, 0.16),
-}
 
 _PIECE = 1 << 16
 #: Mains frequencies (Hz), how many harmonics of them count, and how far a network wanders (Hz).
@@ -82,7 +71,7 @@ def held_samples(reading: LockInReading, load: Float, force: Float) -> Check:
                 f"the {name} repeats each value {length:.3g} times on average: it is converted "
                 f"more slowly than recorded, and its first harmonic lags by {lag:.2g} rad"
             )
-    return judged("held samples", number, LIMITS["held samples"], sentence)
+    return LOCK_IN.check("held samples", number, sentence)
 
 
 def made_force(
@@ -107,12 +96,12 @@ def made_force(
         f"the force was made from friction x load ('{name}'); the recorded coefficient is "
         f"modulated by {number:.2g} of epsilon times its mean"
     )
-    if number < LIMITS["made force"][0]:
+    if number < LOCK_IN["made force"][0]:
         sentence += (
             ". It hardly follows the load: if the recorder divided by a mean load, mu1 and phase1 "
             "are those of the load and not of the friction; use the recorded shear force"
         )
-    return (judged("made force", number, LIMITS["made force"], sentence),)
+    return (LOCK_IN.check("made force", number, sentence),)
 
 
 def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -> Check:
@@ -130,7 +119,7 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
     number = float(abs(reading.epsilon))
     if not near:
         sentence = f"{f:.6g} Hz is no harmonic of 50 or 60 Hz"
-        return judged("mains", number, LIMITS["mains"], sentence, significant=False)
+        return LOCK_IN.check("mains", number, sentence, significant=False)
     switched = False
     for part in parts:
         cut = slice(part.first, part.stop)
@@ -140,11 +129,11 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
     sentence = (
         f"the modulation, epsilon = {number:.3g} at {f:.6g} Hz, lies at a harmonic of the mains "
         f"({near[0]:g} Hz); so small a one may be hum in the load's signal and no modulation"
-        if number < LIMITS["mains"][0] and not switched
+        if number < LOCK_IN["mains"][0] and not switched
         else f"the modulation lies at a harmonic of the mains ({near[0]:g} Hz), and is "
         + ("switched off in the pauses" if switched else "larger than hum usually is")
     )
-    return judged("mains", number, LIMITS["mains"], sentence, significant=not switched)
+    return LOCK_IN.check("mains", number, sentence, significant=not switched)
 
 
 def lines_in_the_pauses(
@@ -190,8 +179,7 @@ def lines_in_the_pauses(
     number, sentence, seen = largest
     if not seen:
         sentence = "without modulation the force has no line at f and 2f that stands out"
-    limits = LIMITS["lines in the pauses"]
-    return (judged("lines in the pauses", number, limits, sentence, significant=seen),)
+    return (LOCK_IN.check("lines in the pauses", number, sentence, significant=seen),)
 
 
 def hum(reading: LockInReading, time: Float, force: Float) -> Check:
@@ -220,7 +208,7 @@ def hum(reading: LockInReading, time: Float, force: Float) -> Check:
                     f"hum at {m * base:g} Hz is {share:.2g} of mu{n} W0; mains have harmonics, and "
                     f"{n * f:.6g} Hz is one of them: mu{n} may hold hum"
                 )
-    return judged("hum", number, LIMITS["hum"], sentence, significant=seen)
+    return LOCK_IN.check("hum", number, sentence, significant=seen)
 
 
 def _line(time: Float, values: Float, frequency: float) -> tuple[float, float]:
@@ -290,7 +278,7 @@ def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> 
                 "the period, as an amplifier or a converter at the end of its range cuts it: "
                 "amplitudes and mean are wrong"
             )
-    return judged("flat top", number, LIMITS["flat top"], sentence)
+    return LOCK_IN.check("flat top", number, sentence)
 
 
 def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int) -> _Cycle | None:

@@ -13,20 +13,13 @@ from asperity.lock_in.normal_equations import Basis, solved
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
-from asperity.measurement.verdicts.verdict import Check, judged, percent
+from asperity.measurement.verdicts.verdict import LOCK_IN, Check, percent
 
 #: Samples of the piece in the middle that is searched for what is nearly as fast as the modulation.
 _PIECE = 1 << 16
 #: Stick-slip of laboratory sliders is slower than this (Hz).
 _STICK_SLIP = 20.0
 
-#: Where suspicious and bad begin.
-LIMITS: dict[str, tuple[float, float]] = {
-    "leakage": (0.01, 0.1),
-    "steady response": (0.05, 0.5),
-    "steady load": (0.01, 0.05),
-    "shifting response": (0.07, 0.4),
-}
 
 #: Spectral lines on each side of a line that are its sidebands if it is not steady.
 _SIDEBANDS = 16
@@ -107,10 +100,9 @@ def leakage(reading: LockInReading) -> Check:
     """Whether the load is one line, as the reading takes it to be."""
     carrier = abs(reading.epsilon * reading.W0) * reading.samples / 2
     number, beyond = _sidebands(reading, 0, carrier)
-    return judged(
+    return LOCK_IN.check(
         "leakage",
         number,
-        LIMITS["leakage"],
         f"sidebands of the load hold {percent(number)} of its amplitude; if much, it is no "
         "steady line of one frequency: choose a window in which it is",
         significant=beyond > 3.0,
@@ -121,10 +113,9 @@ def steady_response(reading: LockInReading) -> Check:
     """Whether mu1 and its phase are the same in all of the window."""
     carrier = reading.phasor(1).amplitude * abs(reading.W0) * reading.samples / 2
     number, beyond = _sidebands(reading, 1, carrier)
-    return judged(
+    return LOCK_IN.check(
         "steady response",
         number,
-        LIMITS["steady response"],
         f"sidebands of the force hold {percent(number)} of its first harmonic; mu1 changes within "
         "the window, or another line is next to it, if that is much",
         significant=3.0 < beyond < np.inf,
@@ -138,10 +129,9 @@ def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
     number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
     motion = "drifts" if abs(drift) > slow else "wanders"
     significant = seen if slow >= abs(drift) else abs(drift) > 10 * reading.uncertainty("W0")
-    return judged(
+    return LOCK_IN.check(
         "steady load",
         number,
-        LIMITS["steady load"],
         f"the mean load {motion} by {percent(number)} in the window, apart from its modulation",
         significant=significant,
     )
@@ -198,7 +188,7 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     pieces = int(min(_PIECES, reading.periods // _FEWEST_PERIODS))
     if pieces < 3:
         sentence = "the window is too short to be read in pieces"
-        return judged("shifting response", 0.0, LIMITS["shifting response"], sentence)
+        return LOCK_IN.check("shifting response", 0.0, sentence)
     omega = 2 * np.pi * reading.frequency
     orders = range(1, reading.harmonics.size + 1)
     middle = (reading.start + reading.end) / 2
@@ -222,10 +212,9 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     seen = squares > freedom + _BEYOND * np.sqrt(2 * freedom)
     away = np.abs(phasors[:, None] - phasors[None, :])
     number = float(away.max() / max(abs(mean), 1e-300))
-    return judged(
+    return LOCK_IN.check(
         "shifting response",
         min(number, 1e300),
-        LIMITS["shifting response"],
         f"read in {pieces} pieces, the first harmonic of the force shifts by {100 * number:.2g} % "
         "within the window",
         significant=bool(seen),
