@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
+from asperity.measurement.campaign import column_unit, modulated_rows
 from asperity.measurement.measure import Measurement, measure
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Trace
@@ -161,13 +163,18 @@ class AmplitudeSeries:
         """
         import xarray
 
-        rows = [_row(point) for point in self.points]
-        data = {
-            name: ("epsilon", np.array([row[name] for row in rows]), {"units": unit})
-            for name, unit in _UNITS.items()
-            if all(name in row for row in rows)
+        rows = modulated_rows(Path(), [point.measurement for point in self.points])
+        names = [name for stem in _NUMBERS for name in (stem, f"{stem}_uncertainty")]
+        columns = {
+            "measured_epsilon": [row["epsilon"] for row in rows],
+            **{n: [row[n] for row in rows] for n in names if all(n in row for row in rows)},
+            "drift": [point.drift for point in self.points],
+            "verdict": [row["verdict"] for row in rows],
         }
-        data["verdict"] = ("epsilon", np.array([p.measurement.verdict for p in self.points]), {})
+        data = {
+            name: ("epsilon", values, {"units": column_unit(name)} if name != "verdict" else {})
+            for name, values in columns.items()
+        }
         about = {"units": "1", "long_name": "commanded relative amplitude of the load"}
         epsilon = [point.epsilon for point in self.points]
         attributes = {
@@ -179,37 +186,8 @@ class AmplitudeSeries:
         return xarray.Dataset(data, {"epsilon": ("epsilon", epsilon, about)}, attributes)
 
 
-_UNITS = {
-    "measured_epsilon": "1",
-    "mean_friction": "1",
-    "mean_friction_uncertainty": "1",
-    "static_friction": "1",
-    "delta_mu": "1",
-    "delta_mu_uncertainty": "1",
-    "mu1": "1",
-    "mu1_uncertainty": "1",
-    "phase1": "rad",
-    "phase1_uncertainty": "rad",
-    "mu2": "1",
-    "mu2_uncertainty": "1",
-    "phase2": "rad",
-    "phase2_uncertainty": "rad",
-    "drift": "1",
-}
-
-
-def _row(point: AmplitudePoint) -> dict[str, float]:
-    measurement = point.measurement
-    reading = measurement.reading
-    row = reading.observables()
-    row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in row}
-    return row | {
-        "measured_epsilon": reading.epsilon,
-        "static_friction": measurement.static_friction,
-        "delta_mu": measurement.delta_mu,
-        "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
-        "drift": point.drift,
-    }
+#: Numbers of a reading over the commanded amplitude, each with its uncertainty where it has one.
+_NUMBERS = ("mean_friction", "static_friction", "delta_mu", "mu1", "phase1", "mu2", "phase2")
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
+from asperity.measurement.stick_slip.detection import turning_points
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -136,7 +137,7 @@ def elastic_length(
     """
     F, x, W = (trace.channel(name).values for name in (force, displacement, load))
     K = None if spring is None else to_si(spring, "stiffness", "elastic_length.spring")
-    turns = _turning_points(F)
+    turns = turning_points(F, _TURN * float(np.ptp(F)))
     branches = list(pairwise(turns[1:]))
     slopes, lengths = [], []
     for a, b in branches[: 2 * (len(branches) // 2)]:
@@ -151,19 +152,3 @@ def elastic_length(
     require(pairs.size >= 2, "elastic_length.trace", rule, pairs.size, advice)
     uncertainty = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
     return ElasticLength(float(pairs.mean()), uncertainty, pairs, float(1 / np.mean(slopes)))
-
-
-def _turning_points(force: Float) -> list[int]:
-    """First sample, every turning point of the force, and last sample."""
-    reach = _TURN * float(np.ptp(force))
-    turns, best, rising = [0], 0, None
-    for i, value in enumerate(force):
-        if rising is None:
-            if abs(value - force[0]) > reach:
-                rising, best = value > force[0], i
-        elif (value > force[best]) if rising else (value < force[best]):
-            best = i
-        elif abs(value - force[best]) > reach:
-            turns.append(best)
-            rising, best = not rising, i
-    return [*turns, len(force) - 1]

@@ -167,9 +167,13 @@ def _stick_slip(
         except InputError:
             # The reader of runs takes K over the load.
             K, over_load = None, True
-        machine = {"stiffness": K, "velocity": V}
-        machine |= {"mass": given.get("M"), "normal_load": given.get("W0")}
-        question = Measured(window=data.window, **machine)
+        question = Measured(
+            window=data.window,
+            stiffness=K,
+            velocity=V,
+            mass=given.get("M"),
+            normal_load=given.get("W0"),
+        )
         measurement = measure_stick_slip(trace, question)
     except InputError:
         # The reader of runs checks the numbers again.

@@ -82,7 +82,7 @@ def lock_in(
     InputError
         If there are too few samples, the clock does not rise, or the frequency is not resolved.
     """
-    degree = _degree(detrend)
+    degree = _degree(detrend, "lock_in.detrend")
     _check(time, load, force, harmonics, degree)
     if frequency is None and not refine:
         raise InputError("lock_in.frequency", "be given with refine=False", "None", "give it in Hz")
@@ -189,9 +189,9 @@ def _white(blocks: BlockSums, residual: Complex) -> Float:
     return total.T @ total / max(float(blocks.count.sum()) - blocks.basis.linear - 1, 1.0)
 
 
-def _degree(detrend: str) -> int:
+def _degree(detrend: str, field: str) -> int:
     rule = "be none, linear or quadratic"
-    require(detrend in DRIFTS, "lock_in.detrend", rule, f"'{detrend}'", "choose one")
+    require(detrend in DRIFTS, field, rule, f"'{detrend}'", "choose one")
     return DRIFTS[detrend]
 
 
@@ -260,13 +260,12 @@ class LockInStream:
         harmonics: int = 4,
         detrend: str = "linear",
     ) -> None:
-        rule = "be none, linear or quadratic"
-        require(detrend in DRIFTS, "LockInStream.detrend", rule, f"'{detrend}'", "choose one")
+        degree = _degree(detrend, "LockInStream.detrend")
         rule, advice = "follow start and frequency be positive", "give them in this order"
         got = f"{start:g} s, {end:g} s and {frequency:g} Hz"
         require(end > start and frequency > 0, "LockInStream.end", rule, got, advice)
         half = (end - start) / 2
-        self._basis = Basis(2 * np.pi * frequency, harmonics, DRIFTS[detrend], start + half, half)
+        self._basis = Basis(2 * np.pi * frequency, harmonics, degree, start + half, half)
         self._parts: list[BlockSums] = []
 
     def add(self, time: Float, load: Float, force: Float) -> None:

@@ -159,6 +159,11 @@ class LockInReading:
         """Number of modulation periods in the window."""
         return (self.end - self.start) * self.frequency
 
+    def cycles(self, time: Float) -> Float:
+        """Phase of the load at times (s) of the window, over 2 pi; arrays (n,)."""
+        middle = (self.start + self.end) / 2
+        return self.frequency * (time - middle) + self.phase / (2 * np.pi)
+
     def observables(self) -> dict[str, float]:
         """W0, epsilon, frequency, mean_force, mean_friction, then mu1, phase1, ... by name."""
         numbers = {name: float(getattr(self, name)) for name in _SCALARS}
@@ -191,21 +196,16 @@ class LockInReading:
         """Harmonic n of F/W0 with its uncertainty."""
         rule, advice = f"be one of 1 to {self.harmonics.size}", "ask for more harmonics"
         require(1 <= n <= self.harmonics.size, "LockInReading.phasor", rule, n, advice)
-        at = [self.names.index(f"re{n}"), self.names.index(f"im{n}")]
-        return Phasor(
-            complex(self.harmonics[n - 1]),
-            self.covariance[np.ix_(at, at)],
-            float(min(self.dof[n], self.dof[1])),
-        )
+        return self._phasor(n, self.harmonics, "")
 
     def load_phasor(self, n: int) -> Phasor:
         """Harmonic n >= 2 of W/W0 with its uncertainty."""
-        at = [self.names.index(f"load_re{n}"), self.names.index(f"load_im{n}")]
-        return Phasor(
-            complex(self.load_harmonics[n - 1]),
-            self.covariance[np.ix_(at, at)],
-            float(min(self.dof[n], self.dof[1])),
-        )
+        return self._phasor(n, self.load_harmonics, "load_")
+
+    def _phasor(self, n: int, harmonics: Complex, prefix: str) -> Phasor:
+        at = [self.names.index(f"{prefix}{part}{n}") for part in ("re", "im")]
+        dof = float(min(self.dof[n], self.dof[1]))
+        return Phasor(complex(harmonics[n - 1]), self.covariance[np.ix_(at, at)], dof)
 
     def half_width(self, name: str, level: float = 0.95) -> float:
         """Half width of the confidence interval of a number, by Student's t.

@@ -284,7 +284,7 @@ def _write_netcdf(path: Path, table: list[Row]) -> None:
         values = [row.get(name) for row in table]
         if all(isinstance(v, int | float) or v is None for v in values):
             numbers = np.array([np.nan if v is None else v for v in values], dtype=float)
-            variables[name] = ("row", numbers, {"units": _unit(name)})
+            variables[name] = ("row", numbers, {"units": column_unit(name)})
         else:
             variables[name] = (
                 "row",
@@ -294,32 +294,27 @@ def _write_netcdf(path: Path, table: list[Row]) -> None:
     data.to_netcdf(path, engine="h5netcdf")
 
 
-def _unit(name: str) -> str:
-    """SI unit of a column; W0 and mean_force are in the column 'unit'."""
-    stem = name.removesuffix("_uncertainty").removesuffix("_interval_95").removesuffix("_spread")
-    units = {
-        "start": "s",
-        "end": "s",
-        "hold_time": "s",
-        "peak_time": "s",
-        "frequency": "Hz",
-        "settling_slip": "m",
-        "reload_slope": "1/m",
-        "reload": "1/m",
-        "loading_slope": "1/s",
-        "K": "N/m",
-        "V": "m/s",
-        "M": "kg",
-        "stiffness_from_slope": "N/m",
-        "linear_frequency": "Hz",
-    }
-    if stem.startswith("velocity"):
-        return "m/s"
-    if stem.startswith("phase"):
-        return "rad"
-    if stem in ("recurrence", "stick_duration", "slip_duration"):
-        return "s"
-    return units.get(stem, "" if stem in ("W0", "mean_force") else "1")
+def column_unit(name: str) -> str:
+    """SI unit of a column; empty for W0 and mean_force, whose unit is in the column 'unit'."""
+    stem = re.sub(r"_(uncertainty|interval_95|spread)$", "", name)
+    # All phases have one unit, as have the velocities before and after a step.
+    return _UNITS.get(re.sub(r"\d+$|_(before|after)$", "", stem), _UNITS.get(stem, "1"))
+
+
+#: Units of the columns that are no pure numbers.
+_UNITS = {
+    **dict.fromkeys(("start", "end", "hold_time", "peak_time", "recurrence"), "s"),
+    **dict.fromkeys(("stick_duration", "slip_duration"), "s"),
+    **dict.fromkeys(("frequency", "linear_frequency"), "Hz"),
+    **dict.fromkeys(("reload_slope", "reload"), "1/m"),
+    **dict.fromkeys(("K", "stiffness_from_slope"), "N/m"),
+    **dict.fromkeys(("velocity", "V"), "m/s"),
+    **dict.fromkeys(("W0", "mean_force"), ""),
+    "settling_slip": "m",
+    "loading_slope": "1/s",
+    "M": "kg",
+    "phase": "rad",
+}
 
 
 #: Fields of a measurement's question by the names that tables have.

@@ -65,7 +65,8 @@ def measure_recording(
         First and last time (s), numbers or texts with units.
     detrend : {"none", "linear", "quadratic"}
     only_whole_periods, refine : bool
-        Of a modulated recording: see `asperity.measurement.measure`.
+        Of a modulated recording: whether the window is cut to whole periods, which the fit does
+        not need, and whether the frequency is fitted. If not, `frequency` is taken to be exact.
     steps : sequence of float, optional
         Of a recording without modulation: times (s) of velocity steps.
     velocities : sequence of float or str, optional

@@ -205,7 +205,9 @@ def _prepared(trace: Trace, question: Question) -> _ModulatedRecording:
             f"{line.amplitude / line.background:.2g} times its surroundings",
             f"give the frequency if you know it, or choose {Argument('modulated', value='False')}",
         )
-    start = question.frequency if question.exact_frequency else line.frequency
+    start = line.frequency
+    if question.frequency is not None and question.exact_frequency:
+        start = question.frequency
     return _ModulatedRecording(samples, _parts(samples, line, start), start, question)
 
 

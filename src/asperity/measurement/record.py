@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from asperity.measurement.series import MeanLevel
     from asperity.measurement.sliding.measure import SlidingMeasurement
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
-    from asperity.measurement.verdicts.verdict import Check
 
 CONVENTIONS = (
     "W/W0 = 1 + epsilon cos phi + ..., F/W0 = mean_friction + sum of mu_n cos(n phi + phase_n); "
@@ -94,7 +92,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
             }
             for part in measurement.stretches
         ],
-        "checks": checks_record(measurement.checks),
+        "checks": [asdict(check) for check in measurement.checks],
         "findings": [asdict(finding) for finding in measurement.samples.findings],
         "channels": {"W": measurement.samples.names[0], "F": measurement.samples.names[1]},
         "unit": measurement.samples.unit,
@@ -179,14 +177,9 @@ def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
         "steps": [asdict(step) for step in measurement.steps],
         "holds": [asdict(hold) for hold in measurement.holds],
         "healing": None if measurement.healing is None else asdict(measurement.healing),
-        "checks": checks_record(measurement.checks),
+        "checks": [asdict(check) for check in measurement.checks],
         "conventions": SLIDING_CONVENTIONS,
     }
-
-
-def checks_record(checks: Iterable[Check]) -> list[dict[str, Any]]:
-    """Checks as a list of dicts."""
-    return [asdict(check) for check in checks]
 
 
 def _level(level: MeanLevel | None) -> dict[str, float] | None:
@@ -227,7 +220,7 @@ def mean_cycle(measurement: Measurement) -> MeanCycle:
     time, force = measurement.samples.time[cut], measurement.samples.force[cut]
     middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
     trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
-    phase = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    phase = reading.cycles(time)
     where = ((phase % 1.0) * _BINS).astype(int) % _BINS
     samples = np.bincount(where, minlength=_BINS)
     mean = np.bincount(where, force - trend, minlength=_BINS) / np.maximum(samples, 1) / reading.W0
@@ -258,8 +251,7 @@ def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
         measurement.samples.time[cut][:_MOST],
         measurement.samples.force[cut][:_MOST] / reading.W0,
     )
-    middle = (reading.start + reading.end) / 2
-    cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    cycles = reading.cycles(time)
     order = np.arange(1, reading.harmonics.size + 1)
     for n, c in zip(order, reading.harmonics, strict=True):
         force = force - (c * np.exp(2j * np.pi * n * cycles)).real

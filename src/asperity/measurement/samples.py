@@ -51,12 +51,8 @@ def load_channel(trace: Trace, load: str) -> Channel | None:
     InputError
         If the user names a load that is not there.
     """
-    try:
-        return trace.channel(load)
-    except InputError:
-        if load != "W" or "W" in trace.roles:
-            raise
-        return None
+    named = load != "W" or "W" in trace.roles
+    return trace.channel(load) if named or trace.has(load) else None
 
 
 def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Channel, bool]:
@@ -88,12 +84,9 @@ def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Chann
     friction = _friction(trace)
     if "friction" in trace.roles and friction is not None:
         return friction, True
-    try:
-        shear = trace.channel("F")
-    except InputError:
-        if friction is None:
-            raise
+    if friction is not None and not trace.has("F"):
         return friction, True
+    shear = trace.channel("F")
     ratio = shear.kind == "dimensionless"
     if ratio or friction is None or (load is not None and load.kind == shear.kind):
         return shear, ratio
@@ -163,7 +156,7 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
     # The sign of a shear is a convention of the recorder.
     if abs(abs(made) - abs(written)) <= _CONTRADICTS * abs(written):
         return
-    names = [next(n for n, c in trace.channels.items() if c is used) for used in (shear, recorded)]
+    names = [trace.name_of(used) for used in (shear, recorded)]
     raise InputError(
         "measure.force",
         "agree with the recorded friction",
@@ -176,10 +169,7 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
 
 
 def _friction(trace: Trace) -> Channel | None:
-    try:
-        return trace.channel("friction")
-    except InputError:
-        return None
+    return trace.channel("friction") if trace.has("friction") else None
 
 
 def compressive(load: Float, shear: Float) -> tuple[Float, Float, list[Finding]]:
@@ -277,7 +267,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     W = trace.channel(load)
     F, name = _force(trace, force, W)
     require_one_dimension(W, F, load, force)
-    names = (_name(trace, W), name)
+    names = (trace.name_of(W), name)
     if names[0] == names[1]:
         rule, got = "be another channel than the load", f"'{names[0]}' for both"
         raise InputError("measure.force", rule, got, "name the one that is the shear force")
@@ -360,7 +350,7 @@ def about_window(samples: Samples, start: float, end: float) -> list[Finding]:
 
 def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
     channel, _ = shear_channel(trace, name, load)
-    recorded = _name(trace, channel)
+    recorded = trace.name_of(channel)
     if channel.kind != "dimensionless" or load.kind == "dimensionless":
         return channel, recorded
     product = replace(load, values=channel.values * load.values, recorded_name=recorded)
@@ -382,10 +372,6 @@ def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:
         for f in trace.findings
         if not any(f.where == name or f.where.startswith(f"{name}, ") for name in others)
     )
-
-
-def _name(trace: Trace, channel: Channel) -> str:
-    return next(name for name, c in trace.channels.items() if c is channel)
 
 
 def _dimension_text(channel: Channel, name: str) -> str:

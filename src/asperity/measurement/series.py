@@ -97,6 +97,20 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
     return MeanLevel(float(values.mean()), spread, float(cosines), float(time[0]), float(time[-1]))
 
 
+def neighbour_scatter(values: Float) -> float:
+    """Standard deviation of noise, by the differences of neighbours, which steps hardly change."""
+    if values.size < 3:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
+
+
+def moving_mean(values: Float, wide: int) -> Float:
+    """Means over every `wide` neighbours; the values themselves where they are fewer."""
+    return (
+        np.convolve(values, np.ones(wide) / wide, mode="valid") if values.size >= wide else values
+    )
+
+
 def steady_from(values: Float, degree: int) -> int:
     """Where a series has forgotten its beginning: index of the first value to keep.
 

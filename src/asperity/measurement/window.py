@@ -11,6 +11,7 @@ from asperity.arrays import Float, Index
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
+from asperity.measurement.series import neighbour_scatter
 
 #: Periods in a block of the envelope, blocks of a whole recording at most, and blocks of one period
 #: where there would be fewer: edges are the exception among so many. Samples in a block.
@@ -72,7 +73,7 @@ def stretches(time: Float, load: Float, frequency: float) -> list[LoadInterval]:
         Hz, of the modulation.
     """
     amplitude, edges = envelope(time, load, frequency)
-    largest, scatter = np.sort(amplitude)[-min(3, amplitude.size)], _scatter(amplitude)
+    largest, scatter = np.sort(amplitude)[-min(3, amplitude.size)], neighbour_scatter(amplitude)
     on = amplitude > max(_ON * largest, _SCATTERS * scatter)
     change = np.abs(np.diff(amplitude))
     changed = change > np.maximum(
@@ -106,18 +107,11 @@ def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
         beta = _solved(blocks)
         amplitude = np.hypot(beta[:, 2, 0], beta[:, 3, 0])
         fewer = amplitude.size // 2
-        if fewer < _FEWEST or _scatter(amplitude) < _SMOOTH * amplitude.max():
+        if fewer < _FEWEST or neighbour_scatter(amplitude) < _SMOOTH * amplitude.max():
             break
         blocks = merged(blocks, fewer)
     edges = np.concatenate([[0], np.cumsum(blocks.count)]).astype(np.intp)
     return amplitude, edges
-
-
-def _scatter(series: Float) -> float:
-    """Standard deviation from neighbours, which steps hardly touch."""
-    if series.size < 3:
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(series)))) / np.sqrt(2)
 
 
 def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:

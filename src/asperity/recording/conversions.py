@@ -58,7 +58,7 @@ def _pressure(trace: Trace, name: str) -> str:
     channel = trace.channel(name)
     rule, got = "be pressures", f"'{name}' in '{channel.unit}'"
     require(channel.kind == "pressure", "stress_to_force.channels", rule, got, "leave it out")
-    return next(key for key, c in trace.channels.items() if c is channel)
+    return trace.name_of(channel)
 
 
 def friction_to_force(trace: Trace, name: str = "F") -> Trace:

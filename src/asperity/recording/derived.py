@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +16,6 @@ from asperity.recording.roles import ROLES, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
 from asperity.units.scale import base_units, kind_of_dimension, unit_text
-
-if TYPE_CHECKING:
-    pass
 
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
@@ -145,7 +141,7 @@ def _key_of(trace: Trace, name: str) -> str | None:
         if any(name in unit for unit in ("V", "N", "W", "F")):
             return None
         raise
-    return next(key for key, c in trace.channels.items() if c is channel)
+    return trace.name_of(channel)
 
 
 def _bare(name: str) -> str:

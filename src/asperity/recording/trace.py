@@ -137,6 +137,10 @@ class Trace(Displayed):
             return False
         return True
 
+    def name_of(self, channel: Channel) -> str:
+        """The name of one of the channels."""
+        return next(name for name, c in self.channels.items() if c is channel)
+
     @property
     def sample_rate(self) -> float | None:
         """Samples per second, Hz; None where the sampling is uneven."""

@@ -102,7 +102,12 @@ def _weights(pole: complex, h: float) -> NDArray:
     x, w = np.polynomial.legendre.leggauss(_NODES)
     s = h - length * (x + 1) / 2
     u = s / h
-    basis = np.array(
+    return _cubics(u) @ (w * np.exp(pole * (h - s))) * length / 2
+
+
+def _cubics(u: Float) -> Float:
+    """Cubics that are 1 at one of the nodes -1, 0, 1, 2 and 0 at the others, shape (4, n)."""
+    return np.array(
         [
             -u * (u - 1) * (u - 2) / 6,
             (u + 1) * (u - 1) * (u - 2) / 2,
@@ -110,7 +115,6 @@ def _weights(pole: complex, h: float) -> NDArray:
             (u + 1) * u * (u - 1) / 6,
         ]
     )
-    return basis @ (w * np.exp(pole * (h - s))) * length / 2
 
 
 def between(values: Float, rate: float, times: Float) -> Float:
@@ -120,15 +124,8 @@ def between(values: Float, rate: float, times: Float) -> Float:
     """
     at = np.clip(times * rate, 0.0, values.size - 1.0)
     k = np.minimum(at.astype(int), max(values.size - 2, 0))
-    u = at - k
-    last = values.size - 1
-    a, b, c, d = (values[np.clip(k + j, 0, last)] for j in (-1, 0, 1, 2))
-    return (
-        -u * (u - 1) * (u - 2) / 6 * a
-        + (u + 1) * (u - 1) * (u - 2) / 2 * b
-        - (u + 1) * u * (u - 2) / 2 * c
-        + (u + 1) * u * (u - 1) / 6 * d
-    )
+    around = np.clip(k + np.arange(-1, 3)[:, None], 0, values.size - 1)
+    return (_cubics(at - k) * values[around]).sum(axis=0)
 
 
 #: A number in SI or a text with its unit; converted to a float in SI at construction.

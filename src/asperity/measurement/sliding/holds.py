@@ -13,7 +13,13 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.measurement.series import bin_means, columns, fit_trend
+from asperity.measurement.series import (
+    bin_means,
+    columns,
+    fit_trend,
+    moving_mean,
+    neighbour_scatter,
+)
 
 #: Share of the sliding before a hold that may still be settling from the hold before it.
 _SETTLING = 0.3
@@ -129,7 +135,7 @@ def read_hold(
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])
     doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0]))
-    quick = _quick_noise(friction[begin:hold])
+    quick = neighbour_scatter(friction[begin:hold])
     rested = friction[max(hold, again - max(3, (again - hold) // 50)) : again]
     low = float(rested.mean()) if rested.size else np.nan
     low_doubt = quick / np.sqrt(max(rested.size, 1))
@@ -187,13 +193,6 @@ def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
         at_one_second=float(beta[0]),
         holds=len(holds),
     )
-
-
-def _quick_noise(values: Float) -> float:
-    """Standard deviation of what changes from sample to sample."""
-    if values.size < 3:
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
 
 
 def _peak(
@@ -262,10 +261,7 @@ def _inflation(residual: Float) -> float:
 
 
 def _smoothed(values: Float, wide: int) -> Float:
-    if wide <= 1:
-        return values
-    padded = np.pad(values, wide // 2, mode="edge")
-    return np.convolve(padded, np.ones(wide) / wide, mode="valid")[: values.size]
+    return moving_mean(np.pad(values, wide // 2, mode="edge"), wide)[: values.size]
 
 
 def _reload(

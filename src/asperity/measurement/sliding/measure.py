@@ -12,7 +12,7 @@ from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
-from asperity.measurement.series import MeanLevel, block_means, mean_level, steady_from
+from asperity.measurement.series import MeanLevel, block_means, mean_level, moving_mean, steady_from
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
 from asperity.measurement.sliding.segments import Partition, partition, partition_at
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
@@ -240,7 +240,7 @@ def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> Slidi
     away = late - late.mean()
     power = float(away @ away)
     slope = float(away @ (values - values.mean())) / power if power else 0.0
-    smooth = np.convolve(friction, np.ones(5) / 5, mode="valid") if friction.size > 5 else friction
+    smooth = moving_mean(friction, 5)
     return SlidingSegment(
         start=float(time[0]),
         end=float(time[-1]),

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
-from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend
+from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend, moving_mean
 
 #: Windows, in slips of the shorter side.
 _WINDOWS = (1.0, 1.5, 2.25)
@@ -311,5 +311,5 @@ def _peak(
     near = times <= step + 1.5 * settling / speed
     near[: max(8, int(0.02 * times.size))] = True
     values = friction[near]
-    smooth = np.convolve(values, np.ones(5) / 5, mode="valid") if values.size >= 5 else values
+    smooth = moving_mean(values, 5)
     return float(smooth.max() if lever > 0 else smooth.min())

@@ -283,8 +283,7 @@ def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> 
 
 def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int) -> _Cycle | None:
     """Values folded by the phase of the load, without what is slower than a period."""
-    middle = (reading.start + reading.end) / 2
-    cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    cycles = reading.cycles(time)
     phasors = (reading.load_harmonics, reading.harmonics)[channel] * reading.W0
     order = np.arange(1, phasors.size + 1)
     fitted = np.zeros_like(values)

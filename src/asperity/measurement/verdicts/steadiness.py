@@ -6,6 +6,8 @@ window.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from asperity.arrays import Float
@@ -71,7 +73,7 @@ def left_of_piece(reading: LockInReading, time: Float, values: Float) -> tuple[s
     """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
-    return piece, _residual(reading.blocks.basis, time[piece], values[piece])
+    return piece, _fitted(reading.blocks.basis, time[piece], values[piece])[1]
 
 
 def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
@@ -82,18 +84,11 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
     return strongest_line(time, values, between=(lowest, highest))
 
 
-def _residual(basis: Basis, time: Float, force: Float) -> Float:
-    """Residual of a separate fit to a piece."""
-    piece = Basis(
-        basis.omega,
-        basis.harmonics,
-        basis.degree,
-        float(time[0] + time[-1]) / 2,
-        float(time[-1] - time[0]) / 2,
-    )
-    columns = piece.columns(time)[: piece.linear]
-    beta = solved(columns @ columns.T, columns @ force)
-    return force - beta @ columns
+def _fitted(basis: Basis, time: Float, values: Float) -> tuple[Float, Float]:
+    """Coefficients and residual of a separate fit to a piece of a window."""
+    columns = basis.columns(time)[: basis.linear]
+    beta = solved(columns @ columns.T, columns @ values)
+    return beta, values - beta @ columns
 
 
 def leakage(reading: LockInReading) -> Check:
@@ -189,19 +184,11 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     if pieces < 3:
         sentence = "the window is too short to be read in pieces"
         return LOCK_IN.check("shifting response", 0.0, sentence)
-    omega = 2 * np.pi * reading.frequency
-    orders = range(1, reading.harmonics.size + 1)
-    middle = (reading.start + reading.end) / 2
+    basis = replace(reading.blocks.basis, omega=2 * np.pi * reading.frequency, degree=1)
     responses = []
     for piece in np.array_split(np.arange(time.size), pieces):
-        t = time[piece]
-        u = (t - t[0]) / (t[-1] - t[0]) - 0.5
-        columns = [np.ones_like(t), u]
-        for n in orders:
-            angle = n * omega * (t - middle)
-            columns += [np.cos(angle), np.sin(angle)]
-        beta = np.linalg.lstsq(np.stack(columns, axis=1), force[piece])[0]
-        responses.append(complex(beta[2], -beta[3]))
+        beta, _ = _fitted(basis, time[piece], force[piece])
+        responses.append(complex(beta[basis.drift], -beta[basis.drift + basis.harmonics]))
     phasors = np.array(responses)
     mean = phasors.mean()
     # Of noise alone: the uncertainty of a harmonic that settles is that of what it settles to.
