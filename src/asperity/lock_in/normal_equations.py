@@ -9,11 +9,6 @@ derivatives with respect to the frequency. The set is closed under a shift of ti
 evenly sampled data needs no separate sines and cosines: one table serves all blocks, each rotated
 by its phase. The sums of each block are kept, so that the residual near any harmonic follows from
 them without a second pass over the samples.
-
-On an uneven clock, products of two harmonics are harmonics again: all normal equations follow from
-sums of u^m e^(ik phi), k up to twice the highest harmonic, and of each channel times the same.
-Where the clock is nearly even, e^(i phi) is that of the even clock, from a table, times a short
-series in the small difference of the phase; elsewhere it is a cosine and a sine.
 """
 
 from __future__ import annotations
@@ -23,15 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Complex, Float
+from asperity.arrays import Float
 from asperity.errors import require
-
-#: Samples of a chunk: their products fit into the second-level cache.
-_CHUNK = 8192
-#: Largest deviation (rad) from an even clock for which the series is used.
-_NEAR = 0.1
-#: Truncation error of the series.
-_ROUNDING = 1e-17
 
 #: Largest deviation of an even clock from an even grid, as phase (rad) of the highest harmonic.
 _EVEN = 1e-8
@@ -96,22 +84,25 @@ class Basis:
         out[0] = 1.0
         for power in range(1, self.drift):
             np.multiply(out[power - 1], u, out=out[power])
-        cosine, sine = self._cosines_and_sines(out)
-        np.multiply(shifted, self.omega, out=shifted)
-        np.cos(shifted, out=cosine[0])
-        np.sin(shifted, out=sine[0])
+        trigonometric = out[self.drift : self.linear]
+        cosine, sine = trigonometric[: self.harmonics], trigonometric[self.harmonics :]
+        # The tangent of half the phase gives both; a cosine and a sine would take longer.
+        shifted *= self.omega / 2
+        tangent = np.tan(shifted, out=shifted)
+        np.multiply(tangent, tangent, out=cosine[0])
+        cosine[0] += 1.0
+        np.divide(tangent, cosine[0], out=sine[0])
+        sine[0] *= 2.0
+        np.multiply(tangent, sine[0], out=cosine[0])
+        np.subtract(1.0, cosine[0], out=cosine[0])
         for k in range(1, self.harmonics):
-            # e^(i(k+1)phi) = e^(ik phi) e^(i phi): two sines a sample, however many harmonics.
+            # e^(i(k+1)phi) = e^(ik phi) e^(i phi): one tangent a sample, however many harmonics.
             np.multiply(cosine[k - 1], cosine[0], out=cosine[k])
             cosine[k] -= sine[k - 1] * sine[0]
             np.multiply(sine[k - 1], cosine[0], out=sine[k])
             sine[k] += cosine[k - 1] * sine[0]
         np.multiply(out[self.drift : self.linear], u, out=out[self.linear :])
         return out
-
-    def _cosines_and_sines(self, columns: Float) -> tuple[Float, Float]:
-        trigonometric = columns[self.drift : self.linear]
-        return trigonometric[: self.harmonics], trigonometric[self.harmonics :]
 
     def shift(self, start: Float) -> Float:
         """Matrices that transform the columns at `centre + s` into those at `start + s`.
@@ -173,165 +164,6 @@ def inverted(normal: Float) -> Float:
     advice = "give a longer window or ask for fewer harmonics"
     require(np.isfinite(inverse).all(), "lock_in.time", rule, "samples that do not", advice)
     return inverse * scale * scale[:, None]
-
-
-def uneven_sums(
-    basis: Basis, time: Float, channels: list[Float], length: int
-) -> tuple[Float, Float]:
-    """Gram matrices and moments of blocks of some thousand samples.
-
-    Parameters
-    ----------
-    basis : Basis
-    time : array, (n,)
-    channels : list of array, (n,)
-    length : int
-        Samples per block; the last may be shorter.
-
-    Returns
-    -------
-    (array (blocks, size, size), array (blocks, size, channels))
-    """
-    chunk = -(-length // -(-length // _CHUNK))
-    worker = _Chunk(basis, time, len(channels), chunk)
-    blocks = -(-time.size // length)
-    totals = np.zeros((blocks, 2 * basis.harmonics + 1, worker.rows), dtype=complex)
-    for b in range(blocks):
-        end = min((b + 1) * length, time.size)
-        for at in range(b * length, end, chunk):
-            stop = min(at + chunk, end)
-            totals[b] += worker.sums(time[at:stop], [c[at:stop] for c in channels])
-    powers = totals[:, :, : worker.powers]
-    return _gram(basis, powers), _moments(basis, totals[:, :, worker.powers :], len(channels))
-
-
-class _Chunk:
-    """Buffers and tables for chunks of one recording."""
-
-    def __init__(self, basis: Basis, time: Float, channels: int, size: int) -> None:
-        self._basis = basis
-        # u^0 .. u^m for the Gram matrix; each channel times u^0 .. u^p.
-        self.powers = max(2 * basis.degree, basis.degree + 1, 2) + 1
-        self._channel_powers = max(basis.degree, 1) + 1
-        self.rows = self.powers + channels * self._channel_powers
-        self._ramp = _usual_step(time, size) * np.arange(float(size))
-        phase = basis.omega * self._ramp
-        self._table, self._turned = np.stack([np.cos(phase), np.sin(phase)]), np.empty((2, size))
-        # Cosine and sine of k phi, k = 0 .. 2n.
-        self._waves = np.empty((2 * basis.harmonics + 1, 2, size))
-        self._waves[0, 0], self._waves[0, 1] = 1.0, 0.0
-        self._weights = np.empty((self.rows, size))
-        self._scratch = np.empty((4, size))
-
-    def sums(self, time: Float, channels: list[Float]) -> Complex:
-        """Sums of each weight times e^(ik phi), k = 0 .. 2n; (2n + 1, rows)."""
-        basis, size = self._basis, time.size
-        waves, weights = self._waves[:, :, :size], self._weights[:, :size]
-        most = 2 * basis.harmonics
-        turn = self._fundamental(time, waves[1])
-        twice = np.multiply(waves[1, 0], 2.0, out=self._scratch[0, :size])
-        for k in range(1, most):
-            # cos (k+1)x + cos (k-1)x = 2 cos x cos kx, and the same of sines.
-            np.multiply(waves[k], twice, out=waves[k + 1])
-            waves[k + 1] -= waves[k - 1]
-        weights[0] = 1.0
-        u = np.subtract(time, basis.centre, out=weights[1])
-        u /= basis.half_width
-        for power in range(2, self.powers):
-            np.multiply(weights[power - 1], u, out=weights[power])
-        at = self.powers
-        for channel in channels:
-            weights[at] = channel
-            for power in range(1, self._channel_powers):
-                np.multiply(weights[at + power - 1], u, out=weights[at + power])
-            at += self._channel_powers
-        both = (waves.reshape(-1, size) @ weights.T).reshape(most + 1, 2, -1)
-        turned = np.exp(1j * turn * np.arange(most + 1))[:, None]
-        return np.asarray((both[:, 0] + 1j * both[:, 1]) * turned)
-
-    def _fundamental(self, time: Float, wave: Float) -> float:
-        """Fill in cos and sin of the phase without a constant part, which is returned."""
-        size, omega = time.size, self._basis.omega
-        small, square = self._scratch[:2, :size]
-        series = self._scratch[2:, :size]
-        np.subtract(time, self._ramp[:size], out=small)
-        small -= time[0]
-        small *= omega
-        widest = max(float(small.max()), -float(small.min()))
-        if not widest < _NEAR:
-            phase = np.subtract(time, self._basis.centre, out=small)
-            phase *= omega
-            np.cos(phase, out=wave[0])
-            np.sin(phase, out=wave[1])
-            return 0.0
-        np.multiply(small, small, out=square)
-        series[:] = 1.0
-        # Cosine and sine over its phase: 1 + r1 x (1 + r2 x (1 + ...)).
-        for j in range(_terms(widest), 0, -1):
-            series *= square
-            series *= -0.5 / np.array([[j * (2 * j - 1)], [j * (2 * j + 1)]])
-            series += 1.0
-        cosine, sine = series
-        sine *= small
-        table = self._table[:, :size]
-        np.multiply(table, cosine, out=wave)
-        np.multiply(table, sine, out=self._turned[:, :size])
-        wave[0] -= self._turned[1, :size]
-        wave[1] += self._turned[0, :size]
-        return float(omega * (time[0] - self._basis.centre))
-
-
-def _usual_step(time: Float, size: int) -> float:
-    """Median step over chunks of `size` samples."""
-    last = np.arange(size, time.size, size)
-    if not last.size:
-        return float(time[-1] - time[0]) / max(time.size - 1, 1)
-    return float(np.median(time[last] - time[last - size])) / size
-
-
-def _terms(widest: float) -> int:
-    """Terms of the series of cosine and sine for a truncation error below rounding."""
-    terms, left = 0, widest
-    while left > _ROUNDING:
-        terms += 1
-        left *= widest**2 / (2 * terms * (2 * terms + 1))
-    return terms
-
-
-def _gram(basis: Basis, powers: Complex) -> Float:
-    """Gram matrices of the basis from sums of u^m e^(ik phi), (blocks, 2n + 1, m)."""
-    n, first, second = basis.harmonics, basis.drift, basis.linear
-    gram = np.empty((powers.shape[0], basis.size, basis.size))
-    p = np.arange(first)
-    gram[:, :first, :first] = powers[:, 0, p[:, None] + p].real
-    k = np.arange(1, n + 1)
-    total, apart = k[:, None] + k, k[:, None] - k
-    for a, at in ((0, first), (1, second)):
-        cosine, sine = slice(at, at + n), slice(at + n, at + 2 * n)
-        mixed = powers[:, 1 : n + 1, a : a + first].transpose(0, 2, 1)
-        gram[:, :first, cosine], gram[:, :first, sine] = mixed.real, mixed.imag
-        for b, to in ((0, first), (1, second)):
-            summed = powers[:, total, a + b] / 2
-            other = powers[:, np.abs(apart), a + b] / 2
-            across, down = slice(to, to + n), slice(to + n, to + 2 * n)
-            gram[:, cosine, across] = other.real + summed.real
-            gram[:, sine, down] = other.real - summed.real
-            gram[:, cosine, down] = summed.imag - np.sign(apart) * other.imag
-            gram[:, sine, across] = summed.imag + np.sign(apart) * other.imag
-    gram[:, first:, :first] = gram[:, :first, first:].transpose(0, 2, 1)
-    return gram
-
-
-def _moments(basis: Basis, sums: Complex, channels: int) -> Float:
-    """Moments from sums of each channel times u^m e^(ik phi), (blocks, 2n + 1, channels * m)."""
-    n, first, second = basis.harmonics, basis.drift, basis.linear
-    of_channel = sums.reshape(*sums.shape[:2], channels, -1)
-    moments = np.empty((sums.shape[0], basis.size, channels))
-    moments[:, :first] = of_channel[:, 0, :, :first].real.transpose(0, 2, 1)
-    for power, at in ((0, first), (1, second)):
-        waves = of_channel[:, 1 : n + 1, :, power]
-        moments[:, at : at + n], moments[:, at + n : at + 2 * n] = waves.real, waves.imag
-    return moments
 
 
 @dataclass(frozen=True)
@@ -414,14 +246,14 @@ def sums(
     time : array, (n,)
     channels : list of array, (n,)
     blocks : int
-        Approximate number of blocks; the last may be shorter than the others.
+        Approximate number of blocks, more of a long recording; the last may be shorter.
     step : float, optional
         Sampling interval (s) of an even clock, from `even_step`.
     """
-    length = max(1, -(-time.size // blocks))
+    length = min(max(1, -(-time.size // blocks)), _BUFFER)
     if step is None:
         return _uneven(basis, time, channels, length)
-    return _even(basis, time, channels, min(length, _BUFFER), step)
+    return _even(basis, time, channels, length, step)
 
 
 def _even(basis: Basis, time: Float, channels: list[Float], length: int, step: float) -> BlockSums:
@@ -456,31 +288,19 @@ def _turned(
 
 
 def _uneven(basis: Basis, time: Float, channels: list[Float], length: int) -> BlockSums:
-    blocks = -(-time.size // length)
-    if length >= _BUFFER // 8:
-        gram, moments = uneven_sums(basis, time, channels, length)
-    else:
-        gram = np.zeros((blocks, basis.size, basis.size))
-        moments = np.zeros((blocks, basis.size, len(channels)))
-        _short_blocks(basis, time, channels, length, gram, moments)
+    """Blocks by their own columns, which are computed for several short ones together."""
     edges = np.arange(0, time.size, length)
+    gram = np.empty((edges.size, basis.size, basis.size))
+    moments = np.empty((edges.size, basis.size, len(channels)))
+    together = max(1, _BUFFER // length)
+    buffer = np.empty((basis.size, together * length))
+    for first in range(0, edges.size, together):
+        piece = time[edges[first] :][: buffer.shape[1]]
+        columns = basis.columns(piece, out=buffer[:, : piece.size])
+        for b, at in enumerate(edges[first : first + together], first):
+            block = columns[:, at - edges[first] :][:, :length]
+            gram[b] = block @ block.T
+            for c, channel in enumerate(channels):
+                moments[b, :, c] = block @ channel[at : at + length]
     count = np.diff(np.append(edges, time.size)).astype(float)
     return BlockSums(basis, gram, moments, count, np.add.reduceat(time, edges) / count)
-
-
-def _short_blocks(
-    basis: Basis, time: Float, channels: list[Float], length: int, gram: Float, moments: Float
-) -> None:
-    """Many blocks at once, padded to equal length by zeros."""
-    together = max(1, _BUFFER // length)
-    for b in range(0, gram.shape[0], together):
-        at, stop = b * length, min((b + together) * length, time.size)
-        count = -(-(stop - at) // length)
-        padded = np.zeros((basis.size, count * length))
-        padded[:, : stop - at] = basis.columns(time[at:stop])
-        columns = padded.reshape(basis.size, count, length).transpose(1, 0, 2)
-        values = np.zeros((count * length, len(channels)))
-        for c, channel in enumerate(channels):
-            values[: stop - at, c] = channel[at:stop]
-        gram[b : b + count] = columns @ columns.transpose(0, 2, 1)
-        moments[b : b + count] = columns @ values.reshape(count, length, -1)
