@@ -6,7 +6,6 @@ import pytest
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import LockInStream, lock_in
 from asperity.lock_in.normal_equations import Basis, even_step, join, sums
-from asperity.lock_in.reference import retuned
 from asperity.measurement.window import merged
 
 TIME = 3.0 + np.arange(20_011) * 1e-3
@@ -157,21 +156,6 @@ def test_a_stream_refuses_what_it_cannot_read(truth) -> None:
         LockInStream(60.0, start=0.0, end=1.0, detrend="cubic")
 
 
-@pytest.mark.parametrize("change", [1e-6, -3e-4])
-def test_sums_are_retuned_to_second_order_in_a_block(change) -> None:
-    there = Basis(BASIS.omega + change, 3, 2, BASIS.centre, BASIS.half_width)
-    found = retuned(sums(BASIS, TIME, channels(TIME), blocks=500), change)
-    expected = sums(there, TIME, channels(TIME), blocks=500)
-    assert found.basis == there
-    # Half a block is 20 ms, the highest harmonic the third, half the window 10 s.
-    quadratic = (3 * change * 0.02) ** 2 * TIME.size + 1e-9
-    in_slopes = abs(3 * change) * 0.02**2 / 10 * TIME.size + 1e-9
-    n = BASIS.linear
-    for a, b in zip(found.totals(), expected.totals(), strict=True):
-        assert abs(a[:n, :n] - b[:n, :n]).max() < quadratic
-        assert abs(a - b).max() < in_slopes
-
-
 @pytest.mark.parametrize("jitter", [0.0, 1e-4])
 @pytest.mark.parametrize("frequency", [60.013, 0.0713, 471.3])
 def test_a_long_recording_is_read_once_and_exactly(truth, jitter, frequency) -> None:
@@ -185,7 +169,7 @@ def test_a_long_recording_is_read_once_and_exactly(truth, jitter, frequency) -> 
 
 
 def test_a_long_recording_whose_frequency_wanders_is_still_read(truth) -> None:
-    # A quarter of it says something else than the whole: the sums cannot be retuned that far.
+    # A part of it says something else than the whole.
     time = np.arange(140_000) * 5e-4
     phase = 2 * np.pi * 60 * time + 3.0 * np.cos(2 * np.pi * time / 70)
     load = 7 * (1 + 0.2 * np.cos(phase))

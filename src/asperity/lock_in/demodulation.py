@@ -23,11 +23,13 @@ from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inverted, join, sums
 from asperity.lock_in.reading import LockInReading, reading_of
 from asperity.lock_in.reference import (
+    CONVERGED,
+    MOST_STEPS,
     around,
     fit_frequency,
     frequency_direction,
+    frequency_step,
     require_modulated,
-    retuned_to_load,
     strongest_line,
     window_basis,
 )
@@ -35,8 +37,11 @@ from asperity.lock_in.settling import Settling, find_settlings, without
 
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
-#: With more samples than this, an additional pass over all samples is avoided.
-_LONG = 1 << 17
+#: Share of a window whose frequency is fitted before that of all of it.
+_FIRST_SHARE = 0.125
+#: Steps of the frequency up to this one, as phase (rad) at the ends of the window, are left to the
+#: first-order correction, and up to `CONVERGED` with more samples, where another pass takes longer.
+_SHORT_STEP, _LONG = 1e-8, 1 << 17
 DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
 
 #: Largest error of the frequency, as phase (rad) at the ends of the window. It is corrected to
@@ -96,20 +101,19 @@ def lock_in(
     step = even_step(time, 2 * np.pi * start * harmonics)
     if step is None:
         _check_clock(time)
-    shares = (1.0,) if time.size < _LONG else (0.125, 1.0)
-    for share in shares if refine else ():
-        start = fit_frequency(
-            time, load, start, harmonics=harmonics, degree=degree, step=step, share=share
-        )
+    if refine:
+        known = {"harmonics": harmonics, "degree": degree, "step": step}
+        start = fit_frequency(time, load, start, **known, share=_FIRST_SHARE)
+    # Most often the frequency of a part is accurate enough for one pass over all samples.
+    enough = _SHORT_STEP if time.size < _LONG else CONVERGED
+    for _ in range(MOST_STEPS):
         _check_resolved(time, start, harmonics)
-        if share < 1:
-            # The remaining correction of the frequency from the sums, if they allow it.
-            basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
-            near = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
-            if (tuned := retuned_to_load(near)) is not None:
-                return read(tuned, settles=settles)
-    basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
-    blocks = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
+        basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
+        blocks = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
+        change = frequency_step(blocks) if refine else 0.0
+        if abs(change) * basis.half_width < enough:
+            break
+        start += change / (2 * np.pi)
     return read(blocks, refine=refine, settles=settles)
 
 

@@ -4,17 +4,11 @@ An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the freque
 of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
 in a window short enough for that start, and is repeated in windows four times as long up to the
 whole one.
-
-The frequency of existing sums can be changed, so that a long recording is read once: over a block
-the phase of a slightly different frequency differs by a constant and a small linear part. The
-constant rotates the sums exactly; the linear part follows from the columns that are multiplied with
-time. The square of the linear part is neglected.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,14 +21,9 @@ from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solve
 _SPECTRUM = 1 << 16
 #: With fewer periods the maximum of the line is too inaccurate: the residual of the fit is scanned.
 _FEW_PERIODS = 8.0
-#: Largest last step, as phase (rad) at the ends of the window. Its square is the remaining error,
-#: and the square of that after the step that `asperity.lock_in.demodulation.read` makes.
-CONVERGED = 1e-3
-_MOST_STEPS = 12
-
-#: Largest phase (rad) of the highest harmonic over half a block: its square is neglected.
-_WITHIN = 3e-5
-_MOST_RETUNINGS = 4
+#: Largest last step, as phase (rad) at the ends of the window. Its square is the remaining error
+#: after that step, which `asperity.lock_in.demodulation.read` makes for the whole window.
+CONVERGED, MOST_STEPS = 1e-4, 12
 
 
 class SpectralLine(NamedTuple):
@@ -183,32 +172,25 @@ def window_basis(time: Float, omega: float, harmonics: int, degree: int) -> Basi
 def _converged(
     time: Float, load: Float, omega: float, harmonics: int, degree: int, step: float | None
 ) -> float:
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         basis = window_basis(time, omega, harmonics, degree)
-        gram, moments = sums(basis, time, [load], step=step).totals()
-        change = frequency_step(basis, gram, moments[:, 0])
-        # Beyond a radian at the ends the linearisation is not valid.
-        change = float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))
+        change = frequency_step(sums(basis, time, [load], step=step))
         omega += change
         if abs(change) * basis.half_width < CONVERGED:
             break
     return omega
 
 
-def frequency_step(basis: Basis, gram: Float, moments: Float) -> float:
-    """Gauss-Newton step of omega.
-
-    Parameters
-    ----------
-    basis : Basis
-    gram, moments : array, (size, size) and (size,)
-        Normal equations of the load.
-    """
-    linear = basis.linear
-    beta = solved(gram[:linear, :linear], moments[:linear])
+def frequency_step(blocks: BlockSums) -> float:
+    """Gauss-Newton step of omega (rad/s) from the sums of the load, their first channel."""
+    basis, linear = blocks.basis, blocks.basis.linear
+    gram, moments = blocks.totals()
+    beta = solved(gram[:linear, :linear], moments[:linear, 0])
     columns = np.eye(basis.size)[:, : linear + 1]
     columns[:, linear] = frequency_direction(basis, beta)
-    return float(solved(columns.T @ gram @ columns, columns.T @ moments)[linear])
+    change = solved(columns.T @ gram @ columns, columns.T @ moments[:, 0])[linear]
+    # Beyond a radian at the ends the linearisation is not valid.
+    return float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))
 
 
 def _scanned(time: Float, load: Float, omega: float, degree: int) -> float:
@@ -288,82 +270,3 @@ def _smooth(size: int) -> int:
                 break
             best = max(best, odd << int(math.log2(size // odd)))
     return best
-
-
-def retuned_to_load(blocks: BlockSums) -> BlockSums | None:
-    """Sums at the frequency of the load, their first channel.
-
-    Parameters
-    ----------
-    blocks : BlockSums
-        At a frequency that is accurate to a fraction of a radian over all blocks.
-
-    Returns
-    -------
-    BlockSums or None
-        None if the error of the frequency is too large for the length of the blocks.
-    """
-    moved = 0.0
-    for _ in range(_MOST_RETUNINGS):
-        gram, moments = blocks.totals()
-        change = frequency_step(blocks.basis, gram, moments[:, 0])
-        if abs(change) * blocks.basis.half_width < CONVERGED:
-            return blocks
-        moved += abs(change)
-        if not moved * blocks.basis.harmonics * _half_block(blocks) < _WITHIN:
-            return None
-        blocks = retuned(blocks, change)
-    return None
-
-
-def retuned(blocks: BlockSums, change: float) -> BlockSums:
-    """The sums at another angular frequency, to first order within each block.
-
-    Parameters
-    ----------
-    blocks : BlockSums
-    change : float
-        Change of omega (rad/s).
-    """
-    basis = blocks.basis
-    turn = _turn(blocks, change)
-    return replace(
-        blocks,
-        basis=replace(basis, omega=basis.omega + change),
-        gram=turn @ blocks.gram @ turn.transpose(0, 2, 1),
-        moments=turn @ blocks.moments,
-    )
-
-
-def _turn(blocks: BlockSums, change: float) -> Float:
-    """Matrices from the old columns to the new ones, (blocks, size, size)."""
-    basis = blocks.basis
-    n, first, second = basis.harmonics, basis.drift, basis.linear
-    k = np.arange(1, n + 1)
-    away = blocks.middle - basis.centre
-    angle = change * away[:, None] * k
-    cosine, sine = np.cos(angle), np.sin(angle)
-    rotation = np.zeros((away.size, 2 * n, 2 * n))
-    i = np.arange(n)
-    rotation[:, i, i] = rotation[:, n + i, n + i] = cosine
-    rotation[:, i, n + i], rotation[:, n + i, i] = -sine, sine
-    # Derivative of the rotation by the angle, times k change: the linear part of the phase.
-    linear = np.zeros_like(rotation)
-    linear[:, i, i] = linear[:, n + i, n + i] = -sine * k
-    linear[:, i, n + i], linear[:, n + i, i] = -cosine * k, cosine * k
-    linear *= change * basis.half_width
-    u = (away / basis.half_width)[:, None, None]
-    turn = np.zeros((away.size, basis.size, basis.size))
-    turn[:, np.arange(first), np.arange(first)] = 1.0
-    turn[:, first:second, first:second] = rotation - u * linear
-    turn[:, first:second, second:] = linear
-    turn[:, second:, first:second] = -(u**2) * linear
-    turn[:, second:, second:] = rotation + u * linear
-    return turn
-
-
-def _half_block(blocks: BlockSums) -> float:
-    """Half the length (s) of the longest block."""
-    if blocks.middle.size < 2:
-        return blocks.basis.half_width
-    return float(np.diff(blocks.middle).max()) / 2
