@@ -367,11 +367,7 @@ def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:
         Channels that are read.
     """
     others = [name for name in trace.channels if name not in names]
-    return tuple(
-        f
-        for f in trace.findings
-        if not any(f.where == name or f.where.startswith(f"{name}, ") for name in others)
-    )
+    return tuple(f for f in trace.findings if not any(f.concerns(name) for name in others))
 
 
 def _dimension_text(channel: Channel, name: str) -> str:

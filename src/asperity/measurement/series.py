@@ -27,7 +27,7 @@ _MOST_BLOCKS = 512
 _ACCIDENT = 3e-3
 
 #: Bins of a segment, and cosines that tell its slow noise.
-BINS, _TREND_COSINES = 400, 8
+_BINS, _TREND_COSINES = 400, 8
 #: Scatter of the log of a squared projection, a chi-squared number of one degree of freedom.
 _LOG_SCATTER = 2.22
 
@@ -111,6 +111,40 @@ def moving_mean(values: Float, wide: int) -> Float:
     )
 
 
+def slope_of(at: Float, values: Float) -> float:
+    """Least-squares slope of values over their positions; 0 where all positions are the same."""
+    away = at - at.mean()
+    power = float(away @ away)
+    return float(away @ (values - values.mean())) / power if power else 0.0
+
+
+class WeightedLine(NamedTuple):
+    """A straight line through values of known uncertainty.
+
+    Attributes
+    ----------
+    beta : array, (2,)
+        Level at zero, and slope.
+    covariance : array, (2, 2)
+        By the uncertainties of the values.
+    excess : float
+        Chi-squared over its degrees of freedom; 1 of two values.
+    """
+
+    beta: Float
+    covariance: Float
+    excess: float
+
+
+def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
+    """Least squares of a straight line; arrays (n,)."""
+    matrix = np.stack([np.ones_like(at), at], axis=1) / uncertainty[:, None]
+    covariance = np.linalg.pinv(matrix.T @ matrix)
+    beta = covariance @ (matrix.T @ (values / uncertainty))
+    left, free = values / uncertainty - matrix @ beta, values.size - 2
+    return WeightedLine(beta, covariance, float(left @ left) / free if free else 1.0)
+
+
 def steady_from(values: Float, degree: int) -> int:
     """Where a series has forgotten its beginning: index of the first value to keep.
 
@@ -176,17 +210,15 @@ class TrendFit:
     dof: int
 
 
-def bin_means(at: Float, values: Float, bins: int = BINS) -> tuple[Float, Float]:
-    """Means over bins of equal width, without those that are empty.
+def bin_means(at: Float, values: Float) -> tuple[Float, Float]:
+    """Means over bins of equal width, at most half as many as samples, without empty ones.
 
     Parameters
     ----------
     at, values : array, (n,)
         Positions, rising, and what is averaged there.
-    bins : int
-        At most; no more than half of the samples.
     """
-    wanted = min(bins, max(4, at.size // 2))
+    wanted = min(_BINS, max(4, at.size // 2))
     edges = np.linspace(at[0], at[-1], wanted + 1)[1:-1]
     place = np.searchsorted(edges, at, side="right")
     count = np.bincount(place, minlength=wanted)

@@ -170,8 +170,12 @@ def _inherited(
     made = []
     for source in sources:
         for f in findings:
-            about = f.where == source or f.where.startswith(f"{source}, ")
-            if not about or f.name in (*known, "unknown unit", "unit overridden", "constant"):
+            if not f.concerns(source) or f.name in (
+                *known,
+                "unknown unit",
+                "unit overridden",
+                "constant",
+            ):
                 continue
             sentence = f"'{target}' is made from '{source}': {f.sentence}"
             where = f"{target}{f.where.removeprefix(source)}"
@@ -181,9 +185,8 @@ def _inherited(
 
 
 def _moved(finding: Finding, old: str, new: str) -> Finding:
-    if finding.where != old and not finding.where.startswith(f"{old}, "):
-        return finding
-    return replace(finding, where=new + finding.where.removeprefix(old))
+    moved = new + finding.where.removeprefix(old)
+    return replace(finding, where=moved) if finding.concerns(old) else finding
 
 
 def _free(name: str, taken: Mapping[str, object]) -> str:

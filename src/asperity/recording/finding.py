@@ -47,6 +47,10 @@ class Finding:
         object.__setattr__(self, "where", printable(self.where, 200))
         object.__setattr__(self, "sentence", printable(self.sentence))
 
+    def concerns(self, channel: str) -> bool:
+        """Whether it is about this channel."""
+        return self.where == channel or self.where.startswith(f"{channel}, ")
+
     def __str__(self) -> str:
         return f"{self.severity}: {self.name} ({self.where}): {self.sentence}"
 

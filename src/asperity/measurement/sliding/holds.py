@@ -19,6 +19,7 @@ from asperity.measurement.series import (
     fit_trend,
     moving_mean,
     neighbour_scatter,
+    weighted_line,
 )
 
 #: Share of the sliding before a hold that may still be settling from the hold before it.
@@ -176,21 +177,17 @@ def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
         return None
     healing = np.array([h.healing for h in holds])
     doubt = np.array([h.healing_uncertainty for h in holds])
-    weight = 1 / np.maximum(doubt, max(1e-3 * float(np.median(doubt)), 1e-12)) ** 2
-    matrix = np.stack([np.ones_like(decades), decades], axis=1)
-    inverse = np.linalg.inv(matrix.T @ (weight[:, None] * matrix))
-    beta = inverse @ (matrix.T @ (weight * healing))
-    free = len(holds) - 2
-    excess = float(weight @ (healing - matrix @ beta) ** 2) / free if free else 1.0
-    uncertainty = float(np.sqrt(inverse[1, 1] * max(excess, 1.0)))
+    doubt = np.maximum(doubt, max(1e-3 * float(np.median(doubt)), 1e-12))
+    line = weighted_line(decades, healing, doubt)
+    uncertainty = float(np.sqrt(line.covariance[1, 1] * max(line.excess, 1.0)))
     # Scatter that exceeds the uncertainties is known from the few holds only.
-    dof = float(free) if excess > 1 and free else min(h.dof for h in holds)
+    dof = float(len(holds) - 2) if line.excess > 1 else min(h.dof for h in holds)
     return HealingRate(
-        per_decade=float(beta[1]),
+        per_decade=float(line.beta[1]),
         uncertainty=uncertainty,
         dof=dof,
         interval_95=float(stdtrit(dof, 0.975)) * uncertainty,
-        at_one_second=float(beta[0]),
+        at_one_second=float(line.beta[0]),
         holds=len(holds),
     )
 

@@ -12,7 +12,14 @@ from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
-from asperity.measurement.series import MeanLevel, block_means, mean_level, moving_mean, steady_from
+from asperity.measurement.series import (
+    MeanLevel,
+    block_means,
+    mean_level,
+    moving_mean,
+    slope_of,
+    steady_from,
+)
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
 from asperity.measurement.sliding.segments import Partition, partition, partition_at
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
@@ -237,9 +244,7 @@ def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> Slidi
     means = block_means(friction, 100)
     begin = steady_from(means, 1) * max(1, friction.size // 100)
     late, values = time[begin:], friction[begin:]
-    away = late - late.mean()
-    power = float(away @ away)
-    slope = float(away @ (values - values.mean())) / power if power else 0.0
+    slope = slope_of(late, values)
     smooth = moving_mean(friction, 5)
     return SlidingSegment(
         start=float(time[0]),
@@ -248,7 +253,7 @@ def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> Slidi
         hold=hold,
         steady=mean_level(late, values),
         slope=slope,
-        scatter=float(np.std(values - values.mean() - slope * away)),
+        scatter=float(np.std(values - slope * (late - late.mean()))),
         highest=float(smooth.max()),
         lowest=float(smooth.min()),
     )

@@ -18,6 +18,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from asperity.arrays import Float, Index
+from asperity.measurement.series import slope_of
 
 #: First sample of a piece, and the one after its last.
 Piece = tuple[int, int]
@@ -299,10 +300,7 @@ def _misfits(sums: Float) -> tuple[Float, Float]:
 def _velocity(motion: _Motion, piece: Piece) -> float:
     """Slope of the displacement over a piece, m/s."""
     t, x = motion.time[slice(*piece)], motion.displacement[slice(*piece)]
-    if t.size < 2:
-        return np.nan
-    away = t - t.mean()
-    return float(away @ (x - x.mean()) / (away @ away))
+    return slope_of(t, x) if t.size > 1 else np.nan
 
 
 def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> float:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.measurement.stick_slip.lines import lines
+from asperity.measurement.stick_slip.lines import Sums
 from asperity.measurement.stick_slip.noise import Noise
 
 #: Means over an eighth of a cycle still show its peak and its trough; what lasts for less than a
@@ -314,7 +314,8 @@ def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, I
         return peak, trough
     length = np.maximum(peak[1:] - trough[:-1], 1).astype(float)
     # Peaks and troughs are where noise has made them so: the slope is that of all samples.
-    rate = lines(force, trough[:-1], peak[1:] + 1)[2]
+    first, stop = trough[:-1], peak[1:] + 1
+    rate = Sums(force, first, (first + stop) // 2).line(first, stop)[1]
     near = np.arange(rate.size)[:, None] + np.arange(-_NEAR, _NEAR + 1)
     inside = (near >= 0) & (near < rate.size)
     near = np.clip(near, 0, rate.size - 1)

@@ -37,11 +37,3 @@ class Sums:
         slope = (ty - t * y / n) / power
         rest = yy - y * y / n - slope * (ty - t * y / n)
         return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
-
-
-def lines(force: Float, first: Index, stop: Index) -> tuple[Float, Float, Float, Float]:
-    """Centre, mean, slope and number of samples of runs that do not overlap, in rising order."""
-    sums = Sums(force, first, (first + stop) // 2)
-    level, slope, _, away = sums.line(first, stop)
-    mean, count = level + slope * away + sums.level, (stop - first).astype(float)
-    return sums.origin + away, mean, slope, count

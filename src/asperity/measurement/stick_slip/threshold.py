@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Float
+from asperity.measurement.series import weighted_line
 from asperity.measurement.stick_slip.events import SlipEvents
 
 #: Periods of growing or dying cycles that are read together: up to this share longer than those of
@@ -136,14 +137,10 @@ def _without_drop(square: Float, period: Float, uncertainty: Float) -> tuple[flo
 
     Half of what the line adds to the period of the smallest drop counts as uncertain.
     """
-    uncertainty = np.maximum(uncertainty, 1e-12 * period)
-    matrix = np.stack([np.ones_like(square), square / square.max()], 1) / uncertainty[:, None]
-    inverse = np.linalg.pinv(matrix.T @ matrix)
-    beta = inverse @ (matrix.T @ (period / uncertainty))
-    left = period / uncertainty - matrix @ beta
-    scatter = max(float(left @ left) / max(period.size - 2, 1), 1.0)
-    extrapolated = beta[1] * square.min() / square.max() / 2
-    return float(beta[0]), float(np.hypot(np.sqrt(inverse[0, 0] * scatter), extrapolated))
+    share = square / square.max()
+    line = weighted_line(share, period, np.maximum(uncertainty, 1e-12 * period))
+    error = np.sqrt(line.covariance[0, 0] * max(line.excess, 1.0))
+    return float(line.beta[0]), float(np.hypot(error, line.beta[1] * share.min() / 2))
 
 
 def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
