@@ -234,20 +234,17 @@ def hold_response(
     response, after, rate = _in_shapes(run, flat, V, time, runaway)
     assert isinstance(response, HoldResponse)
     crossing = response.end == End.CROSSING
-    located = {name: getattr(response, name) for name in ("distance", "slip")}
-    located["velocity_at_maximum"] = response.velocity_at_maximum * V
+    names = ("level", "minimum", "maximum", "hold_slip", "states", "states_at_maximum")
     columns = {
-        **{n: getattr(response, n) for n in ("level", "minimum", "maximum", "hold_slip")},
-        **{n: getattr(response, n) for n in ("states", "states_at_maximum")},
-        **{name: np.where(crossing, values, np.nan) for name, values in located.items()},
+        **{name: getattr(response, name) for name in names},
         "hold_time": time,
-        "velocity": V,
+        "velocity_at_maximum": np.where(crossing, response.velocity_at_maximum * V, np.nan),
         "healing": response.maximum - response.level,
         "healing_rate": rate,
         "relaxation": response.level - response.minimum,
         "end_velocity": response.velocity * V,
         "has_maximum": crossing,
-        **_settling(after, response.end, _stable(flat, V)),
+        **_common(response, after, flat, V),
     }
     return Holds(slider=slider, **{name: shaped(a, shape) for name, a in columns.items()})
 
@@ -295,17 +292,14 @@ def step_response(
     response, after = _in_shapes(run, flat, V, first, runaway)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
-    located = {name: getattr(response, name) for name in ("distance", "slip")}
     columns = {
         **{n: getattr(response, n) for n in ("before", "after", "states_at_extremum")},
-        **{name: np.where(crossing, values, np.nan) for name, values in located.items()},
         "velocity_before": first,
-        "velocity": V,
         "extremum": over,
         "direct": over - response.before,
         "evolution": over - response.after,
         "has_extremum": crossing,
-        **_settling(after, response.end, _stable(flat, V)),
+        **_common(response, after, flat, V),
     }
     return VelocityStepResponse(
         slider=slider, **{name: shaped(a, shape) for name, a in columns.items()}
@@ -339,20 +333,22 @@ def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float)
     return jax.tree.map(lambda *a: np.concatenate(a), *parts)
 
 
-def _stable(slider: Slider, V: Float) -> Bool:
-    """Whether a small disturbance of steady sliding dies out."""
+def _common(
+    response: Any, after: SettlingDistance | None, slider: Slider, V: Float
+) -> dict[str, Any]:
+    """Columns of both tests: the way to the extremum, stability, and what follows."""
     run = lambda slider, V, *_: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
-    return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
-
-
-def _settling(after: SettlingDistance | None, end: Any, stable: Bool) -> dict[str, Any]:
-    """Columns of what follows the extremum."""
-    none = np.full(len(stable), np.nan)
-    ends = end if after is None else after.end
+    stable = np.asarray(_in_shapes(run, slider, V, V, V) < 0)
+    none = np.full(len(V), np.nan)
+    crossing = response.end == End.CROSSING
+    ends = response.end if after is None else after.end
     texts = np.array([_SENTENCES[End(int(e))] for e in ends], dtype=object)
     texts[(ends == End.RUNAWAY) & ~stable] = _UNSTABLE
-    texts[(ends == End.TOO_MANY_STEPS) & (end == End.CROSSING)] = _RINGING
+    texts[(ends == End.TOO_MANY_STEPS) & crossing] = _RINGING
     return {
+        "velocity": V,
+        "distance": np.where(crossing, response.distance, np.nan),
+        "slip": np.where(crossing, response.slip, np.nan),
         "settling_distance": none if after is None else after.distance,
         "settling_slip": none if after is None else after.slip,
         "stable": stable,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -142,12 +142,9 @@ class RunProgress:
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values, from which doubles are restored exactly."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = asdict(self)
         if self.checkpoint is not None:
-            state = {f.name: getattr(self.checkpoint, f.name) for f in fields(self.checkpoint)}
-            values["checkpoint"] = {
-                n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in state.items()
-            }
+            values["checkpoint"]["states"] = self.checkpoint.states.tolist()
         return values
 
     @classmethod

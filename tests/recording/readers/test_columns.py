@@ -152,7 +152,7 @@ def test_a_rate_goes_before_the_times_of_the_file(recording):
         ({"columns": {"F": 4}}, r"columns\['F'\] must be a column, got 4; .* 0 to 3"),
         ({"columns": {"torque": 1}}, r"columns must name roles, got 'torque'"),
         ({"units": {"W": "apples"}}, r"units\['W'\] must be a unit, got 'apples'"),
-        ({"units": {"Y": "N"}}, r"units must be a column, got 'Y'"),
+        ({"units": {"Y": "N"}}, r"units must name a channel, got none like 'Y'"),
         ({"rate": 0.0}, r"read\.rate must be positive"),
         ({"rate": "10 rpm"}, r"read\.rate must be"),
     ],

@@ -79,7 +79,7 @@ class StepLoad(ProgrammeStep):
 
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """No segment: a break point. Friction is defined under a positive load only."""
-        return [], level._replace(load=_positive(self.to, "force", f"{name}.to"))
+        return [], level._replace(load=number(self.to, f"{name}.to", "force", "positive"))
 
 
 @dataclass(frozen=True)
@@ -149,13 +149,13 @@ class Modulate(ProgrammeStep):
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """Up to three segments: rise, modulation, fall."""
         whole = _duration(self.duration, name)
-        rise = _at_least_zero(self.rise, "time", f"{name}.rise")
-        fall = _at_least_zero(self.fall, "time", f"{name}.fall")
+        rise = number(self.rise, f"{name}.rise", "time", "not negative")
+        fall = number(self.fall, f"{name}.fall", "time", "not negative")
         rule = f"be at least rise and fall together, {rise + fall:g} s"
         advice = "lengthen it or shorten them"
         require(not rise + fall > whole, f"{name}.duration", rule, f"{whole:g} s", advice)
-        epsilon = _at_least_zero(self.epsilon, "dimensionless", f"{name}.epsilon")
-        frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
+        epsilon = number(self.epsilon, f"{name}.epsilon", "dimensionless", "not negative")
+        frequency = number(self.frequency, f"{name}.frequency", "frequency", "positive")
         level = level._replace(velocity=_velocity(self.velocity, level, name))
         common: dict[str, Any] = {
             "load1": level.load,
@@ -210,7 +210,7 @@ class CyclicLoading(ProgrammeStep):
 
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
-        frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
+        frequency = number(self.frequency, f"{name}.frequency", "frequency", "positive")
         duration = _duration(self.duration, name)
         modulation = checked_modulation(self.modulation, f"{name}.modulation")
         return [PeriodicSegment(duration, modulation, frequency, level.load, level.velocity)], level
@@ -263,12 +263,4 @@ def _velocity(velocity: Given | None, level: LoadAndVelocity, name: str) -> floa
 
 
 def _duration(duration: Given, name: str) -> float:
-    return _positive(duration, "time", f"{name}.duration")
-
-
-def _positive(value: Given, kind: str, name: str) -> float:
-    return number(value, name, kind, "positive")
-
-
-def _at_least_zero(value: Given, kind: str, name: str) -> float:
-    return number(value, name, kind, "not negative")
+    return number(duration, f"{name}.duration", "time", "positive")

@@ -23,7 +23,7 @@ from asperity.recording.readers.units import (
     split_labels,
     understood,
 )
-from asperity.recording.roles import ROLES, candidates, nouns, role_of
+from asperity.recording.roles import ROLES, candidates, find_channel, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
@@ -177,16 +177,11 @@ def _by_name(
     """Units by the name of the column; the user may have used its heading or role."""
     by_name = {}
     for key, text in units.items():
-        role = role_of(key) if key not in names else None
-        if role in roles:
-            name = roles[str(role)]
-        elif role and key not in labels:
-            fitting = candidates(role, dict.fromkeys(names))
-            name = (
-                fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, Argument("units"))
-            )
-        else:
-            name = _name_of(key, names, labels, Argument("units"))
+        try:
+            heading = key if key in names else labels.get(key)
+            name = heading or find_channel(key, dict.fromkeys(names), roles)
+        except InputError as error:
+            raise error.about(Argument("units")) from None
         by_name[name] = text
     return by_name
 
