@@ -47,20 +47,20 @@ if TYPE_CHECKING:
 _DEFAULTS = Question()
 #: A line this often above its background is a modulation.
 _LINE = 8.0
-#: A drift of so many standard uncertainties is one.
+#: A drift counts above this multiple of its standard uncertainty.
 _DRIFTS = 3.0
-#: Periods of the lines next to which a pause is looked at.
+#: Lowest frequency of the lines that are fitted in a pause, in periods of the pause.
 _PAUSE_PERIODS = 64
-#: Samples of a pause that give a rate.
+#: Fewest samples of a pause from which a rate is estimated.
 _FEWEST = 64
-#: Pieces of a long recording that are searched for the modulation, their samples, and the periods
-#: that one must hold for its line to be apart from what is slower.
+#: Pieces of a long recording that are searched for the modulation, samples of a piece, and fewest
+#: periods of a piece, by which the line stands apart from slower motion.
 _PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurement(Judged):
-    """A reading of one modulated stretch, what was around it, and what is to be thought of it.
+    """A reading of one modulated stretch, the force before and after it, and checks of both.
 
     Attributes
     ----------
@@ -366,12 +366,12 @@ def _around(
             sides.append(None)
             continue
         first, stop = pause.first, pause.stop
-        # What is much later, or much earlier, says little.
+        # Parts of a pause that are far from the stretch are left out.
         if step > 0:
             stop = min(stop, first + 2 * most)
         else:
             first = max(first, stop - most)
-        # The force has to find back from a modulation before.
+        # After a modulation the force recovers.
         recovers = step > 0 or any(part.modulated for part in parts[: at - 1])
         if recovers:
             time = samples.time[first:stop]
@@ -387,14 +387,14 @@ def _around(
 
 
 def _no_modulation(time: Float) -> float:
-    """A frequency (Hz) far above what is slow in a pause."""
+    """A frequency (Hz) far above the slow motion in a pause."""
     return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
 def _pause(time: Float, force: Float, load: Float, *, recovers: bool) -> _Pause | None:
-    """Levels of a pause, of a force that recovers the one that it settles to.
+    """Levels of a pause; of a force that recovers, the level to which it settles.
 
-    None if that is not determined.
+    None if that level is not determined.
     """
     shift = variance = 0.0
     settling = settling_from(time, force, _no_modulation(time), 1) if recovers else None
@@ -446,7 +446,7 @@ def _static_friction(
     # A drift is somewhere between its ends: an even distribution about the mean.
     drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
     if len(sides) == 1:
-        # Its other end was not recorded, but the force drifts in the window or in the pause.
+        # F(0) at the other end was not recorded, but the force drifts in the window or the pause.
         level, load, _ = sides[0]
         rates = list(pauses)
         if reading.drift.shape[1]:

@@ -13,29 +13,32 @@ from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 from asperity.measurement.series import neighbour_scatter
 
-#: Periods in a block of the envelope, blocks of a whole recording at most, and blocks of one period
-#: where there would be fewer: edges are the exception among so many. Samples in a block.
+#: Usual periods of a block of the envelope, largest number of blocks, number of blocks for which
+#: the blocks of a short recording are made shorter, down to one period, and fewest samples of a
+#: block.
 _PERIODS = 4
 _MOST_BLOCKS, _FEW_BLOCKS = 1000, 64
 _SAMPLES = 8
-#: A part is modulated above this share of the recording's largest amplitude.
+#: A part is modulated if its amplitude exceeds this share of the largest amplitude.
 _ON = 0.005
-#: A change of amplitude beyond this share of it is another stretch.
+#: A stretch ends where the amplitude changes by more than this share.
 _SAME = 0.1
-#: Both must exceed the scatter of the envelope so many times, and blocks are made longer until the
-#: scatter is this share of the largest amplitude, or few are left.
+#: An amplitude and a change of it count above this multiple of the envelope's scatter.
 _SCATTERS = 6.0
+#: Blocks are made longer until the scatter is below this share of the largest amplitude, as long as
+#: this number of blocks is left.
 _SMOOTH, _FEWEST = 0.015, 16
-#: Harmonics next to a settling, up to this share of the sampling rate.
+#: Harmonics that are fitted together with a settling, up to this share of the sampling rate.
 _HARMONICS, _RESOLVED = 2, 0.45
-#: A settling is forgotten where it biases the mean by this share of its uncertainty. A part whose
-#: beginning makes it so many times noisier than its later half loses one of so many pieces of it:
-#: the ratio of two noises of twelve degrees of freedom exceeds that once in 1,000 times.
+#: A settling is over where it biases the mean by less than this share of the mean's uncertainty.
+#: A part that is `_NOISIER` times as noisy as its later half loses its first piece of `_STEPS`: the
+#: ratio of two noises of twelve degrees of freedom exceeds 7 once in 1,000 times.
 _FORGOTTEN, _NOISIER, _STEPS = 0.1, 7.0, 16
-#: The longest clean run is read alone if it has this share of the stretch.
+#: The longest run without defects is read alone if it has at least this share of the stretch.
 _WORTH = 0.5
 
-#: The load of a pause may differ from that of the reading by this share, and by its scatter.
+#: The load of a pause may differ from that of the reading by this share, plus this multiple of the
+#: uncertainty of a block; number of blocks of a pause.
 _SAME_LOAD, _LOAD_SCATTERS = 0.02, 5.0
 _BLOCKS = 100
 
@@ -85,7 +88,7 @@ def stretches(time: Float, load: Float, frequency: float) -> list[LoadInterval]:
     for a, b in pairwise(bounds):
         first, stop = a + (a > 0), b - (b < amplitude.size)
         if b - a == 1 and not on[a]:
-            # Of a short pause the only block is as good as free of modulation.
+            # The only block of a short pause hardly holds any modulation.
             first, stop = a, b
         if stop - first < 1:
             continue
@@ -115,7 +118,7 @@ def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
 
 
 def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:
-    """Sums over short blocks of a period or some."""
+    """Sums over short blocks, of one period to four or more."""
     half = float(time[-1] - time[0]) / 2
     basis = Basis(2 * np.pi * frequency, 1, 1, float(time[0]) + half, half)
     periods = 2 * half * frequency
@@ -126,7 +129,7 @@ def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:
 
 
 def merged(blocks: BlockSums, wanted: int) -> BlockSums:
-    """Sums of neighbouring blocks, about so many; a short remainder joins the last."""
+    """Sums of neighbouring blocks joined to about `wanted`; a short remainder joins the last."""
     together = -(-blocks.count.size // wanted)
     if together == 1 and blocks.count[-1] > 0.5 * blocks.count[0]:
         return blocks
@@ -145,9 +148,9 @@ def merged(blocks: BlockSums, wanted: int) -> BlockSums:
 def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
     """First sample at which the force has forgotten what was before this part of it.
 
-    What is left out ends where the settling has fallen below the uncertainty of the mean, if that
-    leaves half of the part. If it does not, the settling is left to the model of the reading, from
-    where on one exponential leaves no more noise than there is in the later half.
+    The beginning is left out until the settling has fallen below the uncertainty of the mean, if
+    that leaves half of the part. If it does not, only the beginning is left out in which one
+    exponential leaves more noise than there is in the later half; the reading models the rest.
 
     Parameters
     ----------
@@ -180,7 +183,7 @@ def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
 
 
 def settling_from(time: Float, force: Float, frequency: float, degree: int) -> Settling | None:
-    """How the mean of a force settles, if it does.
+    """Settling of the mean of a force; None with too few samples for one.
 
     Parameters
     ----------
@@ -229,7 +232,7 @@ def whole_periods(time: Float, frequency: float) -> int:
 def _solved(blocks: BlockSums) -> Float:
     linear = blocks.basis.linear
     gram = blocks.gram[:, :linear, :linear]
-    # A block whose samples lie in a gap's edge may not tell its columns apart.
+    # The columns of a block next to a gap may be linearly dependent.
     return np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ blocks.moments[:, :linear]
 
 

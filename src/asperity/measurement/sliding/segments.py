@@ -23,29 +23,36 @@ from asperity.measurement.series import slope_of
 #: First sample of a piece, and the one after its last.
 Piece = tuple[int, int]
 
-#: Blocks of equal time, as many of equal numbers of samples and of equal slip; and parts of a
-#: block next to a change.
+#: Number of blocks of equal time, of equal numbers of samples and of equal slip each; number of
+#: parts into which a block next to a change is divided.
 _BLOCKS, _PARTS = 300, 12
-#: Means of which the noise is found, and parts of a recording of which a quarter is quiet.
+#: Fewest means from which noise is estimated; parts of a recording, of which the quietest quarter
+#: gives the noise.
 _MEANS, _QUIET_PARTS = 96, 16
-#: Of the penalty of the Bayesian information criterion for a piece: real noise is not white.
+#: Multiple of the penalty of the Bayesian information criterion for a piece, as noise of a gauge is
+#: not white.
 _PENALTY = 2.0
-#: Neighbours with a smaller ratio of velocities are one segment; up to the second it is doubtful.
+#: Neighbours whose velocities have a smaller ratio are one segment; below the second ratio it is
+#: doubtful that they are two.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
-#: Pieces between two velocities are a transition with less than this share of the time and slip on
-#: both sides; and up to the second, in doubt, if the velocity changes within them as in a ramp.
+#: Pieces between two segments are a transition if they last for less than this share of the time
+#: and the slip of both; for less than the second share, which is doubtful, if their velocity
+#: changes as in a ramp.
 _TRANSITION, _RAMP = 0.15, 0.5
-#: Pieces of another velocity than between those of their neighbours are overshoot up to this share.
+#: A piece whose velocity does not lie between those of its neighbours is an overshoot below this
+#: share.
 _OVERSHOOT = 0.05
-#: Slip that lines differ by at the far ends of the parts that are intersected, over the noise.
+#: Lines that are intersected are so long that they differ by this multiple of the noise at their
+#: far ends.
 _LINE = 50.0
-#: Samples of a piece.
+#: Fewest samples of a piece.
 _FEWEST = 4
-#: A segment stands still that moves by no more than so many standard deviations of the noise.
+#: A segment that moves by no more than this multiple of the noise stands still.
 _STILL = 6.0
-#: Slower than this share of its neighbours a segment is a hold, unless it slides steadily.
+#: A segment slower than this share of its neighbours' velocity is a hold, unless it slides
+#: steadily.
 _HOLD = 5e-3
-#: A given velocity that differs by this share from that of the displacement is contradicted.
+#: The displacement contradicts a velocity of the user that differs from it by more than this share.
 _OTHER_VELOCITY = 0.05
 
 
@@ -333,7 +340,7 @@ def _velocity_change(motion: _Motion, piece: Piece) -> tuple[float, float]:
 
 
 def _still(motion: _Motion, piece: Piece, speed: float) -> bool:
-    """Whether noise explains all of a motion."""
+    """Whether noise explains the whole motion of a piece."""
     return abs(speed) * _duration(motion, piece) <= _STILL * motion.noise
 
 
@@ -420,7 +427,11 @@ def _transition(
 
 
 def _course(motion: _Motion, piece: Piece, speed: float, ends: tuple[float, float]) -> str:
-    """Whether a velocity is "even" and none of those at the ends, "settling" to one, or either."""
+    """How the velocity of a piece between two segments changes.
+
+    "even": constant, and unlike those of both segments; "settling": it goes from one to the other;
+    empty where it cannot be decided.
+    """
     change, uncertainty = _velocity_change(motion, piece)
     between = min(ends) <= speed <= max(ends)
     whole = abs(ends[1] - ends[0]) if between else min(abs(speed - end) for end in ends)

@@ -97,9 +97,9 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
 def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
     """Whether the mean force settles in the window, and whether its final value is determined.
 
-    A settling that ends in the window is part of the reading; a window of the user that holds one
-    is none of a steady state all the same. Over a fraction of its time constant a settling is a
-    drift, which the levels without modulation do not have.
+    A settling that ends in the window is part of the reading; in a window that the user chose, it
+    still shows that the window holds no steady state. Over a fraction of its time constant a
+    settling looks like a drift, which the force without modulation does not have.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
         seen = chosen_by == "user" or not settling.determined
         return LOCK_IN.check("transient", number, sentence, significant=seen)
     away = [drift_rate(reading).beyond(pause) for pause in pauses if reading.drift.shape[1]]
-    # A pause that recovers from a modulation may drift too: none of them may explain the window.
+    # A pause that recovers from a modulation drifts too: the drift of the window must exceed that
+    # of every pause.
     number = min(away, default=0.0) * length / mean
     sentence = (
         f"over the window the force moves by {percent(number)} of its mean more than without "

@@ -23,27 +23,27 @@ from asperity.recording.defects.levels import held_length
 _PIECE = 1 << 16
 #: Mains frequencies (Hz), how many harmonics of them count, and how far a network wanders (Hz).
 _MAINS, _MAINS_HARMONICS, _WANDER = (50.0, 60.0), 4, 0.2
-#: A line is seen where it is so many times its scatter.
+#: A line counts above this multiple of its scatter.
 _SEEN = 4.0
 #: A modulation is switched off where less than this share of it is left.
 _SWITCHED = 0.5
-#: Pieces of a pause that give a line's scatter, and periods in each at least.
+#: Pieces of a pause from which the scatter of a line is estimated, and fewest periods of a piece.
 _LINE_PIECES, _LINE_PERIODS = 8, 4
 
-#: Phases into which a period is folded, and samples in each, at least.
+#: Phases into which a period is folded, and fewest samples of a phase.
 _PHASES, _FEWEST = 128, 4
-#: Phases with samples that a comparison needs.
+#: Fewest phases with samples for a comparison.
 _FILLED = 16
-#: Periods and samples of a mean that the drift is taken from.
+#: Fewest periods and samples of a mean by which the drift is subtracted.
 _MEAN_PERIODS, _MEAN_SAMPLES = 2, 64
 #: Model error of a cycle, as a share of its height.
 _LEFT = 2e-3
-#: Harmonics of a cycle that may be cut off, and of one that is not.
+#: Most harmonics of the description that is cut off, and of the one that is not.
 _CUT, _WHOLE = 4, 40
-#: Shares of the period at the level that are tried first, and rounds from each.
+#: Initial shares of the period at the level, and most rounds from each.
 _STARTS, _ROUNDS = (0.06, 0.12, 0.2, 0.3, 0.4, 0.48), 12
-#: Shares of the period that a level takes: of a shorter one little is cut off, and a signal that is
-#: beyond the range for longer is more level than signal.
+#: Smallest and largest share of the period at a level: below, little is cut off; above, there is
+#: more level than signal.
 _SHARES = (0.05, 0.55)
 #: How much better the description that is cut off must be. Of 1,500 cycles of three harmonics with
 #: noise, and of 2,598 of orbits of four laws, two of them with inertia too (0.1 to 100 um/s,
@@ -241,7 +241,7 @@ class _Cycle(NamedTuple):
 
 
 class _Level(NamedTuple):
-    """The best cycle that is cut off: its criterion, share of the period, and side."""
+    """The best description that is cut off: criterion, share of the period at the level, side."""
 
     criterion: float
     share: float

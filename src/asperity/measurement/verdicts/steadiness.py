@@ -17,19 +17,20 @@ from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check, percent
 
-#: Samples of the piece in the middle that is searched for what is nearly as fast as the modulation.
+#: Samples of the piece in the middle of a window in which fast oscillations are searched.
 _PIECE = 1 << 16
 #: Stick-slip of laboratory sliders is slower than this (Hz).
 _STICK_SLIP = 20.0
 
 
-#: Spectral lines on each side of a line that are its sidebands if it is not steady.
+#: Spectral lines on each side of the modulation that count as its sidebands.
 _SIDEBANDS = 16
-#: Slow motion of so many times the variance that noise gives it is no noise.
+#: Slow motion counts above this multiple of the variance that noise gives it.
 _EXCESS = 3.0
 
+#: Pieces of a window that are read separately, and fewest periods of a piece.
 _PIECES, _FEWEST_PERIODS = 8, 3
-#: Chi-squared of the pieces beyond its mean, in standard deviations, that noise does not reach.
+#: Noise does not move chi-squared of the pieces beyond this multiple of its standard deviation.
 _BEYOND = 6.0
 
 
@@ -65,7 +66,7 @@ def slow_line(reading: LockInReading, time: Float, force: Float) -> SpectralLine
             or abs(line.frequency / f - round(line.frequency / f)) * f > width
         )
     ]
-    # A background of nothing, as of a force that stands still, is divided by all the same.
+    # The background of a constant force is zero.
     return max(lines, key=lambda line: line.amplitude / max(line.background, 1e-300), default=None)
 
 
@@ -157,7 +158,7 @@ def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bo
     # Each block with its samples: a short one at the end says little.
     series = [(sums / count, count)]
     at, left = left_of_piece(reading, time, load)
-    # Half a period keeps what is slower, and of the modulation nothing is left to keep.
+    # Means over half a period keep slower motion; the modulation is not in the residual.
     span = float(time[at][-1] - time[at][0])
     blocks = int(min(left.size, max(8, 2 * reading.frequency * span)))
     means = block_means(left, blocks)
@@ -191,8 +192,8 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
         responses.append(complex(beta[basis.drift], -beta[basis.drift + basis.harmonics]))
     phasors = np.array(responses)
     mean = phasors.mean()
-    # Of noise alone: the uncertainty of a harmonic that settles is that of what it settles to.
-    # Amplitude over a piece has half the variance of a complex phasor: two components a piece.
+    # The uncertainty by noise alone; that of the reading includes the extrapolation of a settling.
+    # Each piece has two components, real and imaginary part.
     sigma = np.sqrt(2 * reading.noise.spectra[1, 1, 1].real * pieces / reading.samples)
     squares = float(np.sum(np.abs(phasors - mean) ** 2)) / max(sigma**2, 1e-300)
     freedom = 2 * (pieces - 1)
