@@ -25,8 +25,8 @@ from asperity.lock_in.noise import harmonic_sums, noise_around
 from asperity.lock_in.normal_equations import BlockSums, inverted
 
 #: Prior odds of a settling times the Occam factor of its amplitude, for the mean and for a
-#: harmonic, which has two amplitudes. With these odds of the mean, 3 to 10 of 1,000 steady
-#: recordings prefer a settling, in white and AR(1) noise, and 99 of 100 keep their uncertainty
+#: harmonic, which has two amplitudes. With these odds for the mean, a settling is preferred in 3 to
+#: 10 of 1,000 steady recordings with white or AR(1) noise, and 99 of 100 keep their uncertainty
 #: within 10 %.
 _ODDS = (0.005, 0.0005)
 #: A settling with a time constant above this share of the window does not end in the window: with a
@@ -140,7 +140,8 @@ def find_settlings(
     """
     linear = blocks.basis.linear
     settlings: dict[int, Settling] = {}
-    # The onset of one order has a broad spectrum, like a short settling of the next order.
+    # The beginning of a settling has a broad spectrum, which resembles a short settling of the next
+    # order: those that are present are fitted again without the others.
     sweep = list(range(blocks.basis.harmonics + 1))
     for _ in range(2):
         for order in sweep:

@@ -1,13 +1,12 @@
 """Slow series of a recording: block means, their steady part, levels and trends with uncertainties.
 
 Friction in a segment is averaged in bins of equal time and fitted by least squares with a level, a
-trend over slip and, where asked, decaying exponentials. The residual of these machines is
-correlated over hundreds of samples and holds lines, so the variance of the coefficients is not that
-of white noise: it is the residual's spectral density next to zero frequency, from its projections
-on the slowest cosines that the fitted columns leave free (equal-weighted cosines: Mueller,
-J. Econometrics 141, 1331, 2007; Lazarus et al., J. Bus. Econ. Stat. 36, 541, 2018), followed
-towards zero along its power law where it grows significantly. As many cosines, so many degrees of
-freedom.
+trend over slip and optionally decaying exponentials. The residual of such machines is correlated
+over hundreds of samples and holds lines, so the variance of the coefficients is not that of white
+noise: it is the residual's spectral density next to zero frequency, from its projections on the
+slowest cosines that the fitted columns leave free (equal-weighted cosines: Mueller, J. Econometrics
+141, 1331, 2007; Lazarus et al., J. Bus. Econ. Stat. 36, 541, 2018). Where the density grows
+significantly towards zero, its power law is extrapolated. Each cosine is a degree of freedom.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ _MOST_BLOCKS = 512
 #: Probability at which noise explains that two rates differ.
 _ACCIDENT = 3e-3
 
-#: Bins of a segment, and cosines that tell its slow noise.
+#: Most bins of a segment, and cosines from which its slow noise is estimated.
 _BINS, _TREND_COSINES = 400, 8
 #: Scatter of the log of a squared projection, a chi-squared number of one degree of freedom.
 _LOG_SCATTER = 2.22
@@ -66,7 +65,7 @@ def rate_between(first: MeanLevel, second: MeanLevel) -> Rate:
 
 
 def block_means(values: Float, blocks: int) -> Float:
-    """Means of about so many runs of equally many samples; a short run at the end is left out."""
+    """Means of about `blocks` runs of equally many samples; a short run at the end is left out."""
     length = max(1, values.size // blocks)
     whole = values.size // length
     return values[: whole * length].reshape(whole, length).mean(1)
@@ -146,11 +145,11 @@ def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
 
 
 def steady_from(values: Float, degree: int) -> int:
-    """Where a series has forgotten its beginning: index of the first value to keep.
+    """Index of the first value after the initial transient of a series.
 
-    The start is cut where what is left determines its mean best, by the marginal standard error
-    rule (White, Simulation 69, 323, 1997), about a drift of the given degree; of starts that
-    noise cannot tell apart, the earliest. At most half is cut.
+    The cut is where the rest determines its mean best, by the marginal standard error rule (White,
+    Simulation 69, 323, 1997), about a drift of the given degree; of cuts that are equally good
+    within noise, the earliest. At most half is cut.
 
     Parameters
     ----------
@@ -263,7 +262,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     ----------
     residual : array, (n,)
     matrix : array, (n, p)
-        The columns that were fitted; the noise that they took is not seen.
+        The fitted columns, which have absorbed part of the noise.
     """
     n, taken = matrix.shape
     count = max(1, min(_TREND_COSINES, (n - taken) // 4))
@@ -279,7 +278,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
     power = projections[taken:] ** 2
     slow = float(power[:count].mean())
-    # Of noise that grows towards zero the fitted columns took the strongest part.
+    # The fitted columns have absorbed the strongest part of noise that grows towards zero.
     away = np.log(np.arange(1, power.size + 1) + taken / 2)
     centred = away - away.mean()
     lever = float(centred @ centred)

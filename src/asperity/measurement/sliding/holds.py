@@ -22,7 +22,7 @@ from asperity.measurement.series import (
     weighted_line,
 )
 
-#: Share of the sliding before a hold that may still be settling from the hold before it.
+#: Share of the sliding before a hold that is left out, as it may settle from the hold before it.
 _SETTLING = 0.3
 #: Friction between these shares of the rise on sliding again gives the stiffness.
 _RISE = (0.1, 0.5)
@@ -239,7 +239,7 @@ def _peak(
     row = np.array([1.0, where, where**2])
     inverse = np.linalg.pinv(matrix.T @ matrix, hermitian=True)
     spread = float(np.sum(residual**2)) / max(tops.size - 3, 1)
-    # What neighbours share of the noise does not average out.
+    # Noise that neighbours have in common does not average out.
     doubt = float(np.sqrt(spread * (row @ inverse @ row) * _inflation(residual)))
     return (
         float(row @ beta),

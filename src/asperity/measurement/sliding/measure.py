@@ -266,7 +266,7 @@ def _steps(
     segments: tuple[SlidingSegment, ...],
     degree: int,
 ) -> tuple[list[VelocityStep], list[str]]:
-    """Every change between two sliding segments, and sentences on those that cannot be read."""
+    """Steps between two sliding segments, and sentences on steps that cannot be read."""
     steps: list[VelocityStep] = []
     unread: list[str] = []
     # The first segment may begin with the loading.
@@ -276,7 +276,8 @@ def _steps(
     for k, change in enumerate(cut.cuts):
         a, b, c = bounds[k : k + 3]
         if cut.holds[k] or cut.holds[k + 1]:
-            # The slip after which a hold is forgotten is not known: a third of what follows.
+            # The slip in which friction settles after a hold is not known: half of the sliding
+            # before the next step is left out.
             settling = np.inf
             continue
         if min(b - a, c - b) < _FEWEST:

@@ -203,7 +203,7 @@ def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
         try:
             channel = trace.channel(role)
         except InputError:
-            # One that can be converted is better than several of which only it can.
+            # Of several candidates, the only one with a known unit of that kind is taken.
             only = fitting if len(fitting) == 1 else imposed
             if len(only) == 1:
                 return trace.channels[only[0]], role == "velocity", ""

@@ -18,16 +18,18 @@ from scipy.special import stdtrit
 from asperity.arrays import Float
 from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend, moving_mean
 
-#: Windows, in slips of the shorter side.
+#: Lengths of windows, over the slip of the shorter side.
 _WINDOWS = (1.0, 1.5, 2.25)
-#: Shares of the settling slip that are left out after the step.
+#: Multiples of the settling slip that are left out after the step.
 _LEFT_OUT = (1.0, 1.4, 2.0)
-#: A transient decays within this share of the shorter side; it has settled at that of itself.
+#: Longest decay of a transient over the slip of the shorter side; share of its largest value below
+#: which it has settled.
 _LONGEST_DECAY, _SETTLED = 0.125, 0.03
-#: Where the two slopes differ with less than this probability by chance, there are two.
+#: There are two slopes if their difference has less than this probability by chance.
 _CHANCE = 0.05
+#: Decays of exponentials that are tried.
 _DECAYS = 14
-#: An earlier transient may take this share of the sliding before a step.
+#: Largest share of the sliding before a step that is left out for an earlier transient.
 _MOST_CUT = 0.5
 #: Bins that a level with its trend needs.
 _FEWEST = 8
@@ -185,7 +187,7 @@ def _windowed(side: _Side, low: float, high: float) -> _Side | None:
 def _transient(
     before: _Side, after: _Side, shorter: float, window: float, degree: int
 ) -> tuple[tuple[float, float], float]:
-    """Decay slips of the best two exponentials, continuous at the step, and where they are over."""
+    """Decay slips of the best two exponentials, continuous at the step, and the slip to settle."""
     slip = np.concatenate([before.slip, after.slip])
     friction = np.concatenate([before.friction, after.friction])
     stepped = np.concatenate([np.zeros(before.slip.size), np.ones(after.slip.size)])
@@ -259,7 +261,7 @@ def _result(
         choices += [one for _, one, *_ in readings if one is not None]
     change = np.array([c.change for c in choices])
     noise = np.array([c.uncertainty for c in choices])
-    # A window that happens to look quiet knows no more than the others of its trend.
+    # A window that looks quiet by chance gets no more weight than the others of its trend.
     kinds = np.array([c.trend for c in choices])
     trusted = noise.copy()
     for kind in set(kinds.tolist()):

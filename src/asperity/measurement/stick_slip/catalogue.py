@@ -137,8 +137,8 @@ def events_record(measurement: StickSlipMeasurement) -> list[dict[str, Any]]:
 def means(measurement: StickSlipMeasurement) -> dict[str, float]:
     """Number, means and spreads (standard deviations) of the events, as a campaign's row has them.
 
-    Uncertainties of means are from the spread: they count events as independent. All slips of a
-    recording may fall unlike the shape that is fitted: durations have that error in common.
+    Uncertainties of means are from the spread, with events as independent. The fitted shape of
+    slips may be wrong, which is an error that all durations of a recording have in common.
     """
     events = measurement.events
     common = np.sqrt(2.0) * float(np.median(events.timing_uncertainty)) if len(events) else 0.0

@@ -12,22 +12,24 @@ from asperity.arrays import Float, Index
 from asperity.measurement.stick_slip.lines import Sums
 from asperity.measurement.stick_slip.noise import Noise
 
-#: Means over an eighth of a cycle still show its peak and its trough; what lasts for less than a
-#: thirty-second of it is noise.
+#: Means over an eighth of a cycle still show its peak and trough; changes that last for less than a
+#: thirty-second of a cycle are noise.
 _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
-#: Rises on each side of which the loading slope next to an event is the usual one.
+#: Number of rises on each side of an event that give the usual loading slope there.
 _NEAR = 10
-#: Share of the time of rises in which the force rises no faster than by the usual loading.
+#: Quantile, by time, of the slopes of rises that is the usual loading slope.
 _LOADING = 0.75
-#: Longest swing back of the instrument, in times of a usual fall.
+#: Longest swing of the instrument back, over the usual duration of a fall.
 _SWING = 3.0
-#: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
-#: excess of so many standard deviations is loading and slip.
+#: In symmetrical noise half of the rises last longer than the falls next to them. An excess of this
+#: many standard deviations shows loading and slip.
 _ASYMMETRY = 3.0
-#: Wider means make falls longer by up to this factor before another width tells them better.
+#: Of widths of means, those whose ratio of rises to falls is within this factor of the largest
+#: count; the narrowest of them is chosen.
 _BLUNTER = 3.0
 
-#: Cycles of an oscillation scatter by less than this share; those of a noise by half and more.
+#: Cycles of an oscillation scatter by less than this share, those of noise by a half or more; and
+#: fewest cycles that show it.
 _REGULAR, _FEWEST_CYCLES = 0.25, 8
 
 
@@ -91,9 +93,9 @@ class Falls:
     thresholds : array, (m,)
         Smallest fall between such means that is no noise.
     evidence : int
-        What speaks for loading and slip, rather than for a symmetrical signal: 3 where rises of
-        many falls are longer, 2 where they are less clearly or of few falls, 1 where falls come
-        back regularly, else 0.
+        Evidence for loading and slip, against a symmetrical signal: 3 where the rises are more than
+        twice as long as many falls, 2 where they are longer by less or than few falls, 1 where
+        falls come back regularly, else 0.
     """
 
     peak: Index
@@ -107,7 +109,7 @@ class Falls:
 
 
 def find_falls(force: Float, noise: Noise) -> Falls:
-    """Every fall of the force that is loading's opposite, and no noise.
+    """Every fall of the force that noise does not explain.
 
     Parameters
     ----------
@@ -117,11 +119,11 @@ def find_falls(force: Float, noise: Noise) -> Falls:
 
     Notes
     -----
-    Noise that lasts as long as a cycle cannot be told from cycles. The shortest width of means is
-    sought whose falls are a cycle of eight widths or more apart and follow on longer rises, or else
-    come back regularly, as those of an oscillation do; means up to an eighth of that cycle are then
-    searched together. Of falls that overlap at different widths those of the width that tells most
-    of them apart are kept.
+    Noise as slow as the cycles cannot be distinguished from them. First the shortest width of means
+    is chosen at which falls are at least eight widths apart and either follow longer rises or come
+    back regularly, as in an oscillation. Then the falls of means of all widths up to an eighth of
+    that cycle are collected. Where falls of several widths overlap, those of the width that
+    resolves most falls are kept.
     """
     most, candidates, averages = noise.longest, [], _Averages(force, noise)
     for octave in range(most + 1):
@@ -152,10 +154,10 @@ def _cycle(peak: Index, trough: Index, samples: int) -> float:
 
 
 def _evidence(peak: Index, trough: Index) -> tuple[int, float]:
-    """What speaks for loading and slip, from 3 to 0, and how much longer rises are than falls.
+    """Evidence for loading and slip, as of `Falls`, and the ratio of rises to falls in duration.
 
-    Falls of noise that is faster than its second differences show are as long as its rises, but for
-    the loading under it: sticks are twice as long as slips in many events.
+    Falls of noise are as long as its rises, except for a slow loading under the noise; sticks of
+    many events are at least twice as long as slips.
     """
     fall = trough - peak
     rise = peak - np.concatenate([[0], trough[:-1]])
@@ -214,7 +216,10 @@ class _Averages:
 def _at_all_widths(
     averages: _Averages, noise: Noise, octave: int, first: tuple[Index, Index], evidence: int
 ) -> Falls:
-    """Falls at all widths up to an eighth of a cycle, which is longer the fewer falls are false."""
+    """Falls at all widths up to an eighth of a cycle.
+
+    The cycle becomes longer as false falls disappear, so that wider means are added in turns.
+    """
     most, longest, (peak, trough) = noise.longest, -1, first
     force = averages.force
     while True:
@@ -240,10 +245,11 @@ def _at_all_widths(
 def _steep_part(
     averages: _Averages, peak: Index, trough: Index, thresholds: Float
 ) -> tuple[Index, Index]:
-    """Falls from where they leave their upper quarter to where they reach their lower, and around.
+    """Falls from where they leave their upper quarter to where they reach their lower quarter.
 
-    The highest mean of a stick that loads slowly may be far before the fall. Means are the
-    shortest between whose quarters noise does not go, or else the shortest that show the fall.
+    The highest mean of a stick that loads slowly may lie far before the fall. The means are the
+    shortest whose noise is below half of the fall, or else the shortest that show the fall. The
+    result is longer by half of the distance between the quarters on each side.
     """
     peak, trough = peak.copy(), trough.copy()
     octave = np.full(peak.size, -1)

@@ -21,21 +21,22 @@ from asperity.recording.defects.autoregression import Autoregression, fitted
 Bounds = tuple[Index, ...]
 Shape = Callable[[Float, Float], Float]
 
-#: A line long enough that noise moves its end by this share of the drop; longer ones bend.
+#: Lines are so long that noise moves their ends by this share of the drop; longer lines bend.
 _PRECISION = 0.01
 _SHORTEST = 6
-#: Bins of the slip, and candidates of onset and end on each zoom of the search.
+#: Bins of a slip; candidates of onset and end in each zoom of the search, and number of zooms.
 _BINS = 32
 _CANDIDATES = 8
 _ZOOMS = 4
 #: Events that are searched together: their arrays fit the cache.
 _TOGETHER = 64
-#: A stick shorter than this many slips may be the rise of an oscillation about sliding.
+#: A stick shorter than this multiple of a slip may be the rise of an oscillation about sliding.
 STICKING = 2.0
-#: Events that tell the shape, and made ones of each shape; runs of sticks that tell the noise.
+#: Most events that determine the shape, and simulated events of each shape; most runs of sticks
+#: that determine the noise, and most samples of a run.
 _TELLING, _MADE = 64, 64
 _RUNS, _LONGEST_RUN = 64, 4096
-#: What sampling adds to the uncertainty of an onset or end (samples).
+#: Part of the uncertainty of an onset or end that sampling causes (samples).
 _SAMPLING = 0.45
 
 
@@ -55,12 +56,12 @@ class SlipEvents:
     drop_uncertainty : array, (k,)
         Of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
-        Of the middle half of the stick before the event (1/s times the unit); NaN of the first.
-        Creep throughout the stick is part of it.
+        Of the middle half of the stick before the event (1/s times the unit), creep throughout the
+        stick included; NaN of the first event.
     slope_bend : array, (k,)
-        What of that uncertainty all sticks have in common.
+        Part of that uncertainty that all sticks have in common.
     creep, creep_uncertainty : array, (k,)
-        What the force at onset lacks to the line of that slope; NaN of the first.
+        Line of that slope at the onset less the force there; NaN of the first event.
     fall_rate : array, (k,)
         Steepest fall of the force over a quarter of the slip (1/s times the unit), by the mean
         slip of the recording.
@@ -117,10 +118,10 @@ def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     if not len(falls):
         return SlipEvents(*(np.empty(0) for _ in fields(SlipEvents)))
     events = _read(time, force, falls)
-    # What a line before and a line after do not confirm is a bend in the loading. Hum and a ringing
-    # gauge make falls next to which lines bend, so that the drop may be zero; in an oscillation
-    # about sliding they all do, and the drop counts, which is a third too small of a sine. The
-    # lines of the others still end there: it may be a slip that noise hides.
+    # A fall that the lines before and after it do not confirm is a bend in the loading, as hum and
+    # a ringing gauge make it. In an oscillation about sliding all lines bend: there the drop
+    # counts, which is a third too small for a sine. Lines of other events still end at an
+    # unconfirmed fall, as it may be a slip that noise hides.
     clear = events.drop > 1.96 * events.drop_uncertainty
     cycles = events.stick_duration[1:] / events.slip_duration[1:]
     sticks = cycles.size > 0 and np.median(cycles) >= STICKING
@@ -139,7 +140,7 @@ def _read(time: Float, force: Float, falls: Falls) -> SlipEvents:
     sums = Sums(force, edges[:-1], peak)
     drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
-    # The tail of an exponential fall is as long again as its quarters say.
+    # The tail of an exponential fall is as long again as the part between its quarters.
     length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - length + (trough - peak))
     stop = np.minimum(edges[1:], trough + length)
@@ -148,7 +149,7 @@ def _read(time: Float, force: Float, falls: Falls) -> SlipEvents:
     sticks = _sticks(force, trough[:-1] + quarter, peak[1:] - quarter + 2, falls.scatter)
     rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
     bounds = peak, trough, first, stop
-    # Throughout the recording: the largest of equal slips are those that noise makes so.
+    # Events from all of the recording: of equal slips, noise alone makes some the largest.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
     large = large[np.linspace(0, large.size - 1, min(large.size, _TELLING)).astype(np.intp)]
     runs = (trough[:-1] + quarter, peak[1:] - quarter + 2) if k > 1 else (first, peak)
@@ -183,7 +184,7 @@ def _onset_and_end(
     -------
     onset, end : array, (k,)
     squares : array, (k,)
-        Sum of the squares of all residuals, but for a constant.
+        Sum of the squares of all residuals, apart from a constant.
     """
     length = (trough - peak).astype(float)
     middle = (peak + trough) / 2
@@ -207,7 +208,7 @@ def _onset_and_end(
         edges = np.linspace(span_on[0], span_end[1] + 1.0, _BINS + 1, axis=1)
         edges = np.clip(np.rint(edges).astype(np.intp), first[:, None], stop[:, None])
         pair = np.s_[:, :, None, None], np.s_[:, None, :, None]
-        # Of the bin in which the slip begins or ends only the part that is slip.
+        # In the bins where the slip begins or ends, only the samples of the slip count.
         begin = np.maximum(edges[:, None, None, :-1], until[pair[0]])
         stops = np.maximum(np.minimum(edges[:, None, None, 1:], since[pair[1]]), begin)
         weight = stops - begin
@@ -293,16 +294,16 @@ def _timing(
     noise: Autoregression,
     scatter: Float,
 ) -> _Timing:
-    """The shape of slips, which all fall alike, from made recordings of each.
+    """The shape of the slips of a recording, which all have one shape, from simulated recordings.
 
-    Slips of every shape are made as they are read with it, with noise of the spectrum of the
-    recording, and read with all shapes. A shape is likely where its made recordings have the
-    squares of residuals of all shapes that the recording has (indirect inference: Gourieroux,
-    Monfort and Renault, J. Appl. Econometrics 8, S85, 1993): correlated noise acts on both alike.
-    Where no shape describes the recording, all are as likely as their distances say in units of
-    the smallest. It may lie between them, as the slip of a damped slider lies between that of a
-    free one and an exponential fall: differences of squares are linear in the shape, so that the
-    mixture of shapes that has those of the recording says how late or early the best one reads it.
+    For each shape, slips are simulated with noise of the recording's spectrum and read with all
+    shapes. A shape is likely if its simulated recordings have the same sums of squared residuals
+    under all shapes as the recording (indirect inference: Gourieroux, Monfort and Renault, J. Appl.
+    Econometrics 8, S85, 1993): correlated noise acts on both alike. Where no shape fits, the
+    distances are taken in units of the smallest. The true shape may lie between these shapes, as
+    that of a damped slider lies between a free slip and an exponential fall: differences of squares
+    are linear in the shape, so that the mixture of shapes with the squares of the recording says
+    how late or early the best shape reads onset and end.
     """
     # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
     from scipy.optimize import nnls
@@ -369,8 +370,8 @@ def _timing(
     unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
     columns = np.hstack([away, unit])
     mixture, left = nnls(columns[:-1].T, columns[-1])
-    # What no mixture explains, beyond what noise leaves, is a shape as far off in a direction of
-    # its own: it moves onset or end at most as the shape that moves it the most for its distance.
+    # The part that no mixture explains, beyond noise, is a shape in another direction: it moves
+    # onset or end at most as the shape does that moves it the most per distance.
     far = (away[:-1] ** 2).sum(1)
     others = np.arange(len(_SHAPES)) != best
     lever = (moved[others] ** 2 / far[others, None]).max(0)
@@ -419,7 +420,7 @@ def _measured(
     timing_of: _Timing,
     slow: float,
 ) -> SlipEvents:
-    """Forces and their uncertainties, which slow noise makes `slow` times as large."""
+    """Forces and their uncertainties; slow noise multiplies these by `slow`."""
     (onset, end), (first, stop) = slips, bounds
     step = float(time[-1] - time[0]) / (force.size - 1)
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
@@ -432,9 +433,9 @@ def _measured(
     high, before = level(first, until, onset)
     low, after = level(since, stop, end)
     drop = high - low
-    # The end of a line is twice as uncertain as its mean. What the line of half of its samples says
-    # otherwise, in the mean over the events, is how the stick bends: creep in proportion to what is
-    # loaded before, a ringing gauge to the drop.
+    # The end of a line is twice as uncertain as its mean. The mean difference of lines through half
+    # of the samples shows how sticks bend: by creep in proportion to the loading before, by a
+    # ringing gauge in proportion to the drop.
     before_error = slow * 2 * _of_mean(scatter, until - first)
     of_noise = np.hypot(before_error, slow * 2 * _of_mean(scatter, stop - since))
     # The level of a line may lie anywhere within a step of the recorder.
@@ -448,8 +449,8 @@ def _measured(
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
     timing = timing_of.factor * _of_mean(scatter, long / 2) / least
-    # A line that ends too low meets the slip later by as large a share of it; what noise of the
-    # spectrum of the sticks does to lines is in the factor.
+    # A line that ends too low meets the slip later by the same share; the effect on lines of noise
+    # with the spectrum of the sticks is in the factor.
     slowly = np.hypot(of_noise * np.sqrt(1 - slow**-2), rounding) / least
     timing = np.linalg.norm(
         [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
@@ -500,7 +501,7 @@ class _Sticks:
 
 
 def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
-    """Lines through runs of samples, and what lines through the halves of each say otherwise."""
+    """Lines through runs of samples, and how lines through their halves differ from them."""
     if not first.size:
         return _Sticks(*(np.empty(0),) * 6)
     middle = (first + stop) // 2
@@ -514,7 +515,7 @@ def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
     change = (sums.line(first, middle)[1] - sums.line(middle, stop)[1]) / (4 * slope_error)
     usual = np.median(change)
     slope_error = slope_error * max(1.0, float(np.median(np.abs(change - usual))) / 0.6745)
-    # Creep bends the second half: what it does to the whole is of the size of the difference.
+    # Creep bends the second half; its effect on the whole is of the size of the difference.
     error = np.sqrt(np.pi / 2 / first.size)
     bend = 4 * slope_error * np.sqrt(max(usual**2 - error**2, 0.0))
     mean = level + slope * away + sums.level
@@ -529,10 +530,10 @@ def _empty_falls(
     slope: Float,
     scatter: Float,
 ) -> float:
-    """Uncertainty of drops by the noise as it is, over that by the scatter of means.
+    """True uncertainty of drops over that by the scatter of means.
 
-    Where there is no slip, in the middle of a stick, lines on both sides of it should meet: hum and
-    other noise slower than a thirty-second of a cycle says otherwise.
+    In the middle of a stick, where there is no slip, lines on both sides should meet; hum and other
+    noise slower than a thirty-second of a cycle keep them apart.
     """
     (begin, end), (first, stop) = slips, bounds
     half = (end - begin)[:-1] / 2
@@ -552,7 +553,7 @@ def _empty_falls(
     low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
     drop = high - low + slope[long] * (since - until)
     error = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
-    # By the median, as some sticks hold slips that were not seen.
+    # The median, as some sticks hold slips that were not detected.
     return max(1.0, float(np.median(np.abs(drop) / error)) / 0.6745)
 
 
@@ -567,7 +568,7 @@ def _noise(force: Float, first: Index, stop: Index) -> Autoregression:
 
 
 def _of_mean(scatter: Float, samples: Index | Float) -> Float:
-    """Scatter of the mean over so many samples, between and beyond the widths that are known."""
+    """Scatter of means over numbers of samples, between and beyond the widths in `scatter`."""
     known = np.arange(scatter.size)
     octave = np.log2(np.maximum(samples, 1))
     inside = np.exp(np.interp(octave, known, np.log(scatter)))
@@ -577,8 +578,8 @@ def _of_mean(scatter: Float, samples: Index | Float) -> Float:
 def steepest_fall(force: Float, onset: Float, end: Float, drop: Float) -> Float:
     """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
 
-    Slips have one shape, whose steepest quarter is that of their mean: the largest of the rates of
-    one slip would be what noise makes it.
+    All slips have one shape, so that the steepest quarter of their mean counts; the largest rate of
+    a single slip would be biased by noise.
 
     Parameters
     ----------

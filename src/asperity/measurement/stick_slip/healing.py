@@ -1,8 +1,8 @@
 """Healing from stick-slip: how the drop grows with the logarithm of the stick time.
 
-Recordings at several velocities or stiffnesses are compared, whose stick times the velocity sets.
-One recording does not tell: its stick ends where the force reaches the peak, so that a higher
-friction on the track makes a longer stick. Peaks rise with stick times without any healing.
+Recordings at several velocities or stiffnesses are compared, as these set the stick times. A single
+recording does not show healing: a stick ends where the force reaches the peak, so that a higher
+friction on the track makes a longer stick, and peaks rise with stick times without any healing.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 
-#: Fewest recordings that tell a slope, and passes in which their scatter about it settles.
+#: Fewest recordings for a slope, and most iterations for their scatter about it.
 _FEWEST, _PASSES = 3, 30
 #: Growth of the drop per e-fold of stick time over B - A: limit cycles of 24 sliders with inertia
 #: and random A, B, D0, M and V of the Rice-Ruina law, at stiffnesses from 0.05 to 0.5 of the

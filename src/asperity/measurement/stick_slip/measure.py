@@ -1,4 +1,4 @@
-"""A stick-slip recording measured: events, regimes, loading, and what is to be thought of them."""
+"""Measurement of a stick-slip recording: events, regimes, loading, and checks of them."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 
 
 _DEFAULTS = Question()
-#: Events that tell no regime.
+#: With this number of events or fewer there is no regime.
 _FEW = 2
-#: Share of the displacement in the slips above which it is the slider's.
+#: The displacement is the slider's if more than this share of it falls into the slips.
 SLIDER = 0.5
-#: Evidence of `Falls` that many slips give.
+#: Evidence of `Falls` in a recording of many slips.
 _MANY_SLIPS = 3
-#: Ratio to the smallest drop that is seen within which events may have smaller companions.
+#: Events below this multiple of the smallest detectable drop show that smaller ones may be missing.
 _NEAR = 1.5
-#: Usual intervals of uneven times up to which the force between two samples is a straight line.
+#: Longest interval between two samples that a straight line bridges, over the usual interval.
 _LONGEST_GAP = 4.0
-#: Straight loading fills no level of the recorder more often than the next; of 480 extremes of made
-#: recordings that are not saturated 474 do not, the others in three samples or fewer.
+#: Straight loading fills no level of the recorder more often than the next: of 480 extremes of
+#: simulated recordings that are not saturated, 474 do not, the others in three samples or fewer.
 _CROWDED = 1.5
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
@@ -172,7 +172,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     -----
     Samples at uneven times are interpolated to even ones.
     """
-    # A lone F/(m g) is known by its name before it has company.
+    # F/(m g) goes by its name only where it is the only channel: before a load is added.
     trace = with_normalised_force(trace)
     if question.normal_load is not None and not trace.has("W"):
         constant = Channel(np.full(len(trace), question.normal_load), "force", "N", "load", "N")
@@ -185,7 +185,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     falls, upside_down = find_falls(friction, noise), False
     if falls.evidence < _MANY_SLIPS:
         other = find_falls(-friction, noise)
-        # A negative mean comes of the sign of the gauge or of its zero: few slips tell which.
+        # A negative mean is due to the sign of the gauge or to its zero; a few slips decide.
         enough = 1 if signals.turned else _MANY_SLIPS - 1
         upside_down = other.evidence > max(falls.evidence, enough)
         if upside_down:
@@ -313,7 +313,7 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
 
 
 def _smallest_drop(falls: Falls, slope: float) -> float:
-    """Smallest drop that the means of any width show: they lose what is loaded in their length."""
+    """Smallest drop that means of any width show; the loading within their width hides a part."""
     width = 2.0 ** np.arange(falls.thresholds.size)
     rise = slope if np.isfinite(slope) else 0.0
     return float((falls.thresholds + width * max(rise, 0.0)).min())
@@ -344,8 +344,8 @@ def _spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
 def _recorded_slip(time: Float, displacement: Float, events: SlipEvents) -> tuple[Float, Float]:
     """Slip and largest slip velocity of each event from the displacement of the slider.
 
-    Means over a quarter of its duration, before the onset and after the end, tell the slip: a
-    slider creeps ever faster before its onset.
+    The slip is the difference of means over a quarter of its duration, after the end and before the
+    onset, as a slider creeps ever faster before the onset.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
     forward = displacement * np.sign(displacement[-1] - displacement[0])
@@ -425,13 +425,13 @@ def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
 
 
 def _hidden(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, float]:
-    """Share of the loading that events too small to be seen take, and its standard error.
+    """Share of the loading that events too small to be detected release, and its standard error.
 
-    Few of them make sticks load less in their first half than their slope says; creep lies in the
-    second. Many lower the slope of every stick: of the differences between neighbouring means in
-    its middle half the median is that of the loading, as noise is symmetrical, and the mean has
-    what falls in between too. Of both, and of all widths of means, the most significant; NaN with
-    few sticks.
+    A few such events make sticks load less in their first half than their slope says; creep acts in
+    the second half. Many such events lower the slope of every stick: of the differences between
+    neighbouring means in its middle half the median is that of the loading alone, as noise is
+    symmetrical, and the mean includes the falls. The most significant of these estimates, over all
+    widths of means; NaN with few sticks.
     """
     events, time, after = result.events, result.time, sticks.after
     if after.size < STICK_SLIP["events"][1] or not result.loading_slope > 0:

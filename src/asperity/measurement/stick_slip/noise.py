@@ -16,17 +16,17 @@ from asperity.arrays import Float, Index
 
 #: Median filter whose output two neighbouring impulses leave as it is.
 _FILTER = 5
-#: Standard deviations by which an impulse stands out of the median, whose noise counts too. Two
-#: samples that stand out by less, one up and one down, are no fall.
+#: Standard deviations by which an impulse stands out of the median, including the median's noise.
+#: Two samples that stand out by less, one up and one down, make no fall.
 _IMPULSE = 4.5
-#: Quantile of second differences that gives their scatter: up to two thirds of the blocks may hold
-#: a slip or a peak. And the largest share on one level of a coarse recorder that tells a scatter.
+#: Quantile of second differences that gives their scatter, as up to two thirds of the blocks may
+#: hold a slip or a peak; largest share of differences on one level of a coarse recorder.
 _QUANTILE, _MOST = 0.25, 0.99
-#: Blocks that give a scatter, blocks that give it by themselves, and its relative standard error
-#: times the root of their number.
+#: Fewest blocks that give a scatter; with fewer than `_MANY_BLOCKS` the scatter of shorter means
+#: bounds it. Relative standard error of a scatter times the root of the number of blocks.
 _FEWEST_BLOCKS, _MANY_BLOCKS = 32, 256
 _QUANTILE_ERROR = 1.8
-#: Second differences that give a scatter to 1.4 %; of more every so many is taken.
+#: Second differences from which a scatter is estimated, to 1.4 %; of more, an even selection.
 _MOST_BENDS = 1 << 14
 #: Probability of a false event in a recording of Gaussian noise.
 FALSE_ALARM = 0.01
@@ -99,7 +99,7 @@ def estimate(force: Float) -> Noise:
         Without impulses, evenly sampled.
     """
     n = force.size
-    # Numbers below this are rounding.
+    # Scatter below this is rounding error.
     floor = 4 * np.finfo(float).eps * float(np.abs(force).max(initial=0.0))
     total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
     # A saturated sample has no noise.
@@ -124,10 +124,10 @@ def estimate(force: Float) -> Noise:
             )
             # The variance of the bend of white means is six times theirs.
             one = _deviation(np.abs(after - 2 * here + before)[inside]) / (np.sqrt(6.0) * width)
-            # Two standard errors more: a threshold from a scatter that came out small is none.
+            # Two standard errors are added, so that thresholds are rarely too low.
             scatter[k, j] = max(one * (1 + 2 * _QUANTILE_ERROR / np.sqrt(count)), floor)
         if j and n / lag < _MANY_BLOCKS:
-            # Few blocks may scatter little by chance: noise falls no faster than white noise does.
+            # Few blocks may scatter little by chance: means of white noise bound the scatter.
             scatter[j, j] = max(scatter[j, j], scatter[j - 1, j - 1] / np.sqrt(2.0))
     return Noise(scatter, n)
 

@@ -30,20 +30,22 @@ Kind = Literal[
     "cannot tell",
 ]
 
-#: Events of a train, and of one whose trend is judged.
+#: Fewest events of a train, and of a train whose trend is judged.
 _FEWEST, _FEWEST_OF_TREND = 3, 8
-#: A part without events longer than so many cycles is a regime of its own.
+#: A part without events that lasts longer than this many cycles is a separate regime.
 _LONG = 5.0
-#: Events on each side that say what is usual; a ratio of their loading slopes that is no scatter.
+#: Number of events on each side that give the usual loading slope; ratio of the two slopes above
+#: which the velocity or the stiffness has changed.
 _NEAR, _OTHER = 5, 1.5
-#: Rise over what loading would be, above which a part without events is a stick.
+#: A part without events is a stick if the force rises by more than this share of usual loading.
 _LOADED = 0.5
-#: Relative spread of the loading slopes of many events, and of few, above which it is no spring
-#: that loads: that of friction with a spectrum of 1/f^2 is 0.6 and more, by chance 0.23 for few.
+#: Largest relative spread of the loading slopes of a spring, for many events and for few: that of
+#: friction with a spectrum of 1/f^2 is 0.6 and more, by chance 0.23 for few.
 _ALIKE, _ALIKE_OF_FEW, _MANY_EVENTS = 0.5, 0.2, 20
 #: Relative spread of drops and recurrences of a regular train.
 _REGULAR = 0.15
-#: Ratio of the last drop to the first, by a straight line, of a train that grows.
+#: Smallest ratio of the last drop to the first, by a straight line, of a train that grows; and
+#: largest probability that this is chance.
 _GROWTH, _GROWTH_CHANCE = 1.5, 1e-4
 #: A stick shorter than this many slips is that of an oscillation.
 _SYMMETRICAL = 1.5
@@ -51,8 +53,8 @@ _SYMMETRICAL = 1.5
 _INERTIAL = 0.25
 #: Share of impulses above which they may be the motion.
 _MANY = 0.05
-#: Smallest drop that could be seen, or trend, over the mean friction, above which steady is not
-#: known.
+#: Sliding counts as steady if the smallest drop that could be detected and the trend are below this
+#: share of the mean friction.
 _BLIND = 0.2
 
 
@@ -133,7 +135,7 @@ def regimes(
 
 
 def _without_single_events(parts: list[Regime]) -> list[Regime]:
-    """Parts in which trains too short for a regime and sliding alternate are one that is open."""
+    """Join parts in which sliding and trains too short for a regime alternate, as "cannot tell"."""
     merged: list[Regime] = []
     for short, group in groupby(parts, lambda r: r.stop - r.first < _FEWEST):
         run = list(group)
@@ -147,7 +149,7 @@ def _without_single_events(parts: list[Regime]) -> list[Regime]:
 
 
 def _usual(values: Float) -> Float:
-    """Median over the neighbours on both sides; NaN of a single event, which has no stick."""
+    """Medians over the neighbours on both sides; NaN for a single event, which has no stick."""
     if values.size < 2:
         return values
     known = np.concatenate([values[1:2], values[1:]])
@@ -155,7 +157,7 @@ def _usual(values: Float) -> Float:
 
 
 def _other_velocity(slope: Float) -> Bool:
-    """Whether the loading is another after an event: the velocity or the stiffness has changed.
+    """After which events the loading slope changes: velocity or stiffness has changed there.
 
     An entry for each stick; entry k is true where the events up to k load otherwise than those
     from k + 1 on.
@@ -174,7 +176,7 @@ def _other_velocity(slope: Float) -> Bool:
     loading = np.minimum(first, second) > 0
     other = jump > (_OTHER - 1) * np.minimum(first, second)
     clear = np.flatnonzero(loading & other & (jump > 2 * scatter))
-    # Of neighbouring places the one whose windows are the most uniform.
+    # Among neighbouring places, the one with the most uniform slopes on both sides.
     for group in np.split(clear, np.flatnonzero(np.diff(clear) > 1) + 1):
         if group.size:
             changed[group[np.argmin(scatter[group])] + _NEAR] = True

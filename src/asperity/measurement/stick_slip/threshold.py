@@ -25,21 +25,22 @@ from asperity.arrays import Float
 from asperity.measurement.series import weighted_line
 from asperity.measurement.stick_slip.events import SlipEvents
 
-#: Periods of growing or dying cycles that are read together: up to this share longer than those of
-#: the smallest, and drops that change by this factor.
+#: Growing or dying cycles are fitted together if their periods exceed those of the smallest cycles
+#: by less than this factor, and if their drops range over at least the second factor.
 _LONGER, _RANGE = 1.25, 1.3
-#: Slope of a sine of this drop and period over K V/W0, below which the period is that of a sine: of
-#: growing cycles of random truth it is up to 5 % longer at 1.2, 14 % at 1.5 and 27 % at 2; with
-#: sticks the ratio is 2.6 to 3 and the period 3 to 6 times as long.
+#: A cycle is small if the largest slope of a sine of its drop and period is below this multiple of
+#: K V/W0. Periods of growing cycles of random truth are up to 5 % longer than those of vanishing
+#: ones at 1.2, 14 % at 1.5 and 27 % at 2; with sticks the ratio is 2.6 to 3 and the period 3 to 6
+#: times as long.
 _SLOPE = 2.0
-#: Fewest such cycles, and the factor by which drops grow or die that do so by no chance.
+#: Fewest small cycles, and factor by which drops must grow or die to exclude chance.
 _FEWEST, _GROWTH = 3, 3.0
-#: Velocities that differ by less are one.
+#: Velocities with a smaller relative difference count as one.
 _SAME_VELOCITY = 0.02
-#: Ratio of the two ends beyond which a bracket says little, and of a stiffness to the threshold
-#: beyond which its cycles do not tell the frequency there.
+#: Largest ratio of the two ends of a bracket, and largest ratio of a stiffness to the threshold for
+#: which its cycles show the frequency at the threshold.
 _WIDEST, _NEAR = 2.0, 1.6
-#: Share by which a period is extrapolated at most.
+#: Largest share by which a period is extrapolated.
 _FARTHEST = 0.4
 
 #: Regimes that the motion comes to below the threshold.
@@ -176,7 +177,7 @@ def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
 
 def _threshold(group: list[Mapping[str, Any]]) -> Threshold:
     V = float(np.mean([row["V"] for row in group]))
-    # What the motion comes to counts, not how it begins.
+    # The last regime of a recording counts.
     last = [(row["regime"].rpartition(", then ")[2], row["K"] / row["W0"]) for row in group]
     sticking = [stiffness for kind, stiffness in last if kind.startswith(_STICKING)]
     sliding = [stiffness for kind, stiffness in last if kind == "steady sliding"]
