@@ -17,7 +17,6 @@ from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
-from asperity.measurement.stick_slip.detection import turning_points
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -135,10 +134,13 @@ def elastic_length(
     Each branch between two turning points is fitted by x = a + F dx/dF; the first one, which comes
     from sliding, is left out.
     """
+    from scipy.signal import find_peaks
+
     F, x, W = (trace.channel(name).values for name in (force, displacement, load))
     K = None if spring is None else to_si(spring, "stiffness", "elastic_length.spring")
-    turns = turning_points(F, _TURN * float(np.ptp(F)))
-    branches = list(pairwise(turns[1:]))
+    reach = _TURN * float(np.ptp(F))
+    turns = np.sort(np.concatenate([find_peaks(f, prominence=reach)[0] for f in (F, -F)]))
+    branches = list(pairwise([*turns, F.size - 1]))
     slopes, lengths = [], []
     for a, b in branches[: 2 * (len(branches) // 2)]:
         rim = max(int(_TRIM * (b - a)), 1)

@@ -102,8 +102,9 @@ def lock_in(
     if step is None:
         _check_clock(time)
     if refine:
-        known = {"harmonics": harmonics, "degree": degree, "step": step}
-        start = fit_frequency(time, load, start, **known, share=_FIRST_SHARE)
+        start = fit_frequency(
+            time, load, start, harmonics=harmonics, degree=degree, step=step, share=_FIRST_SHARE
+        )
     # Most often the frequency of a part is accurate enough for one pass over all samples.
     enough = _SHORT_STEP if time.size < _LONG else CONVERGED
     for _ in range(MOST_STEPS):

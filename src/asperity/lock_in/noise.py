@@ -118,8 +118,7 @@ def noise_around(
     periods = basis.omega * basis.half_width / np.pi
     # Each block stands at its middle, in units of the window's length.
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
-    taken = 1 + (basis.degree > 0) + settles
-    lines = free_lines(k, periods, basis, samples, blocks.count.size, taken)
+    lines = _free_lines(k, periods, blocks, 1 + (basis.degree > 0) + settles)
     if lines.size < 2 * _FEWEST:
         return white.astype(complex), max(samples - basis.linear - 1, 1.0)
     # Lines lie whole numbers of half lines from the harmonic, and none on it: powers of one turn
@@ -156,28 +155,19 @@ def _growth(lines: Float, turned: Complex) -> Float:
     return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
 
 
-def free_lines(
-    k: int, periods: float, basis: Basis, samples: float, blocks: int, taken: int
-) -> Float:
-    """Numbers of the spectral lines next to a harmonic that are free of fitted columns.
+def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:
+    """Numbers of the spectral lines next to harmonic k that are free of fitted columns.
 
-    Parameters
-    ----------
-    k : int
-        Harmonic, 0 for the mean.
-    periods : float
-        Number of modulation periods in the window.
-    basis : Basis
-    samples : float
-        Number of samples; the Nyquist frequency is half of it.
-    blocks : int
-        Number of blocks; lines farther from the harmonic than an eighth of it are averaged out.
-    taken : int
-        Lines above zero that the slow columns take up.
+    Lines farther from it than an eighth of the number of blocks are averaged out; the slow columns
+    take up the `taken` lines above zero.
     """
+    basis, samples = blocks.basis, float(blocks.count.sum())
     wanted = _AROUND_HARMONIC if k else _ABOVE_ZERO
     # Most lines between harmonics are free, unless there are few periods.
-    reach = min(blocks / 8, 3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0))
+    reach = min(
+        blocks.count.size / 8,
+        3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0),
+    )
     first = max(float(taken), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
     # Integer and half-integer lines: a distant line such as hum leaks into one of these sets as it
@@ -226,25 +216,15 @@ def sum_covariance(
     -------
     array, (p + q, p + q)
     """
-    of_column = column_harmonics(basis)
-    k = [of_column[np.argmax(np.abs(c), axis=0)] for c in columns]
-    turned = quadrature(basis)
-    rows = []
-    for a in (0, 1):
-        row = []
-        for b in (0, 1):
-            product = columns[a].T @ gram @ columns[b]
-            if a == b:
-                level = np.sqrt(noise.spectra[k[a], a, a].real)
-                row.append(level[:, None] * product * level)
-                continue
-            # Noise of two channels is correlated within one harmonic only: in phase by the real
-            # part of the cross-spectrum, in quadrature by the imaginary one.
-            cross = noise.spectra[k[a], a, b][:, None]
-            across = (turned @ columns[a]).T @ gram @ columns[b]
-            same = k[a][:, None] == k[b]
-            row.append(np.where(same, cross.real * product + cross.imag * across, 0.0))
-        rows.append(np.hstack(row))
-    whole = np.vstack(rows)
+    C = np.hstack(columns)
+    channel = np.repeat([0, 1], [c.shape[1] for c in columns])
+    k = column_harmonics(basis)[np.argmax(np.abs(C), axis=0)]
+    product, across = C.T @ gram @ C, (quadrature(basis) @ C).T @ gram @ C
+    level = np.sqrt(noise.spectra[k, channel, channel].real)
+    # Noise of two channels is correlated within one harmonic only: in phase by the real part of the
+    # cross-spectrum, in quadrature by the imaginary one.
+    cross = noise.spectra[k[:, None], channel[:, None], channel]
+    between = np.where(k[:, None] == k, cross.real * product + cross.imag * across, 0.0)
+    whole = np.where(channel[:, None] == channel, np.outer(level, level) * product, between)
     # Symmetrised: with incomplete periods the columns overlap.
     return (whole + whole.T) / 2

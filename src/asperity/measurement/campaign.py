@@ -276,21 +276,18 @@ def _cell(value: Any) -> Any:
 
 
 def _write_netcdf(path: Path, table: list[Row]) -> None:
-    import numpy as np
-    import xarray as xr
+    import pandas as pd
 
-    variables: dict[str, Any] = {}
-    for name in _columns(table):
-        values = [row.get(name) for row in table]
-        if all(isinstance(v, int | float) or v is None for v in values):
-            numbers = np.array([np.nan if v is None else v for v in values], dtype=float)
-            variables[name] = ("row", numbers, {"units": column_unit(name)})
-        else:
-            variables[name] = (
-                "row",
-                np.array(["" if v is None else str(v) for v in values], object),
-            )
-    data = xr.Dataset(variables, attrs={"title": "asperity measure: one row a file and part"})
+    frame = pd.DataFrame(table, columns=_columns(table))
+    numbers = [
+        n for n in frame if frame[n].map(lambda v: v is None or not isinstance(v, str)).all()
+    ]
+    texts = frame.columns.difference(numbers, sort=False)
+    frame = frame.astype(dict.fromkeys(numbers, float)).fillna(dict.fromkeys(texts, ""))
+    data = frame.rename_axis("row").to_xarray().drop_vars("row")
+    for name in numbers:
+        data[name].attrs = {"units": column_unit(str(name))}
+    data.attrs = {"title": "asperity measure: one row a file and part"}
     data.to_netcdf(path, engine="h5netcdf")
 
 

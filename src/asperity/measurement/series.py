@@ -138,7 +138,7 @@ class WeightedLine(NamedTuple):
 def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
     """Least squares of a straight line; arrays (n,)."""
     matrix = np.stack([np.ones_like(at), at], axis=1) / uncertainty[:, None]
-    covariance = np.linalg.pinv(matrix.T @ matrix)
+    covariance = np.asarray(np.linalg.pinv(matrix.T @ matrix), dtype=np.float64)
     beta = covariance @ (matrix.T @ (values / uncertainty))
     left, free = values / uncertainty - matrix @ beta, values.size - 2
     return WeightedLine(beta, covariance, float(left @ left) / free if free else 1.0)

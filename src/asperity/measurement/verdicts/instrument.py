@@ -110,12 +110,7 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
     A line that is switched off in the pauses of the recording is none of the mains.
     """
     f = reading.frequency
-    near = [
-        (n * base)
-        for base in _MAINS
-        for n in range(1, _MAINS_HARMONICS + 1)
-        if abs(f - n * base) < n * _WANDER
-    ]
+    near = _near_mains(f, *_MAINS)
     number = float(abs(reading.epsilon))
     if not near:
         sentence = f"{f:.6g} Hz is no harmonic of 50 or 60 Hz"
@@ -134,6 +129,12 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
         + ("switched off in the pauses" if switched else "larger than hum usually is")
     )
     return LOCK_IN.check("mains", number, sentence, significant=not switched)
+
+
+def _near_mains(frequency: float, *bases: float) -> list[float]:
+    """Harmonics (Hz) of mains that may be a frequency (Hz)."""
+    orders = range(1, _MAINS_HARMONICS + 1)
+    return [n * f for f in bases for n in orders if abs(frequency - n * f) < n * _WANDER]
 
 
 def lines_in_the_pauses(
@@ -156,11 +157,8 @@ def lines_in_the_pauses(
             if n > reading.harmonics.size:
                 continue
             f = n * reading.frequency
-            time, force = (
-                samples.time[part.first : part.stop],
-                samples.force[part.first : part.stop],
-            )
-            line, doubt = _line(time, force, f)
+            cut = slice(part.first, part.stop)
+            line, doubt = _line(samples.time[cut], samples.force[cut], f)
             if not doubt < np.inf:
                 continue
             harmonic = reading.phasor(n)
@@ -187,12 +185,7 @@ def hum(reading: LockInReading, time: Float, force: Float) -> Check:
     f = reading.frequency
     number, sentence, seen = 0.0, "no hum is to be expected at the modulation or its double", False
     for base in _MAINS:
-        orders = [
-            n
-            for n in (1, 2)
-            for m in range(1, _MAINS_HARMONICS + 1)
-            if abs(n * f - m * base) < m * _WANDER
-        ]
+        orders = [n for n in (1, 2) if _near_mains(n * f, base)]
         if not orders:
             continue
         n = orders[0]
