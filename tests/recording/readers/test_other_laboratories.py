@@ -201,7 +201,7 @@ def test_a_cut_in_a_quoted_number_leaves_its_row_out(tmp_path):
 def test_a_quote_without_end_is_one_sentence(tmp_path):
     lines = PLAIN.splitlines(True)
     lines[7] = '"' + lines[7]
-    with pytest.raises(InputError, match="a quote is opened and never closed"):
+    with pytest.raises(InputError, match="EOF inside string starting at row"):
         read(written(tmp_path, "".join(lines)))
 
 

@@ -22,8 +22,6 @@ from asperity.recording.readers.layout import MISSING, Layout, cells_of, digits,
 from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, truncated
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
 
 #: Bytes searched for the table, first and at most: headers of some megabytes exist.
@@ -146,7 +144,7 @@ def _load(
     size = file.seek(0, io.SEEK_END)
     layout = _layout(file, start, size, path, delimiter, decimal)
     ending = _ending_of(file, size, layout)
-    frame, findings = _parse(file, layout, ending.stop, path)
+    frame, findings = _parse(file, layout, ending.stop)
     got = f"'{path.name}' with a heading only"
     require(len(frame), "recording.path", "hold rows of numbers", got, "give a recording")
     frame, left_out = _without_text_rows(frame, layout.width)
@@ -224,24 +222,7 @@ def _is_empty(values: np.ndarray[Any, Any]) -> bool:
     return values.dtype.kind == "f" and bool(np.isnan(values).all())
 
 
-def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    try:
-        return parsed(low_memory=False)
-    except (pd.errors.ParserError, pd.errors.EmptyDataError):
-        raise InputError(
-            "recording.path",
-            "hold a table that can be parsed",
-            f"'{path.name}', in which a "
-            "quote is opened and never closed, or a row goes on without end",
-            "correct the file",
-        ) from None
-
-
-def _parse(
-    file: BinaryIO, layout: Layout, stop: int, path: Path
-) -> tuple[pd.DataFrame, list[Finding]]:
+def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, list[Finding]]:
     """The table, as numbers if all cells are numbers, and the malformed rows."""
     import pandas as pd
 
@@ -278,7 +259,7 @@ def _parse(
             frame = parsed(dtype=np.float64)
         except ValueError:
             caught.clear()
-            frame = _parsed_with_texts(parsed, path)
+            frame = parsed(low_memory=False)
     longer = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
     longer = [*range(-layout.longer + 1, 1), *longer]
     return frame, [_malformed(longer)] if longer else []
