@@ -5,8 +5,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import LockInStream, lock_in
-from asperity.lock_in.normal_equations import Basis, even_step, join, sums
-from asperity.measurement.window import merged
+from asperity.lock_in.normal_equations import Basis, even_step, join, merged, sums
 
 TIME = 3.0 + np.arange(20_011) * 1e-3
 BASIS = Basis(2 * np.pi * 61.3, 3, 2, 13.0, 10.005)

@@ -20,7 +20,15 @@ import numpy as np
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
 from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
-from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inverted, join, sums
+from asperity.lock_in.normal_equations import (
+    Basis,
+    BlockSums,
+    even_step,
+    inverted,
+    join,
+    merged,
+    sums,
+)
 from asperity.lock_in.reading import LockInReading, reading_of
 from asperity.lock_in.reference import (
     CONVERGED,
@@ -292,7 +300,7 @@ class LockInStream:
         share = (time[-1] - time[0]) / (2 * basis.half_width)
         step = even_step(time, basis.omega * basis.harmonics)
         blocks = max(1, round(BLOCKS * share))
-        part = sums(basis, time, [load, force], blocks=blocks, step=step)
+        part = merged(sums(basis, time, [load, force], blocks=blocks, step=step), blocks)
         rule, got, advice = "get finite values", "some that are not", "leave their samples out"
         require(np.isfinite(part.moments).all(), "LockInStream.add", rule, got, advice)
         self._parts.append(part)

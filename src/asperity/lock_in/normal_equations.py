@@ -207,6 +207,23 @@ def join(parts: list[BlockSums]) -> BlockSums:
     return BlockSums(parts[0].basis, *together)
 
 
+def merged(blocks: BlockSums, wanted: int) -> BlockSums:
+    """Sums of neighbouring blocks joined to about `wanted`; a short remainder joins the last."""
+    together = -(-blocks.count.size // wanted)
+    if together == 1 and blocks.count[-1] > 0.5 * blocks.count[0]:
+        return blocks
+    edges = np.arange(0, blocks.count.size, together)
+    if edges.size > 1 and blocks.count[edges[-1] :].sum() < 0.5 * blocks.count[:together].sum():
+        edges = edges[:-1]
+
+    def added(values: Float) -> Float:
+        return np.add.reduceat(values, edges, axis=0)
+
+    count = added(blocks.count)
+    middle = added(blocks.middle * blocks.count) / count
+    return BlockSums(blocks.basis, added(blocks.gram), added(blocks.moments), count, middle)
+
+
 def even_step(time: Float, omega: float) -> float | None:
     """Sampling interval (s) of an even clock; None if it is not even.
 

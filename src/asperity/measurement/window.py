@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, sums
+from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, merged, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 from asperity.measurement.series import neighbour_scatter
@@ -126,23 +126,6 @@ def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:
     wanted = int(min(_MOST_BLOCKS, max(1, wanted)))
     step = even_step(time, basis.omega)
     return merged(sums(basis, time, channels, blocks=wanted, step=step), wanted)
-
-
-def merged(blocks: BlockSums, wanted: int) -> BlockSums:
-    """Sums of neighbouring blocks joined to about `wanted`; a short remainder joins the last."""
-    together = -(-blocks.count.size // wanted)
-    if together == 1 and blocks.count[-1] > 0.5 * blocks.count[0]:
-        return blocks
-    edges = np.arange(0, blocks.count.size, together)
-    if edges.size > 1 and blocks.count[edges[-1] :].sum() < 0.5 * blocks.count[:together].sum():
-        edges = edges[:-1]
-
-    def added(values: Float) -> Float:
-        return np.add.reduceat(values, edges, axis=0)
-
-    count = added(blocks.count)
-    middle = added(blocks.middle * blocks.count) / count
-    return BlockSums(blocks.basis, added(blocks.gram), added(blocks.moments), count, middle)
 
 
 def settled(time: Float, force: Float, frequency: float, degree: int) -> int:

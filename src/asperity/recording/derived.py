@@ -12,7 +12,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Names, Quantity, evaluate
 from asperity.recording.finding import Finding
-from asperity.recording.roles import ROLES, nouns, role_of
+from asperity.recording.roles import kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
 from asperity.units.scale import base_units, kind_of_dimension, unit_text
@@ -101,7 +101,7 @@ def _with_time(trace: Trace, time: Float, field: Argument, text: str) -> Trace:
 def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: Argument) -> None:
     if role is None:
         return
-    fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
+    fitting = kinds_of(role)
     if kind not in fitting:
         shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
         advice = "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'"

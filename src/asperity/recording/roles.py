@@ -234,6 +234,11 @@ def nouns(kinds: Iterable[str]) -> str:
     return " or ".join(KINDS[kind].noun for kind in sorted(kinds))
 
 
+def kinds_of(role: str) -> frozenset[str]:
+    """Kinds of the units of a role; a ratio may stand for a load or a force."""
+    return ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
+
+
 def _may_be(role: str | None, kind: str | None) -> bool:
     """Whether a unit of `kind` does not contradict a role; a ratio may stand for a force."""
     return role is None or kind in {None, "dimensionless"} | ROLES[role].kinds

@@ -23,7 +23,7 @@ from asperity.recording.readers.units import (
     split_labels,
     understood,
 )
-from asperity.recording.roles import ROLES, candidates, find_channel, nouns, role_of
+from asperity.recording.roles import ROLES, candidates, find_channel, kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
@@ -137,10 +137,10 @@ def _chosen_roles(
 
 
 def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
-    """Refuse a column whose unit does not fit its role; a ratio may stand for a force."""
+    """Refuse a column whose unit does not fit its role."""
     for role, name in roles.items():
         kind = known[name].kind if name in known else None
-        fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
+        fitting = kinds_of(role)
         if kind is not None and kind not in fitting:
             raise InputError(
                 Argument("columns", role),
