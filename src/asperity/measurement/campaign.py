@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from asperity._processes import process_pool
 from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
-from asperity.measurement.verdicts.verdict import doubts_text
+from asperity.measurement.verdicts.verdict import Judged, doubts_text
 from asperity.outputs import UnfinishedText, output_file, write_table, written_file
 from asperity.parameters.columns import read_headed_columns
 
@@ -174,6 +174,15 @@ def failed_row(path: Path, part: int, reason: str) -> Row:
     return {"file": str(path), "part": part, "kind": "", "verdict": "", "reason": reason}
 
 
+def first_columns(
+    path: Path, part: int, kind: str, start: float, end: float, measurement: Judged
+) -> Row:
+    """The columns that every row has but the checks, which stand last."""
+    verdict = measurement.verdict
+    values = (str(path), part, kind, float(start), float(end), verdict, "")
+    return dict(zip(_FIRST, values, strict=True))
+
+
 def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError]) -> list[Row]:
     """Rows of the amplitudes of one recording, in their order.
 
@@ -189,15 +198,7 @@ def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError])
             rows.append(failed_row(path, part, str(measurement)))
             continue
         reading = measurement.reading
-        row: Row = {
-            "file": str(path),
-            "part": part,
-            "kind": "amplitude",
-            "start": reading.start,
-            "end": reading.end,
-            "verdict": measurement.verdict,
-            "reason": "",
-        }
+        row = first_columns(path, part, "amplitude", reading.start, reading.end, measurement)
         observables = reading.observables()
         row |= observables
         row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in observables}
@@ -221,28 +222,26 @@ def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError])
 
 def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
     """Rows of the velocity steps and holds of one recording; of its mean friction without any."""
-    common = {"file": str(path), "verdict": measurement.verdict, "reason": ""}
-    rows: list[Row] = []
-    for step in measurement.steps:
-        row = {"kind": "step", "start": step.time, "end": step.time}
-        rows.append(row | _columns_of(step) | {"change_uncertainty": step.uncertainty})
-    for hold in measurement.holds:
-        row = {"kind": "hold", "start": hold.start, "end": hold.end}
-        rows.append(row | _columns_of(hold))
-    rows.sort(key=lambda row: row["start"])
-    friction = measurement.friction
-    if not rows:
-        rows = [{"kind": "level", "start": friction.start, "end": friction.end}]
+    friction, healing = measurement.friction, measurement.healing
+    parts: list[tuple[str, float, float, Row]] = [
+        *(
+            ("step", s.time, s.time, _columns_of(s) | {"change_uncertainty": s.uncertainty})
+            for s in measurement.steps
+        ),
+        *(("hold", h.start, h.end, _columns_of(h)) for h in measurement.holds),
+    ]
+    parts = sorted(parts, key=lambda part: part[1]) or [("level", friction.start, friction.end, {})]
     more = {
         "mean_friction": friction.value,
         "mean_friction_uncertainty": friction.uncertainty,
-        "healing_per_decade": measurement.healing.per_decade if measurement.healing else math.nan,
-        "healing_per_decade_uncertainty": measurement.healing.uncertainty
-        if measurement.healing
-        else math.nan,
+        "healing_per_decade": healing.per_decade if healing else math.nan,
+        "healing_per_decade_uncertainty": healing.uncertainty if healing else math.nan,
         "checks": doubts_text(measurement.checks),
     }
-    return [common | {"part": k} | row | more for k, row in enumerate(rows, 1)]
+    return [
+        first_columns(path, k, kind, start, end, measurement) | columns | more
+        for k, (kind, start, end, columns) in enumerate(parts, 1)
+    ]
 
 
 def _columns_of(reading: VelocityStep | HoldReading) -> Row:

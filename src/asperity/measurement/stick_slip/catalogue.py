@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError
+from asperity.measurement.campaign import first_columns
 from asperity.measurement.series import mean_level
 from asperity.measurement.stick_slip.threshold import linear_frequency
 from asperity.measurement.verdicts.verdict import doubts_text, percent
@@ -187,14 +188,9 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
         mean = mean_level(measurement.time[part], measurement.friction[part])
         level = {"mean_friction": mean.value, "mean_friction_uncertainty": mean.uncertainty}
         level["epsilon"] = 0.0
+    kind, time = "level" if level else "stick-slip", measurement.time
     return {
-        "file": str(path),
-        "part": 1,
-        "kind": "level" if level else "stick-slip",
-        "start": float(measurement.time[0]),
-        "end": float(measurement.time[-1]),
-        "verdict": measurement.verdict,
-        "reason": "",
+        **first_columns(path, 1, kind, time[0], time[-1], measurement),
         "regime": measurement.kind,
         **level,
         **means(measurement),

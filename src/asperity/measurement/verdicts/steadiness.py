@@ -74,7 +74,7 @@ def left_of_piece(reading: LockInReading, time: Float, values: Float) -> tuple[s
     """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
-    return piece, _fitted(reading.blocks.basis, time[piece], values[piece])[1]
+    return piece, _residual(reading.blocks.basis, time[piece], values[piece])
 
 
 def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
@@ -85,11 +85,10 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
     return strongest_line(time, values, between=(lowest, highest))
 
 
-def _fitted(basis: Basis, time: Float, values: Float) -> tuple[Float, Float]:
-    """Coefficients and residual of a separate fit to a piece of a window."""
+def _residual(basis: Basis, time: Float, values: Float) -> Float:
+    """Residual of a separate fit to a piece of a window."""
     columns = basis.columns(time)[: basis.linear]
-    beta = solved(columns @ columns.T, columns @ values)
-    return beta, values - beta @ columns
+    return values - solved(columns @ columns.T, columns @ values) @ columns
 
 
 def leakage(reading: LockInReading) -> Check:
@@ -188,7 +187,8 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     basis = replace(reading.blocks.basis, omega=2 * np.pi * reading.frequency, degree=1)
     responses = []
     for piece in np.array_split(np.arange(time.size), pieces):
-        beta, _ = _fitted(basis, time[piece], force[piece])
+        columns = basis.columns(time[piece])[: basis.linear]
+        beta = np.linalg.lstsq(columns.T, force[piece])[0]
         responses.append(complex(beta[basis.drift], -beta[basis.drift + basis.harmonics]))
     phasors = np.array(responses)
     mean = phasors.mean()
