@@ -95,9 +95,10 @@ def test_rates_and_ways_belong_to_values(step) -> None:
     (segment,) = Programme(step, **START).segments
     h = 1e-6
     for t in (0.0137, 0.1771, 0.3313):
-        for value in (segment.load, segment.shear):
-            slope = (float(value(t + h)[0]) - float(value(t - h)[0])) / (2 * h)
-            assert float(value(t)[1]) == pytest.approx(slope, rel=1e-7, abs=1e-7)
+        before, here, after = (segment.at(x, 1.0, 1.0) for x in (t - h, t, t + h))
+        for name in ("w", "shear"):
+            slope = (float(getattr(after, name)) - float(getattr(before, name))) / (2 * h)
+            assert float(getattr(here, f"{name}_slope")) == pytest.approx(slope, rel=1e-7, abs=1e-7)
         way = quad(lambda x: float(segment.pull(x)), 0, t, points=np.linspace(0, 0.4, 9)[1:-1])[0]
         assert float(segment.position(t)) == pytest.approx(way, rel=1e-9)
     t = np.linspace(0, 0.4, 400)

@@ -82,20 +82,6 @@ class HarmonicSegment(ProgrammeSegment):
             pull / V,
         )
 
-    def load(self, t: ArrayLike) -> tuple[Array, Array]:
-        """W and dW/dt."""
-        at = self.at(t, 1.0, 1.0)
-        return at.w, at.w_slope
-
-    def shear(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Shear force S and dS/dt."""
-        at = self.at(t, 1.0, 1.0)
-        return at.shear, at.shear_slope
-
-    def pull(self, t: ArrayLike) -> Array:
-        """Pulling velocity V."""
-        return self.at(t, 1.0, 1.0).pull
-
     def position(self, t: ArrayLike) -> Array:
         """Integral of V, in closed form."""
         smooth = self.pull1 * t + 0.5 * self.pull_rate * t**2
@@ -190,22 +176,16 @@ class PeriodicSegment(ProgrammeSegment):
     def _omega(self) -> Array:
         return 2 * jnp.pi * self.frequency
 
-    def _excitation(self, t: ArrayLike) -> Excitation:
-        return self.modulation.at(self._omega * t)
-
-    def load(self, t: ArrayLike) -> tuple[Array, Array]:
-        """W and dW/dt."""
-        at = self._excitation(t)
-        return self.load1 * at.w, self.load1 * at.w_slope * self._omega
-
-    def shear(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Shear force S and dS/dt."""
-        at = self._excitation(t)
-        return self.load1 * at.shear, self.load1 * at.shear_slope * self._omega
-
-    def pull(self, t: ArrayLike) -> Array:
-        """Pulling velocity V."""
-        return self.pull1 * self._excitation(t).pull * jnp.ones_like(t)
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """As in `ProgrammeSegment`."""
+        at, level = self.modulation.at(self._omega * t), self.load1
+        return Excitation(
+            level * at.w / W0,
+            level * at.w_slope * self._omega / W0,
+            level * at.shear / W0,
+            level * at.shear_slope * self._omega / W0,
+            self.pull1 * at.pull * jnp.ones_like(t) / V,
+        )
 
     def position(self, t: ArrayLike) -> Array:
         """Integral of V, term by term."""

@@ -12,6 +12,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError, closest, require
+from asperity.loads.modulation import Excitation
 from asperity.loads.programme.segment import ProgrammeSegment, Scalar
 from asperity.units import to_si
 
@@ -95,17 +96,10 @@ class RecordedSegment(ProgrammeSegment):
     lowest: Scalar = eqx.field(converter=jnp.asarray)
     fastest: Scalar = eqx.field(converter=jnp.asarray)
 
-    def load(self, t: ArrayLike) -> tuple[Array, Array]:
-        """W and dW/dt, from the same interpolant."""
-        return self.load_curve.value(t)
-
-    def shear(self, t: ArrayLike) -> tuple[float, float]:
-        """No shear force in addition to the spring's."""
-        return 0.0, 0.0
-
-    def pull(self, t: ArrayLike) -> Array:
-        """Pulling velocity V."""
-        return self.pull_curve.value(t)[0]
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """As in `ProgrammeSegment`; W and dW/dt are of one interpolant."""
+        (W, W_rate), (pull, _) = self.load_curve.value(t), self.pull_curve.value(t)
+        return Excitation(W / W0, W_rate / W0, pull=pull / V)
 
     def position(self, t: ArrayLike) -> Array:
         """Integral of the interpolant."""

@@ -43,16 +43,20 @@ class ProgrammeSegment(eqx.Module):
     duration: eqx.AbstractVar[Scalar]
 
     @abstractmethod
-    def load(self, t: ArrayLike) -> tuple[Array, Array]:
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """Values over `W0` (N) and `V` (m/s); slopes are derivatives with respect to time.
+
+        The shear force acts along the pulling direction, in addition to the spring's.
+        """
+
+    def load(self, t: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
         """W (N) and dW/dt (N/s) at the time `t` (s) of the segment."""
+        at = self.at(t, 1.0, 1.0)
+        return at.w, at.w_slope
 
-    @abstractmethod
-    def shear(self, t: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
-        """Force along the pulling direction in addition to the spring's (N), and its rate (N/s)."""
-
-    @abstractmethod
-    def pull(self, t: ArrayLike) -> Array:
+    def pull(self, t: ArrayLike) -> ArrayLike:
         """Velocity of the far end of the spring (m/s)."""
+        return self.at(t, 1.0, 1.0).pull
 
     @abstractmethod
     def position(self, t: ArrayLike) -> Array:
@@ -90,12 +94,6 @@ class ProgrammeSegment(eqx.Module):
     def constant(self) -> bool:
         """Whether load and pulling velocity are constant."""
         return False
-
-    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
-        """Values over `W0` and `V`; slopes are derivatives with respect to time."""
-        W, W_rate = self.load(t)
-        S, S_rate = self.shear(t)
-        return Excitation(W / W0, W_rate / W0, S / W0, S_rate / W0, self.pull(t) / V)
 
 
 #: W (N) and the pulling velocity (m/s) of a segment at times (s), each by one program.
