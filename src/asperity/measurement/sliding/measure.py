@@ -352,47 +352,30 @@ def _checks(
     doubts: list[str],
 ) -> list[Check]:
     checks = [friction(float(np.abs(signals.friction).mean()))]
+
+    def ask(name: str, number: float, sentence: str) -> None:
+        checks.append(SLIDING.check(name, number, sentence))
+
     borne, mean = signals.load, max(abs(float(signals.friction.mean())), 1e-300)
     if borne is not None and borne.size:
         spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
-        checks.append(
-            SLIDING.check(
-                "load",
-                spread,
-                f"the load's standard deviation is {100 * spread:.2g} % of its mean"
-                + _exchanged(signals, spread),
-            )
-        )
+        text = f"the load's standard deviation is {100 * spread:.2g} % of its mean"
+        ask("load", spread, text + _exchanged(signals, spread))
     sliding = [s for s in segments if not s.hold] or list(segments)
     drift = max(abs(p.slope * (p.end - p.steady.start)) for p in sliding) / mean
-    checks.append(
-        SLIDING.check(
-            "drift",
-            drift,
-            f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean",
-        )
-    )
+    text = f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean"
+    ask("drift", drift, text)
     if signals.turned:
-        checks.append(
-            SLIDING.check("sign", 1.0, "friction is recorded as negative, and was turned")
-        )
-    checks.append(
-        SLIDING.check(
-            "segments",
-            float(len(doubts)),
-            "; ".join(doubts) or "the recording can be cut in one way only",
-        )
-    )
+        ask("sign", 1.0, "friction is recorded as negative, and was turned")
+    text = "; ".join(doubts) or "the recording can be cut in one way only"
+    ask("segments", float(len(doubts)), text)
     if steps:
         slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
         share = slow.settling_slip / slow.choices[0].window
-        checks.append(
-            SLIDING.check(
-                "settling",
-                share,
-                f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of "
-                "the slip that can be compared; a slower one cannot be distinguished from the "
-                "trend",
-            )
+        ask(
+            "settling",
+            share,
+            f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of the "
+            "slip that can be compared; a slower one cannot be distinguished from the trend",
         )
     return checks
