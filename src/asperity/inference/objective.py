@@ -219,6 +219,9 @@ class DataTerm(ABC):
     def use_search(self, always: bool) -> None:  # noqa: B027
         """Try the slower method at every call, or no more; of data that have one."""
 
+    def search_wholly(self, values: Mapping[str, float]) -> None:  # noqa: B027
+        """Search by every method for solutions there, for later calls to begin with."""
+
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
@@ -367,6 +370,12 @@ class Objective:
         """Let every term try its slower method at every call, or no more."""
         for term in self.terms:
             term.use_search(always)
+        self.forget()
+
+    def search_wholly(self, u: Float) -> None:
+        """Let every term search by every method for solutions at u, to begin with from then on."""
+        for term in self.terms:
+            term.search_wholly(self.named(u))
         self.forget()
 
     def minimise(

@@ -103,8 +103,9 @@ class ResponseFunction:
             with its unit.
         known : KnownOrbits, optional
             Of as many points, from earlier calls with other parameters. Orbits that the fast
-            method does not find are begun there, and kept there for the next call. For
-            ``search="direct"`` without multipliers, and parameters that are not traced.
+            method does not find are kept there for the next call, and begun there by
+            ``search="direct"``. For a search without multipliers, and parameters that are not
+            traced.
 
         Returns
         -------
@@ -183,11 +184,10 @@ class ResponseFunction:
         """Refuse known orbits that this call cannot begin with."""
         if known is None:
             return
-        direct = self._program.search in ("direct", "coarse")
-        if traced or not direct or self._program.multipliers:
+        if traced or not self._program.search or self._program.multipliers:
             raise InputError(
-                'known must go with search="direct", no multipliers and parameters that are not '
-                "traced; leave it out"
+                "known must go with a search, no multipliers and parameters that are not traced; "
+                "leave it out"
             )
         rule = f"be of as many points as the parameters, {points}"
         require(known.points == points, "known", rule, known.points)

@@ -199,6 +199,10 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
         if minima and end.chi2 > ends[0].chi2 + _WORTH:
             break
         near = objective.minimise(end.u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
+        if not math.isfinite(near.chi2):
+            # Motions do not settle on orbits that are hardly stable; branches lead to them.
+            objective.search_wholly(near.u)
+            near = objective.minimise(near.u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
         if math.isfinite(near.chi2) and not _far_off(objective, near):
             near = objective.minimise(near.u)
         minima.append(near)

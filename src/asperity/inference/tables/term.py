@@ -98,7 +98,7 @@ class LockInTerm(DataTerm):
         # Whatever rows are asked for, the programs are those of the whole table.
         function = partial(response_function, law, **self.motion, least_points=table.rows)
         self._functions: dict[bool | str, ResponseFunction] = {
-            way: function(search=way) for way in (False, "direct", "coarse")
+            way: function(search=way) for way in (False, "direct", "coarse", True)
         }
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.coarse, self.least = False, 1.0
@@ -204,6 +204,17 @@ class LockInTerm(DataTerm):
     def use_search(self, always: bool) -> None:
         """Search for the orbits that the fast method does not find at every call, or no more."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
+
+    def search_wholly(self, values: Mapping[str, float]) -> None:
+        """As in `DataTerm`."""
+        direct, known = self._functions["direct"], self._nearest(values)
+        given = parameters_at(self.fixed, values, direct)
+        left = np.flatnonzero(np.asarray(direct(given, known).outcome) != Outcome.CONVERGED)
+        if 0 < left.size <= _LEAST * self.table.rows:
+            missed = known.picked(left)
+            self._functions[True]({n: v[left] for n, v in given.items()}, missed)
+            known.complete(missed, left)
+        self._visited.append((dict(values), known))
 
     def coarser(self) -> LockInTerm:
         """As in `DataTerm`; both go on from the orbits of each other."""

@@ -149,16 +149,17 @@ class KnownOrbits:
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
-    def complete(self, other: KnownOrbits) -> None:
-        """Take the orbits of points of which only another call knows one."""
-        index = np.flatnonzero(other.known & ~self.known)
-        if other.orbit is None or not len(index):
+    def complete(self, other: KnownOrbits, index: Indices | None = None) -> None:
+        """Take the orbits that only another call knows, of all points or of the points `index`."""
+        rows = np.arange(self.points) if index is None else index
+        new = np.flatnonzero(other.known & ~self.known[rows])
+        if other.orbit is None or not len(new):
             return
         if self.orbit is None:
-            self.orbit = jax.tree.map(np.copy, other.orbit)
-        else:
-            put(self.orbit, index, take(other.orbit, index))
-        self.known[index] = True
+            size, intervals, _ = other.orbit.nodes.shape
+            self.orbit = Orbit.empty(other.orbit.scheme, size, intervals, self.points)
+        put(self.orbit, rows[new], take(other.orbit, new))
+        self.known[rows[new]] = True
 
     def picked(self, index: Indices) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
@@ -251,7 +252,7 @@ def search_orbits(
     coarse : bool
         Whether a direct search takes orbits on the coarsest mesh, unchecked, and no motions.
     known : KnownOrbits, optional
-        Of the first points, for a direct search, which begins there and keeps what it finds.
+        Of the first points: the search keeps there what it finds, and a direct one begins there.
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
@@ -265,6 +266,11 @@ def search_orbits(
             take(problem, rows), len(rows), harmonics=counted, phases=0, progress=_idle, **options
         )
 
+    def keep(some: Indices, orbits: MeshOrbits) -> None:
+        result.add(some, orbits)
+        if known is not None:
+            known.keep(problem, some, orbits.orbit)
+
     if not direct:
         solution = searched(index, intervals=MESHES[0])
         solved = solution.converged
@@ -274,7 +280,7 @@ def search_orbits(
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
             logs = np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
-            result.add(index[some], orbits._replace(log_multipliers=logs))
+            keep(index[some], orbits._replace(log_multipliers=logs))
         return result
 
     def left() -> Indices:
@@ -284,11 +290,6 @@ def search_orbits(
     # No method at all still marks the points out of range.
     result.outcome[index] = searched(index, methods=()).outcome
     meshes = () if coarse else MESHES
-
-    def keep(some: Indices, orbits: MeshOrbits) -> None:
-        result.add(some, orbits)
-        if known is not None:
-            known.keep(problem, some, orbits.orbit)
 
     def follow(guess: Orbit, rows: Indices) -> None:
         for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
