@@ -79,6 +79,9 @@ METHODS: tuple[Method, ...] = (
 #: Names that a user may choose.
 CHOICES = tuple(dict.fromkeys(method.choice for method in METHODS))
 
+#: Earlier names of choices.
+_SYNONYMS = {"smooth": "series"}
+
 
 def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
     """The methods that a user chose, in the order of the search.
@@ -89,7 +92,8 @@ def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
         If there is no method of a name.
     """
     require(choices, "methods", "name a method", "none", "leave it out for all")
-    names = {one_of(choice, CHOICES, "methods") for choice in choices}
+    known = (*CHOICES, *_SYNONYMS)
+    names = {_SYNONYMS.get(n, n) for n in (one_of(c, known, "methods") for c in choices)}
     return tuple(method for method in METHODS if method.choice in names)
 
 
