@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from asperity.arrays import Float, Index
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
@@ -171,7 +171,7 @@ class DataTerm(ABC):
             For data whose prediction has no derivatives within compiled programs.
         """
         rule = "be of lock-in readings or recordings of sliding"
-        advice = "take intervals by profile likelihood (profile=True, --profile)"
+        advice = f"take intervals by profile likelihood ({Argument('profile', value='True')})"
         raise InputError("a posterior", rule, self.name, advice)
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:

@@ -227,7 +227,7 @@ def _pieces(motion: _Motion) -> list[Piece]:
         near = np.unique(np.clip(near, 0, edges.size - 2))
         if finest or (np.diff(edges)[near] == 1).all():
             break
-        fine = [np.linspace(*edges[[k, k + 1]], _PARTS + 1).astype(np.intp) for k in near]
+        fine = [np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp) for k in near]
         edges = kept = np.unique(np.concatenate([kept, bounds, *fine]))
         finest = motion.step > 0
     # A spike or a jump of the gauge is no motion.
