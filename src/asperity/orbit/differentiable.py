@@ -92,7 +92,11 @@ class ResponseFunction:
         return 1 << (max(points, self._least_points, _FEWEST) - 1).bit_length()
 
     def __call__(
-        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
+        self,
+        parameters: Mapping[str, ArrayLike],
+        known: KnownOrbits | None = None,
+        *,
+        motions: bool | None = None,
     ) -> ResponseValues:
         """Response at one or many points.
 
@@ -106,6 +110,9 @@ class ResponseFunction:
             method does not find are kept there for the next call, and begun there by
             ``search="direct"``. For a search without multipliers, and parameters that are not
             traced.
+        motions : bool, optional
+            Whether a direct search integrates motions where it finds no orbit otherwise, 10 ms a
+            point; by default ``search="direct"`` does and ``search="coarse"`` does not.
 
         Returns
         -------
@@ -124,7 +131,7 @@ class ResponseFunction:
         if _traced(padded):
             fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
             return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
-        fast, searched = _orbits(self._program, padded, points or 1, known)
+        fast, searched = _orbits(self._program, padded, points or 1, known, motions=motions)
         part = _fast_part(self._program)
         values = _evaluate(padded, fast, None, program=part)
         return _cut(_with_searched(values, searched, part), points)
@@ -296,8 +303,8 @@ def response_function(
         load, from the orbit on which a motion from steady sliding settles, in some milliseconds a
         point; it leaves out what follows branches, which may take a minute for one point. Within
         `jax.jit`, and where multipliers are wanted, it is as True. "coarse" is the same on 72
-        intervals without a check of the mesh and without motions: values good to some 1e-6, to
-        look for minima with.
+        intervals without a check of the mesh, and without motions unless a call asks for them:
+        values good to some 1e-6, to look for minima with.
     least_points : int
         Calls with fewer points are padded to this number, so that calls with different numbers of
         points share one compiled program.
@@ -373,6 +380,7 @@ def _orbits(
     known: KnownOrbits | None,
     *,
     every: bool = False,
+    motions: bool | None = None,
 ) -> tuple[FastOrbits | None, SearchedOrbits | None]:
     """Orbits of the first `points` points by the fast method and, of the others, by the search."""
     spare_mappings()
@@ -391,6 +399,7 @@ def _orbits(
         rows,
         direct=direct,
         coarse=program.search == "coarse",
+        motions=motions,
         known=known,
         every=every,
     )

@@ -176,6 +176,8 @@ def followed_orbits(
     harmonics: int,
     meshes: tuple[int, ...],
     numbers: Complex | None = None,
+    *,
+    patient: bool = True,
 ) -> Iterator[tuple[Indices, MeshOrbits]]:
     """Orbits that Newton's method reaches from a guess, on the first mesh that is accurate.
 
@@ -191,6 +193,8 @@ def followed_orbits(
     numbers : complex array, shape (1 + harmonics, points), optional
         Mean and harmonics, where they are known. Otherwise each mesh is compared with the one
         before, the first with `FIRST_MESH`, and a point that Newton's method fails on is left out.
+    patient : bool
+        Whether each orbit gets all attempts, to their end.
 
     Yields
     ------
@@ -201,7 +205,7 @@ def followed_orbits(
     known, agreements = numbers is not None, _MESH_AGREEMENT if numbers is None else _AGREEMENT
     before = np.full((1 + harmonics, points), np.nan + 0j) if numbers is None else numbers
     read = partial(_numbers, harmonics=harmonics)
-    rounds, patience = (_ROUNDS, math.inf) if meshes else (1, _PATIENCE)
+    rounds, patience = (_ROUNDS, math.inf) if patient else (1, _PATIENCE)
     for intervals in meshes if known else (FIRST_MESH, *meshes):
         agreement = agreements[(intervals,) == meshes[-1:]]
         solve = partial(
@@ -235,6 +239,7 @@ def search_orbits(
     *,
     direct: bool = False,
     coarse: bool = False,
+    motions: bool | None = None,
     known: KnownOrbits | None = None,
     every: bool = False,
 ) -> SearchedOrbits:
@@ -250,7 +255,10 @@ def search_orbits(
         Whether only to solve each point independently, without following branches: by series under
         slow modulation, from the known orbits, from the averaged limit, and from motions.
     coarse : bool
-        Whether a direct search takes orbits on the coarsest mesh, unchecked, and no motions.
+        Whether a direct search takes orbits on the coarsest mesh, unchecked.
+    motions : bool, optional
+        Whether a direct search integrates motions for the orbits that it does not find otherwise;
+        by default one that is not coarse does.
     known : KnownOrbits, optional
         Of the first points: the search keeps there what it finds, and a direct one begins there.
     every : bool
@@ -290,9 +298,12 @@ def search_orbits(
     # No method at all still marks the points out of range.
     result.outcome[index] = searched(index, methods=()).outcome
     meshes = () if coarse else MESHES
+    motions = not coarse if motions is None else motions
 
     def follow(guess: Orbit, rows: Indices) -> None:
-        for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
+        for some, orbits in followed_orbits(
+            problem, guess, rows, harmonics, meshes, patient=motions
+        ):
             keep(some, orbits)
 
     rows = left()
@@ -310,10 +321,10 @@ def search_orbits(
         follow(*orbits_from_averaged_limit(problem, rows, _PATIENCE if coarse else math.inf))
     rows = left()
     hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
-    if len(rows) and not coarse and not hopeless:
-        motions, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
+    if len(rows) and motions and not hopeless:
+        settled, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
         if len(periodic) >= (len(rows) if every else 1):
-            follow(motions, periodic)
+            follow(settled, periodic)
     return result
 
 
