@@ -408,9 +408,8 @@ class Objective:
         # So far inside that SciPy does not move the first point.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
-        terms = tuple(term.coarser() for term in self.terms)
-        if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
-            ahead = replace(self, terms=terms)
+        ahead = self.coarser()
+        if ahead is not self:
             near = ahead.minimise(point, kept, tolerance=tolerance, evaluations=evaluations)
             self.unsolved += ahead.unsolved
             if self.chi2(near.u) <= self.chi2(point):
@@ -455,6 +454,12 @@ class Objective:
         )
         found = whole(result.x)
         return Minimum(found, self.chi2(found))
+
+    def coarser(self) -> Objective:
+        """The objective of `DataTerm.coarser` data; itself where that has no coarser model."""
+        terms = tuple(term.coarser() for term in self.terms)
+        same = all(a is b for a, b in zip(terms, self.terms, strict=True))
+        return self if same else replace(self, terms=terms)
 
     def expected_decrease(self, u: Float) -> float:
         """Decrease of chi-squared that residuals linear in the coordinates would allow.
