@@ -7,6 +7,7 @@ here: friction itself changes quickly after them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -74,6 +75,24 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
     return replace(
         run, friction=without(run.friction, wrong), spikes=tuple(run.time[wrong].tolist())
     )
+
+
+def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
+    """The run with samples that a fit cannot explain; without any where they are too many.
+
+    Parameters
+    ----------
+    run : RecordedRun
+    times : sequence of float
+        Of the samples (s).
+    """
+    if len(run.spikes or ()) + len(times) <= 1 + _MOST_SPIKES * run.time.size:
+        return replace(run, wrong=tuple(times))
+    doubt = (
+        f"{len(times)} samples of friction are farther from the motion than noise reaches: the "
+        "noise is not normal or the law is wrong, and intervals may not hold"
+    )
+    return replace(run, wrong=(), doubts=(*run.doubts, doubt))
 
 
 def with_jumps(run: RecordedRun) -> RecordedRun:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import solve_banded
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtri
 
 from asperity.arrays import Float
 from asperity.recording.defects.autoregression import Autoregression, LaggedProducts, Whitening
@@ -68,6 +68,74 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> float:
     r = products[1 : lags + 1] / products[0]
     q = float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     return float(chdtrc(max(lags - fitted_order, 1), n * (n + 2) * q))
+
+
+#: Probability that noise is taken for a wrong sample, anywhere in a recording.
+_CHANCE = 1e-3
+#: Of the innovations of a sample, what curves must leave to know the sample from them.
+_LEAST_LEFT = 1e-6
+
+
+def largest_departure(n: int) -> float:
+    """The departure, in standard deviations, that none of n samples exceeds but by small chance."""
+    return -float(ndtri(_CHANCE / (2 * n)))
+
+
+def wrong_samples(
+    white: Float,
+    curves: Float,
+    noise: Sequence[Whitening],
+    stretches: Sequence[tuple[int, int]],
+) -> list[int]:
+    """Samples that neither the motion nor its noise explains, the farthest off first.
+
+    Parameters
+    ----------
+    white : array, shape (n,)
+        Innovations of computed less recorded friction.
+    curves : array, shape (n, columns)
+        Innovations of the derivatives of the motion, and of linear nuisances.
+    noise : sequence of Whitening
+        Of each stretch.
+    stretches : sequence of (int, int)
+
+    Notes
+    -----
+    The size of an impulse at each sample over its standard error, with the parameters following
+    and without the sample's own part in the scale of the noise (Fox, J. R. Stat. Soc. B 34, 350,
+    1972, for an additive outlier). One after the other is taken off: a large one hides others.
+    """
+    basis = np.linalg.qr(curves)[0]
+    white = white - basis @ (basis.T @ white)
+    squares = np.concatenate([w.squares(b - a) for w, (a, b) in zip(noise, stretches, strict=True)])
+    seen = sum(x**2 for x in _at_samples(basis, noise, stretches).T)
+    limit = largest_departure(white.size)
+    result: list[int] = []
+    while True:
+        left = squares - seen
+        known = left > _LEAST_LEFT * squares
+        size = np.where(known, _at_samples(white, noise, stretches) ** 2 / np.where(known, left, 1.0), 0.0)
+        free = white.size - basis.shape[1] - 1
+        k = int(np.argmax(size))
+        if size[k] * free <= limit**2 * (white @ white - size[k]):
+            return result
+        result.append(k)
+        impulse = np.zeros(white.size)
+        impulse[k] = 1.0
+        impulse = innovations(impulse, noise, stretches, basis)
+        impulse /= np.linalg.norm(impulse)
+        basis = np.column_stack([basis, impulse])
+        white = white - impulse * (impulse @ white)
+        seen += _at_samples(impulse, noise, stretches) ** 2
+
+
+def _at_samples(
+    white: Float, noise: Sequence[Whitening], stretches: Sequence[tuple[int, int]]
+) -> Float:
+    """Products with the innovations of an impulse at each sample."""
+    return np.concatenate(
+        [w.transposed(white[a:b]) for w, (a, b) in zip(noise, stretches, strict=True)]
+    )
 
 
 #: Samples after a change in which a misfit is looked for, and before it: its time is uncertain.
