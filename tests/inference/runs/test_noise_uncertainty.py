@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
+from scipy.optimize import brentq
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from asperity.inference.runs.noise import added_by_noise, misfit_after_changes, whiteness
+from asperity.inference.runs.noise import (
+    added_by_noise,
+    innovations,
+    largest_departure,
+    misfit_after_changes,
+    whiteness,
+    wrong_samples,
+)
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 
@@ -136,3 +144,82 @@ def test_whiteness_rejects_as_often_as_it_says():
         whiteness([np.random.default_rng(seed).normal(size=300)], 0) < 0.1 for seed in range(300)
     ]
     assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)
+
+
+def decays(n):
+    """An offset, and curves that change quickly at two thirds of the samples."""
+    s = np.arange(n) / n - 2 / 3
+    return np.stack(
+        [np.ones(n), np.where(s > 0, np.exp(-30 * s), 0), np.where(s > 0, s, 0)], axis=1
+    )
+
+
+def noises(a, n, sets):
+    """Sets of an AR(2) of innovations of unit variance."""
+    white = np.random.default_rng(5).normal(size=(sets, n + 500))
+    return lfilter([1.0], [1.0, -a[0], -a[1]], white, axis=1)[:, 500:]
+
+
+def wrong_in(values, model, stretches, most=20):
+    whitening = [model.whitening] * len(stretches)
+    white = innovations(np.column_stack([values, decays(values.size)]), whitening, stretches)
+    return wrong_samples(white[:, 0], white[:, 1:], whitening, stretches, most)
+
+
+def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so():
+    """Each just above or below the limit, by generalised least squares with the covariance."""
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    inverse = np.linalg.inv(toeplitz(autocovariances(a, n)))
+    root = np.linalg.cholesky(inverse).T
+
+    def departure(values, k):
+        impulse = np.eye(1, n, k).T
+        squares = [
+            np.linalg.lstsq(root @ X, root @ values, rcond=None)[1][0]
+            for X in (decays(n), np.hstack([decays(n), impulse]))
+        ]
+        return np.sqrt((squares[0] - squares[1]) * (n - 4) / squares[1])
+
+    limit = largest_departure(n)
+    assert 2 * n * norm.sf(limit) == pytest.approx(1e-3)
+    # At the beginning, at the end, and next to the change, which the curves follow.
+    for k in (0, 1, 100, 199, 201, 202, n - 1):
+        impulse, near = np.eye(1, n, k)[0], range(max(k - 2, 0), min(k + 3, n))
+
+        def excess(size, impulse=impulse, near=near):
+            return max(departure(values + size * impulse, j) for j in near) - limit
+
+        size = brentq(excess, 0, 200)
+        above, below = (values + share * size * impulse for share in (1.001, 0.999))
+        expected = max(near, key=lambda j, above=above: departure(above, j))
+        assert wrong_in(above, model_of(a), [(0, n)]) == [expected]
+        assert wrong_in(below, model_of(a), [(0, n)]) == []
+
+
+def test_large_wrong_samples_hide_no_small_ones_whatever_the_scale_of_the_noise():
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    values += decays(n) @ [3.0, -20.0, 5.0]
+    values[[80, 81, 200, 230]] += [300.0, 9.0, -12.0, 15.0]
+    model = model_of(a)
+    wide = Autoregression(model.reflection, 25 * model.variance)
+    for m in (model, wide):
+        assert wrong_in(values, m, [(0, n)]) == [80, 81, 200, 230]
+        assert wrong_in(values, m, [(0, 150), (150, n)]) == [80, 81, 200, 230]
+    # One more than there may be says that there are too many.
+    assert len(wrong_in(values, model, [(0, n)], most=2)) == 3
+
+
+def test_many_samples_in_a_row_are_a_motion_and_no_wrong_samples():
+    a, n = (0.5, 0.0), 300
+    (values,) = noises(a, n, 1)
+    values[[40, 41, 42, 100, 101, 102, 103]] += 20 * np.array([1, -1, 1, 1, -1, 1, -1])
+    assert wrong_in(values, model_of(a), [(0, n)]) == [40, 41, 42]
+
+
+def test_noise_is_taken_for_a_wrong_sample_as_rarely_as_designed():
+    a, n, sets = (1.2, -0.5), 300, 400
+    alarms = sum(bool(wrong_in(x, model_of(a), [(0, n)])) for x in noises(a, n, sets))
+    # 0.4 expected; four and more by a chance of 1 in 1,000.
+    assert alarms <= 3

@@ -50,6 +50,11 @@ def first_after_changes(run: RecordedRun) -> list[int]:
     return [int(k) for k in np.searchsorted(run.time, edges)]
 
 
+def most_spikes(run: RecordedRun) -> int:
+    """Samples of a run that may be spikes."""
+    return int(1 + _MOST_SPIKES * run.time.size)
+
+
 def without_spikes(run: RecordedRun) -> RecordedRun:
     """The run with lines between the neighbours in place of spikes.
 
@@ -62,7 +67,7 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
         return run
     if run.spikes is None:
         wrong = away_from_changes(run.friction, spikes(run.friction), first_after_changes(run))
-        if wrong.size > 1 + _MOST_SPIKES * run.time.size:
+        if wrong.size > most_spikes(run):
             doubt = (
                 f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
                 "normal, and intervals may not hold"
@@ -86,11 +91,11 @@ def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
     times : sequence of float
         Of the samples (s).
     """
-    if len(run.spikes or ()) + len(times) <= 1 + _MOST_SPIKES * run.time.size:
+    if len(run.spikes or ()) + len(times) <= most_spikes(run):
         return replace(run, wrong=tuple(times))
     doubt = (
-        f"{len(times)} samples of friction are farther from the motion than noise reaches: the "
-        "noise is not normal or the law is wrong, and intervals may not hold"
+        f"{len(times)} samples of friction or more are farther from the motion than noise reaches: "
+        "the noise is not normal or the law is wrong, and intervals may not hold"
     )
     return replace(run, wrong=(), doubts=(*run.doubts, doubt))
 
