@@ -166,35 +166,49 @@ def wrong_in(values, model, stretches, most=20):
     return wrong_samples(white[:, 0], white[:, 1:], whitening, stretches, most)
 
 
-def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so():
-    """Each just above or below the limit, by generalised least squares with the covariance."""
+def departure(values, a, k, known=()):
+    """Of an impulse at k, next to `known` ones, by least squares with the inverse covariance."""
+    n = values.size
+    root = np.linalg.cholesky(np.linalg.inv(toeplitz(autocovariances(a, n)))).T
+    without = np.column_stack([decays(n), *np.eye(n)[list(known)]])
+    squares = [
+        np.linalg.lstsq(root @ X, root @ values, rcond=None)[1][0]
+        for X in (without, np.column_stack([without, np.eye(n)[k]]))
+    ]
+    return np.sqrt((squares[0] - squares[1]) * (n - without.shape[1] - 1) / squares[1])
+
+
+# At the beginning, at the end, and next to the change, which the curves follow.
+@pytest.mark.parametrize("k", [0, 1, 100, 199, 201, 202, 299])
+def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so(k):
     a, n = (1.2, -0.5), 300
     (values,) = noises(a, n, 1)
-    inverse = np.linalg.inv(toeplitz(autocovariances(a, n)))
-    root = np.linalg.cholesky(inverse).T
-
-    def departure(values, k):
-        impulse = np.eye(1, n, k).T
-        squares = [
-            np.linalg.lstsq(root @ X, root @ values, rcond=None)[1][0]
-            for X in (decays(n), np.hstack([decays(n), impulse]))
-        ]
-        return np.sqrt((squares[0] - squares[1]) * (n - 4) / squares[1])
-
     limit = largest_departure(n)
     assert 2 * n * norm.sf(limit) == pytest.approx(1e-3)
-    # At the beginning, at the end, and next to the change, which the curves follow.
-    for k in (0, 1, 100, 199, 201, 202, n - 1):
-        impulse, near = np.eye(1, n, k)[0], range(max(k - 2, 0), min(k + 3, n))
+    impulse, near = np.eye(n)[k], range(max(k - 2, 0), min(k + 3, n))
 
-        def excess(size, impulse=impulse, near=near):
-            return max(departure(values + size * impulse, j) for j in near) - limit
+    def excess(size):
+        return max(departure(values + size * impulse, a, j) for j in near) - limit
 
-        size = brentq(excess, 0, 200)
-        above, below = (values + share * size * impulse for share in (1.001, 0.999))
-        expected = max(near, key=lambda j, above=above: departure(above, j))
-        assert wrong_in(above, model_of(a), [(0, n)]) == [expected]
-        assert wrong_in(below, model_of(a), [(0, n)]) == []
+    size = brentq(excess, 0, 200, xtol=1e-4)
+    above, below = (values + share * size * impulse for share in (1.001, 0.999))
+    expected = max(near, key=lambda j: departure(above, a, j))
+    assert wrong_in(above, model_of(a), [(0, n)]) == [expected]
+    assert wrong_in(below, model_of(a), [(0, n)]) == []
+
+
+def test_a_sample_next_to_a_large_wrong_one_is_judged_without_that():
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    values[100] += 300.0
+
+    def excess(size):
+        return departure(values + size * np.eye(n)[101], a, 101, [100]) - largest_departure(n)
+
+    size = brentq(excess, 0, 200, xtol=1e-4)
+    for share, expected in ((1.001, [100, 101]), (0.999, [100])):
+        spoiled = values + share * size * np.eye(n)[101]
+        assert wrong_in(spoiled, model_of(a), [(0, n)]) == expected
 
 
 def test_large_wrong_samples_hide_no_small_ones_whatever_the_scale_of_the_noise():

@@ -24,6 +24,8 @@ from asperity.recording.defects.spikes import away_from_changes, spikes, without
 _FEW_CHANGES = 100
 #: Share of samples, and one more, that may be spikes: noise with more of them is not normal.
 _MOST_SPIKES = 0.01
+#: Samples that a fit may leave out: each is a nuisance, and costs time at each step.
+_MOST_WRONG = 50
 #: Share of the segments next to a change of the drive, and samples about it, in which friction
 #: changes too quickly to recognise a jump.
 _NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
@@ -50,11 +52,6 @@ def first_after_changes(run: RecordedRun) -> list[int]:
     return [int(k) for k in np.searchsorted(run.time, edges)]
 
 
-def most_spikes(run: RecordedRun) -> int:
-    """Samples of a run that may be spikes."""
-    return int(1 + _MOST_SPIKES * run.time.size)
-
-
 def without_spikes(run: RecordedRun) -> RecordedRun:
     """The run with lines between the neighbours in place of spikes.
 
@@ -67,7 +64,7 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
         return run
     if run.spikes is None:
         wrong = away_from_changes(run.friction, spikes(run.friction), first_after_changes(run))
-        if wrong.size > most_spikes(run):
+        if wrong.size > 1 + _MOST_SPIKES * run.time.size:
             doubt = (
                 f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
                 "normal, and intervals may not hold"
@@ -82,6 +79,11 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
     )
 
 
+def most_wrong(run: RecordedRun) -> int:
+    """Samples besides the spikes that a fit may leave out."""
+    return min(int(1 + _MOST_SPIKES * run.time.size) - len(run.spikes or ()), _MOST_WRONG)
+
+
 def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
     """The run with samples that a fit cannot explain; without any where they are too many.
 
@@ -91,7 +93,7 @@ def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
     times : sequence of float
         Of the samples (s).
     """
-    if len(run.spikes or ()) + len(times) <= most_spikes(run):
+    if len(times) <= most_wrong(run):
         return replace(run, wrong=tuple(times))
     doubt = (
         f"{len(times)} samples of friction or more are farther from the motion than noise reaches: "

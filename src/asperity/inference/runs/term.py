@@ -14,7 +14,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
-from asperity.inference.runs.cleaning import first_after_changes, most_spikes
+from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.motion import (
     ROOMS,
@@ -169,8 +169,8 @@ class RunTerm(DataTerm):
         columns = [raw[0][:, None], moving, self._columns[:, : self._linear]]
         white = self._whitened(np.column_stack(columns))
         noise = [m.whitening for m in self.models]
-        most = most_spikes(self.run) - len(self.run.spikes or ())
-        rows = wrong_samples(white[:, 0], white[:, 1:], noise, self.run.stretches, most)
+        stretches, most = self.run.stretches, most_wrong(self.run)
+        rows = wrong_samples(white[:, 0], white[:, 1:], noise, stretches, most)
         return tuple(self.run.time[rows].tolist())
 
     def use_search(self, always: bool) -> None:
