@@ -48,7 +48,7 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _CUT_INTERVALS = 2.0
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
-#: Spikes that a warning names.
+#: Spikes, or other samples, that a warning names.
 _NAMED = 5
 
 
@@ -351,13 +351,14 @@ class RunTerm(DataTerm):
             )
         if self.run.spikes:
             said.append(
-                self._said_of_samples(self.run.spikes, "is a spike", "are spikes")
+                self._said_of(self.run.spikes, "sample", "is a spike", "are spikes")
                 + ", which no motion of the slider makes; replaced by the line between the "
                 "neighbours"
             )
         if self.run.wrong:
+            what = "sample" if self.run.blocks is None else "mean"
             said.append(
-                self._said_of_samples(self.run.wrong, "is", "are")
+                self._said_of(self.run.wrong, what, "is", "are")
                 + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
                 "if friction itself is so, the law or the drive is not that of the recording"
             )
@@ -379,11 +380,10 @@ class RunTerm(DataTerm):
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
-    def _said_of_samples(self, times: Sequence[float], one: str, several: str) -> str:
+    def _said_of(self, times: Sequence[float], what: str, one: str, several: str) -> str:
         shown = ", ".join(f"{time:.6g}" for time in times[:_NAMED])
         shown += ", ..." if len(times) > _NAMED else ""
-        kind = "sample" if self.run.blocks is None else "mean"
-        those, are = (f"{len(times)} {kind}s", several) if len(times) > 1 else (f"a {kind}", one)
+        those, are = (f"{len(times)} {what}s", several) if len(times) > 1 else (f"a {what}", one)
         return f"{those} of {self.name}, at {shown} s after the first sample, {are}"
 
     @property
