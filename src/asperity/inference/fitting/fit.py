@@ -363,7 +363,9 @@ class _Steps:
         self._parameters, self._done, self._total = parameters, 0, parameters
 
     def minimised(self, done: int, total: int) -> None:
-        self._done, self._total = done, total + self._parameters
+        # A fit begins again without samples that its motion does not explain.
+        self._done = max(self._done, done)
+        self._total = max(self._total, total + self._parameters)
         self._report(self._done, self._total)
 
     def described(self, parameters: int) -> None:

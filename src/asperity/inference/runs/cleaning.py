@@ -2,7 +2,8 @@
 
 Spikes are replaced by the line between their neighbours, long recordings are averaged over blocks,
 and the level after a jump of the gauge is a nuisance of the fit. Changes of the drive are known
-here: friction itself changes quickly after them.
+here: friction itself changes quickly after them. Spikes that could be friction are left to the fit,
+which knows the motion, and begins again without them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Innovations of a recording's noise, tests of them, and what estimating the noise costs.
 
 Innovations are independent and normal with unit variance if law and noise are right. A law, a gauge
-or a drive that is not that of the recording shows in the samples after the changes of the drive.
+or a drive that is not that of the recording shows in the samples after the changes of the drive,
+and a wrong sample in the innovations that it has a part in.
 
 The covariance of generalised least squares is that under known noise. The coefficients of the noise
 are estimated from the same samples: estimates vary with them (Kackar and Harville, J. Am. Stat.
