@@ -111,6 +111,8 @@ def wrong_samples(
     The size of an impulse at each sample over its standard error (an additive outlier of Fox, J. R.
     Stat. Soc. B 34, 350, 1972), while all curves follow it and it does not count for the scale of
     the noise. The largest is removed before the next is looked for: it hides others.
+    Innovations with the tails of Student's t would not do: a wrong sample has a part in those of as
+    many samples as the order of the noise.
     """
     basis = np.linalg.qr(curves)[0]
     white = white - basis @ (basis.T @ white)
