@@ -25,6 +25,7 @@ from scipy.signal import lfilter
 
 from asperity.errors import InputError
 from asperity.inference import fit, recorded_run
+from asperity.inference.fitting import fit as fitting
 from asperity.inference.runs import blocks, cleaning
 from asperity.recording import Channel, Trace
 from benchmarks.coverage import CASES, LOAD, LOAD_NOISE, NOISE, Case, coloured, friction
@@ -190,6 +191,7 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
 STEPS: dict[str, tuple[Any, str, Any]] = {
     "spikes": (cleaning, "spikes", lambda values: np.empty(0, np.intp)),
     "jumps": (cleaning, "find_jumps", lambda values, stretches: []),
+    "wrong": (fitting, "_without_wrong_samples", lambda objective, u, recordings: recordings),
     "lines": (blocks, "find_lines", lambda values, step, lowest: []),
 }
 

@@ -353,7 +353,7 @@ class _Motion(SimpleNamespace):
 
 def _fit_with(law, run, friction, aicc=0.0, **about):
     white = Autoregression(np.zeros(0), 1e-6)
-    term = _Motion(run=run, name=run.name, models=[white], doubts=())
+    term = _Motion(run=run, name=run.name, models=[white], doubts=(), basis=None)
     vars(term).update(about)
     objective = SimpleNamespace(terms_of=lambda kind: [term])
     return SimpleNamespace(law=law, values={"friction": friction}, aicc=aicc, objective=objective)
@@ -383,6 +383,22 @@ def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps
     assert "it rests on" not in doubt + stretch
     doubt, _ = support(_fit_with("good", run, wrong, doubts=("it misses",)), everywhere)
     assert "even under good it misses" in doubt
+
+
+def test_a_verdict_rests_on_no_sample_that_is_left_out():
+    time = np.linspace(0, 100, 2001)
+    friction = 0.6 + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
+    friction[500] += 100.0
+    run = SimpleNamespace(
+        name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)]
+    )
+    poor = _fit_with("poor", run, np.where((time > 40) & (time < 42), 0.61, 0.6) - 1e-4, 200.0)
+    said = [
+        " ".join(support(_fit_with("good", run, np.full(time.size, 0.6), basis=basis), poor))
+        for basis in (np.eye(1, time.size, 500).T, None)
+    ]
+    assert re.search(r"rests on 40 to 41.95 s of run", said[0])
+    assert not re.search(r"rests on 40 to", said[1])
 
 
 def test_a_verdict_that_changes_with_the_window_says_so_first():

@@ -153,6 +153,19 @@ def test_single_samples_far_off_do_not_count(clean, ringing):
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
+def test_a_mean_that_the_motion_does_not_explain_is_wrong_and_so_is_what_holds_it(clean, ringing):
+    run = cleaned(recorded(clean + ringing), 100.0)
+    k = int(np.searchsorted(run.time, CASE.changes[0])) + 2
+    friction = run.friction.copy()
+    friction[k] += 1e-3
+    term = RunTerm(replace(run, friction=friction), get_law("rice-ruina"), TRUTH | TRUE)
+    assert term.update_noise({})
+    assert term.wrong_samples({}) == (run.time[k],)
+    wide = averaged(replace(run, wrong=(run.time[k],)), 0.04)
+    (row,) = wide.rows_at(wide.wrong)
+    assert wide.blocks.edges[row, 0] <= run.time[k] < wide.blocks.edges[row, 1]
+
+
 def test_large_samples_far_off_take_no_good_ones_with_them(ringing):
     """Friction that relaxes after each step is no noise, however large the spikes are."""
     time = np.arange(24_000) / CASE.rate

@@ -23,6 +23,8 @@ from asperity.inference.report import fit_in_words
 from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.cleaning import cleaned, without_spikes
 from asperity.inference.runs.levels import level_change, level_rates
+from asperity.inference.runs.noise import largest_departure
+from asperity.inference.runs.term import RunTerm
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
@@ -291,6 +293,66 @@ def test_large_samples_far_off_leave_no_jumps_behind():
     found = cleaned(run)
     assert found.spikes == tuple(k / case.rate for k in spoiled)
     assert found.jumps == ()
+
+
+def test_a_spike_that_friction_could_be_is_told_from_it_by_the_motion():
+    """As small as differences of friction elsewhere, where the reloading after a hold ends."""
+    case = CASES["holds"]
+    (run,) = runs_of(case, 1)
+    k = round((case.changes[3] + 2.1) * case.rate)
+    spoiled = run.friction.copy()
+    spoiled[k] -= 0.03
+    bad = replace(run, friction=spoiled)
+    assert cleaned(bad).spikes == ()
+    right, mended, kept = (
+        fit(r, "rice-ruina", FREE, start=TRUE, starts=1)
+        for r in (run, bad, replace(bad, spikes=(), wrong=()))
+    )
+    (said,) = (w for w in mended.warnings if "farther from the motion of rice-ruina" in w)
+    assert "at 82.1 s after the first sample, is farther" in said
+    assert mended.objective.terms[0].noise["outliers"] == [run.time[k]]
+    assert right.objective.terms[0].noise["outliers"] == []
+    apart = [abs(mended.values[n] - right.values[n]) / right.parameters[n].se for n in TRUE]
+    assert max(apart) < 0.3
+    # The user's word counts, however far off the sample puts the answer.
+    assert not any("farther from the motion" in w for w in kept.warnings)
+    apart = [abs(kept.values[n] - right.values[n]) / right.parameters[n].se for n in TRUE]
+    assert max(apart) > 3
+
+
+def test_a_lag_of_the_gauge_that_is_not_given_leaves_no_samples_out():
+    """A motion that the law does not have is off in many samples in a row."""
+    case = CASES["loads"]
+    (run,) = runs_of(case, 1)
+    lagging = lfilter([0.3], [1.0, -0.7], run.friction, zi=[0.7 * run.friction[0]])[0]
+    free = [*FREE, "alpha"]
+    found = fit(replace(run, friction=lagging), case.law, free, start=case.true, starts=1)
+    assert found.objective.terms[0].noise["outliers"] == []
+    assert any("just after changes of its drive" in w for w in found.warnings)
+
+
+def test_a_wrong_sample_costs_as_much_as_the_largest_departure_of_noise(found):
+    """Otherwise a law would win a comparison by the samples that it leaves out."""
+    (term,) = found.objective.terms
+    n, values = term.run.time.size, found.values
+    without = RunTerm(
+        replace(term.run, wrong=(term.run.time[300], term.run.time[900])),
+        term.law,
+        term.fixed,
+        linear=term.linear,
+        nuisances=term.nuisances,
+        own={f"step_time_{k}": f"shift_{edge}" for k, edge in enumerate(term.run.cuts, 1)},
+    )
+    without.models = term.models
+    without._prepare()
+    before, after = term.residuals(values), without.residuals(values)
+    assert after.log_scale - before.log_scale == pytest.approx(largest_departure(n) ** 2)
+    assert without.profiled == term.profiled
+    # Samples of which nothing is known change neither the motion nor the number of the others.
+    assert before.values @ before.values > after.values @ after.values
+    np.testing.assert_allclose(
+        without.fitted_friction(values), term.fitted_friction(values), atol=1e-4
+    )
 
 
 @pytest.mark.parametrize(("name", "rate"), [("steps", 0.7), ("holds", 0.7), ("loads", 10.0)])

@@ -3,10 +3,18 @@
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
+from scipy.optimize import brentq
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from asperity.inference.runs.noise import added_by_noise, misfit_after_changes, whiteness
+from asperity.inference.runs.noise import (
+    added_by_noise,
+    innovations,
+    largest_departure,
+    misfit_after_changes,
+    whiteness,
+    wrong_samples,
+)
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 
@@ -136,3 +144,96 @@ def test_whiteness_rejects_as_often_as_it_says():
         whiteness([np.random.default_rng(seed).normal(size=300)], 0) < 0.1 for seed in range(300)
     ]
     assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)
+
+
+def decays(n):
+    """An offset, and curves that change quickly at two thirds of the samples."""
+    s = np.arange(n) / n - 2 / 3
+    return np.stack(
+        [np.ones(n), np.where(s > 0, np.exp(-30 * s), 0), np.where(s > 0, s, 0)], axis=1
+    )
+
+
+def noises(a, n, sets):
+    """Sets of an AR(2) of innovations of unit variance."""
+    white = np.random.default_rng(5).normal(size=(sets, n + 500))
+    return lfilter([1.0], [1.0, -a[0], -a[1]], white, axis=1)[:, 500:]
+
+
+def wrong_in(values, model, stretches, most=20):
+    whitening = [model.whitening] * len(stretches)
+    white = innovations(np.column_stack([values, decays(values.size)]), whitening, stretches)
+    return wrong_samples(white[:, 0], white[:, 1:], whitening, stretches, most)
+
+
+def departure(values, a, k, known=()):
+    """Of an impulse at k, next to `known` ones, by least squares with the inverse covariance."""
+    n = values.size
+    root = np.linalg.cholesky(np.linalg.inv(toeplitz(autocovariances(a, n)))).T
+    without = np.column_stack([decays(n), *np.eye(n)[list(known)]])
+    squares = [
+        np.linalg.lstsq(root @ X, root @ values, rcond=None)[1][0]
+        for X in (without, np.column_stack([without, np.eye(n)[k]]))
+    ]
+    return np.sqrt((squares[0] - squares[1]) * (n - without.shape[1] - 1) / squares[1])
+
+
+# At the beginning, at the end, and next to the change, which the curves follow.
+@pytest.mark.parametrize("k", [0, 1, 100, 199, 201, 202, 299])
+def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so(k):
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    limit = largest_departure(n)
+    assert 2 * n * norm.sf(limit) == pytest.approx(1e-3)
+    impulse, near = np.eye(n)[k], range(max(k - 2, 0), min(k + 3, n))
+
+    def excess(size):
+        return max(departure(values + size * impulse, a, j) for j in near) - limit
+
+    size = brentq(excess, 0, 200, xtol=1e-4)
+    above, below = (values + share * size * impulse for share in (1.001, 0.999))
+    expected = max(near, key=lambda j: departure(above, a, j))
+    assert wrong_in(above, model_of(a), [(0, n)]) == [expected]
+    assert wrong_in(below, model_of(a), [(0, n)]) == []
+
+
+def test_a_sample_next_to_a_large_wrong_one_is_judged_without_that():
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    values[100] += 300.0
+
+    def excess(size):
+        return departure(values + size * np.eye(n)[101], a, 101, [100]) - largest_departure(n)
+
+    size = brentq(excess, 0, 200, xtol=1e-4)
+    for share, expected in ((1.001, [100, 101]), (0.999, [100])):
+        spoiled = values + share * size * np.eye(n)[101]
+        assert wrong_in(spoiled, model_of(a), [(0, n)]) == expected
+
+
+def test_large_wrong_samples_hide_no_small_ones_whatever_the_scale_of_the_noise():
+    a, n = (1.2, -0.5), 300
+    (values,) = noises(a, n, 1)
+    values += decays(n) @ [3.0, -20.0, 5.0]
+    values[[80, 81, 200, 230]] += [300.0, 9.0, -12.0, 15.0]
+    model = model_of(a)
+    wide = Autoregression(model.reflection, 25 * model.variance)
+    for m in (model, wide):
+        assert wrong_in(values, m, [(0, n)]) == [80, 81, 200, 230]
+        assert wrong_in(values, m, [(0, 150), (150, n)]) == [80, 81, 200, 230]
+    # One more than there may be says that there are too many.
+    assert len(wrong_in(values, model, [(0, n)], most=2)) == 3
+
+
+def test_many_samples_in_a_row_are_a_motion_and_no_wrong_samples():
+    a, n = (0.5, 0.0), 300
+    (values,) = noises(a, n, 1)
+    values[[40, 41, 42, 100, 101, 102, 103]] += 20 * np.array([1, -1, 1, 1, -1, 1, -1])
+    assert wrong_in(values, model_of(a), [(0, n)]) == [40, 41, 42]
+
+
+def test_noise_is_taken_for_a_wrong_sample_as_rarely_as_designed():
+    a, n, sets = (1.2, -0.5), 300, 400
+    alarms = sum(bool(wrong_in(x, model_of(a), [(0, n)])) for x in noises(a, n, sets))
+    # 0.4 expected; four and more by a chance of 1 in 1,000.
+    assert alarms <= 3

@@ -270,12 +270,15 @@ def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Floa
     """Edges of the parts of a recording, as samples, and the share of the gain up to each.
 
     The gain is that of `best` in the sum of squared innovations. Both laws are judged by the noise
-    that the better one leaves.
+    that the better one leaves, and without the samples that are wrong under it.
     """
     run = first.run
     noise = [model.whitening for model in first.models]
     squares = [
-        innovations(run.friction - term.fitted_friction(fit.values), noise, run.stretches) ** 2
+        innovations(
+            run.friction - term.fitted_friction(fit.values), noise, run.stretches, first.basis
+        )
+        ** 2
         for term, fit in ((first, best), (second, other))
     ]
     edges = np.linspace(0, run.time.size, min(_PARTS, run.time.size) + 1).astype(int)

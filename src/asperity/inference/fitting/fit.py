@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.cycles.cycle import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
@@ -52,9 +53,10 @@ from asperity.inference.runs.assembly import (
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser
-from asperity.inference.runs.cleaning import cleaned
+from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun, run_of
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -64,6 +66,8 @@ from asperity.parameters import MACHINE, law_parameters
 from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 
+#: Searches for samples that the motion does not explain: a motion without them explains others.
+_CLEANINGS = 4
 #: The level of sliding (dimensionless; m/s), for data that are counted from it.
 _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 
@@ -181,16 +185,28 @@ def fit(
     else:
         objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
-    # Minima of a long recording are looked for in fewer, longer blocks.
-    searched = compared(coarse) if (coarse := coarser(recordings)) else objective
-    if recordings:
-        searched = under_drift(searched)
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
 
-    minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
-    agreed = True
-    if minima and recordings:
-        minima, agreed = with_noise(objective, minima, searched)
+    def minima_under(
+        objective: Objective, recordings: Sequence[RecordedRun]
+    ) -> tuple[list[Minimum], bool]:
+        # Minima of a long recording are looked for in fewer, longer blocks.
+        searched = compared(coarse) if (coarse := coarser(recordings)) else objective
+        if recordings:
+            searched = under_drift(searched)
+        minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
+        return with_noise(objective, minima, searched) if minima and recordings else (minima, True)
+
+    minima, agreed = minima_under(objective, recordings)
+    cleaner = recordings
+    for _ in range(_CLEANINGS):
+        if not minima or not math.isfinite(minima[0].chi2):
+            break
+        before, cleaner = cleaner, _without_wrong_samples(objective, minima[0].u, recordings)
+        if [(r.wrong or (), r.doubts) for r in before] == [(r.wrong, r.doubts) for r in cleaner]:
+            break
+        objective = compared(cleaner)
+        minima, agreed = minima_under(objective, cleaner)
     if not minima or not math.isfinite(minima[0].chi2):
         return failed_fit(objective)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
@@ -222,6 +238,20 @@ def fit(
             else contradicted_stiffness(result, freed, recordings, given)
         )
     return replace(result, warnings=(*said, *result.warnings))
+
+
+def _without_wrong_samples(
+    objective: Objective, u: Float, recordings: Sequence[RecordedRun]
+) -> list[RecordedRun]:
+    """Recordings without the samples that the motion at u and its noise do not explain.
+
+    Those of which the user has named the spikes stay as they are.
+    """
+    values, terms = objective.named(u), objective.terms_of(RunTerm)
+    return [
+        with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
+        for run, term in zip(recordings, terms, strict=True)
+    ]
 
 
 class _Given(NamedTuple):
@@ -333,7 +363,9 @@ class _Steps:
         self._parameters, self._done, self._total = parameters, 0, parameters
 
     def minimised(self, done: int, total: int) -> None:
-        self._done, self._total = done, total + self._parameters
+        # A fit begins again without samples that its motion does not explain.
+        self._done = max(self._done, done)
+        self._total = max(self._total, total + self._parameters)
         self._report(self._done, self._total)
 
     def described(self, parameters: int) -> None:

@@ -2,11 +2,13 @@
 
 Spikes are replaced by the line between their neighbours, long recordings are averaged over blocks,
 and the level after a jump of the gauge is a nuisance of the fit. Changes of the drive are known
-here: friction itself changes quickly after them.
+here: friction itself changes quickly after them. Spikes that could be friction are left to the fit,
+which knows the motion, and begins again without them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -23,6 +25,8 @@ from asperity.recording.defects.spikes import away_from_changes, spikes, without
 _FEW_CHANGES = 100
 #: Share of samples, and one more, that may be spikes: noise with more of them is not normal.
 _MOST_SPIKES = 0.01
+#: Samples that a fit may leave out: each is a nuisance, and costs time at each step.
+_MOST_WRONG = 50
 #: Share of the segments next to a change of the drive, and samples about it, in which friction
 #: changes too quickly to recognise a jump.
 _NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
@@ -74,6 +78,29 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
     return replace(
         run, friction=without(run.friction, wrong), spikes=tuple(run.time[wrong].tolist())
     )
+
+
+def most_wrong(run: RecordedRun) -> int:
+    """Samples besides the spikes that a fit may leave out."""
+    return min(int(1 + _MOST_SPIKES * run.time.size) - len(run.spikes or ()), _MOST_WRONG)
+
+
+def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
+    """The run with samples that a fit cannot explain; without any where they are too many.
+
+    Parameters
+    ----------
+    run : RecordedRun
+    times : sequence of float
+        Of the samples (s).
+    """
+    if len(times) <= most_wrong(run):
+        return replace(run, wrong=tuple(times))
+    doubt = (
+        f"{len(times)} samples of friction or more are farther from the motion than noise reaches: "
+        "the noise is not normal or the law is wrong, and intervals may not hold"
+    )
+    return replace(run, wrong=(), doubts=(*run.doubts, doubt))
 
 
 def with_jumps(run: RecordedRun) -> RecordedRun:

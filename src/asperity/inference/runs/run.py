@@ -14,7 +14,7 @@ from scipy.linalg import solveh_banded
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtri
 
-from asperity.arrays import Float
+from asperity.arrays import Float, Index
 from asperity.errors import InputError, require
 from asperity.inference.runs.drive import Drive, constant_velocities
 from asperity.inference.runs.levels import LevelRate, level_rates
@@ -114,6 +114,9 @@ class RecordedRun:
     spikes, jumps : tuple of float, or None
         Times (s) of single samples that are wrong, and times from which on the level of the gauge
         is another one; None where they have not been looked for.
+    wrong : tuple of float, or None
+        Times (s) of samples, or means, that neither a fitted motion nor its noise explains; None
+        where they have not been looked for.
     blocks : Blocks or None
         None where `friction` is that of single samples.
     level_rates : tuple of (float, float)
@@ -138,6 +141,7 @@ class RecordedRun:
     doubts: tuple[str, ...]
     spikes: tuple[float, ...] | None = None
     jumps: tuple[float, ...] | None = None
+    wrong: tuple[float, ...] | None = None
     blocks: Blocks | None = None
     level_rates: tuple[LevelRate, ...] = ()
 
@@ -145,6 +149,11 @@ class RecordedRun:
     def at(self) -> Float:
         """Where the motion is compared: times (n,), or edges of blocks (n, 2), in seconds."""
         return self.time if self.blocks is None else self.blocks.edges
+
+    def rows_at(self, times: Sequence[float]) -> Index:
+        """Samples, or means over blocks, that hold times (s) of samples."""
+        begin = self.time if self.blocks is None else self.blocks.edges[:, 0]
+        return np.searchsorted(begin, times, side="right") - 1
 
     @property
     def stiffness_unit(self) -> str:
@@ -183,7 +192,7 @@ def recorded_run(
         Channels, by name or role.
     spikes, jumps : sequence of float, optional
         Times (s) of single wrong samples, and of jumps of the gauge's level, in place of those that
-        a fit finds; empty for none.
+        the program finds; empty for none.
 
     Returns
     -------
@@ -246,6 +255,7 @@ def recorded_run(
         doubts=tuple(doubts),
         spikes=_of_the_user(spikes, origin, times, "spikes"),
         jumps=_of_the_user(jumps, origin, times, "jumps"),
+        wrong=None if spikes is None else (),
         level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
-from asperity.inference.runs.cleaning import first_after_changes
+from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.motion import (
     ROOMS,
@@ -26,8 +26,10 @@ from asperity.inference.runs.motion import (
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
+    largest_departure,
     misfit_after_changes,
     whiteness,
+    wrong_samples,
 )
 from asperity.inference.runs.reading import reading_at
 from asperity.inference.runs.run import RecordedRun
@@ -46,7 +48,7 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _CUT_INTERVALS = 2.0
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
-#: Spikes that a warning names.
+#: Spikes, or other samples, that a warning names.
 _NAMED = 5
 
 
@@ -114,7 +116,7 @@ class RunTerm(DataTerm):
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
-        self._columns = _linear_columns(run, linear)
+        self._columns = np.column_stack([_linear_columns(run, linear), _impulses(run)])
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
@@ -125,7 +127,7 @@ class RunTerm(DataTerm):
     @property
     def profiled(self) -> int:
         """Parameters beyond the coordinates: linear nuisances and the noise."""
-        return self._columns.shape[1] + sum(m.order + 1 for m in self.models)
+        return self._linear + sum(m.order + 1 for m in self.models)
 
     @property
     def noise(self) -> dict[str, Any]:
@@ -140,7 +142,7 @@ class RunTerm(DataTerm):
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
             "lines_removed": [] if self.run.blocks is None else list(self.run.blocks.lines),
-            "outliers": list(self.run.spikes or ()),
+            "outliers": sorted({*(self.run.spikes or ()), *(self.run.wrong or ())}),
             "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
@@ -159,6 +161,18 @@ class RunTerm(DataTerm):
         result._prepare()
         return result
 
+    def wrong_samples(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """Times of samples that neither the motion at `values` nor its noise explains."""
+        raw = self.departures(values)
+        assert raw is not None  # there is a motion at an estimate
+        moving = raw[1][:, np.any(raw[1], axis=0)]
+        columns = [raw[0][:, None], moving, self._columns[:, : self._linear]]
+        white = self._whitened(np.column_stack(columns))
+        noise = [m.whitening for m in self.models]
+        stretches, most = self.run.stretches, most_wrong(self.run)
+        rows = wrong_samples(white[:, 0], white[:, 1:], noise, stretches, most)
+        return tuple(self.run.time[rows].tolist())
+
     def use_search(self, always: bool) -> None:
         """Let the motion take as many steps as there is memory for, from now on."""
         self._room[:] = [ROOMS[-1]] if always else self._room
@@ -176,6 +190,8 @@ class RunTerm(DataTerm):
         scale = sum(
             m.log_scale(b - a) for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
         )
+        # A wrong sample is as likely as a departure that makes it one.
+        scale += len(self.run.wrong or ()) * largest_departure(n) ** 2 / 2
         return Residuals(
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
         )
@@ -311,7 +327,9 @@ class RunTerm(DataTerm):
         raw = self.departures(values)
         if raw is None:
             return np.full(self.run.time.size, np.nan)
-        return np.asarray(self.run.friction + raw[0] + self._columns @ self._coefficients(raw[0]))
+        linear = slice(self._linear)
+        shift = self._columns[:, linear] @ self._coefficients(raw[0])[linear]
+        return np.asarray(self.run.friction + raw[0] + shift)
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
@@ -332,7 +350,18 @@ class RunTerm(DataTerm):
                 f"longer window would help, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:
-            said.append(self._said_of_spikes())
+            said.append(
+                self._said_of(self.run.spikes, "sample", "is a spike", "are spikes")
+                + ", which no motion of the slider makes; replaced by the line between the "
+                "neighbours"
+            )
+        if self.run.wrong:
+            what = "sample" if self.run.blocks is None else "mean"
+            said.append(
+                self._said_of(self.run.wrong, what, "is", "are")
+                + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
+                "if friction itself is so, the law or the drive is not that of the recording"
+            )
         if self.run.jumps:
             times = ", ".join(f"{t:.6g}" for t in self.run.jumps)
             said.append(
@@ -351,15 +380,16 @@ class RunTerm(DataTerm):
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
-    def _said_of_spikes(self) -> str:
-        times = [f"{time:.6g}" for time in self.run.spikes or ()]
-        shown = ", ".join(times[:_NAMED]) + (", ..." if len(times) > _NAMED else "")
-        those = f"{len(times)} samples" if len(times) > 1 else "a sample"
-        return (
-            f"{those} of {self.name}, at {shown} s after the first sample, "
-            f"{'are spikes' if len(times) > 1 else 'is a spike'}, which no motion of the slider "
-            "makes; replaced by the line between the neighbours"
-        )
+    def _said_of(self, times: Sequence[float], what: str, one: str, several: str) -> str:
+        shown = ", ".join(f"{time:.6g}" for time in times[:_NAMED])
+        shown += ", ..." if len(times) > _NAMED else ""
+        those, are = (f"{len(times)} {what}s", several) if len(times) > 1 else (f"a {what}", one)
+        return f"{those} of {self.name}, at {shown} s after the first sample, {are}"
+
+    @property
+    def _linear(self) -> int:
+        """Linear nuisances, which come before the columns of wrong samples."""
+        return len(self.linear) + len(self.run.jumps or ())
 
     def _inner_names(self, names: Iterable[str]) -> dict[str, str]:
         """Names in the motion of those parameters that this run depends on."""
@@ -387,6 +417,14 @@ def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
     }
     columns = [known[n] for n in names] + [_behind(run, at) for at in run.jumps or ()]
     return np.stack(columns, axis=1) if columns else np.zeros((run.time.size, 0))
+
+
+def _impulses(run: RecordedRun) -> Float:
+    """A column for each wrong sample, of which nothing is known."""
+    rows = np.unique(run.rows_at(run.wrong or ()))
+    columns = np.zeros((run.time.size, rows.size))
+    columns[rows, np.arange(rows.size)] = 1.0
+    return columns
 
 
 def _behind(run: RecordedRun, at: float) -> Float:

@@ -59,6 +59,31 @@ class Whitening(NamedTuple):
         white = module.concatenate([self.first[:p, :p] @ columns[:p], module.stack(later, axis=-1)])
         return white.reshape(x.shape)
 
+    def transposed(self, white: Float) -> Float:
+        """The transpose of `of`: products of innovations with those of an impulse at each sample.
+
+        Parameters
+        ----------
+        white : array, shape (n,) or (n, columns)
+        """
+        n, p = white.shape[0], min(self.first.shape[0], white.shape[0])
+        columns = white.reshape(n, -1).copy()
+        first, columns[:p] = self.first[:p, :p].T @ columns[:p], 0.0
+        ends = np.concatenate([columns, np.zeros((self.taps.size - 1, columns.shape[1]))])
+        result = np.stack([np.correlate(x, self.taps, mode="valid") for x in ends.T], axis=-1)
+        result[:p] += first
+        return result.reshape(white.shape)
+
+    def squares(self, n: int) -> Float:
+        """Sums of the squared innovations of an impulse at each of n samples."""
+        p = min(self.first.shape[0], n)
+        # Innovations from the first p samples on have the weights of the highest order.
+        before = np.concatenate([[0.0], np.cumsum(self.taps**2)])
+        at = np.arange(n)
+        result = before[np.minimum(n - at, self.taps.size)] - before[np.maximum(p - at, 0)]
+        result[:p] += np.sum(self.first[:p, :p] ** 2, axis=0)
+        return np.asarray(result)
+
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
@@ -127,11 +152,8 @@ class Autoregression:
         The estimate of a spike at each sample over its standard error (Fox, J. R. Stat. Soc. B
         34, 350, 1972).
         """
-        a = np.concatenate([[1.0], -self.coefficients[-1]])
-        ends = np.concatenate([white, np.zeros(self.order)])
-        along = np.correlate(ends, a, mode="valid")
-        reached = np.minimum(np.arange(white.size, 0, -1), self.order + 1)
-        return np.asarray(along / np.sqrt(np.cumsum(a**2))[reached - 1])
+        impulse = self.whitening
+        return impulse.transposed(white) / np.sqrt(impulse.squares(white.size))
 
     def log_scale(self, n: int) -> float:
         """Sum of the logarithms of the standard deviations of the innovations of n samples."""
