@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -85,20 +85,14 @@ class TransientSolve(SolveKind):
     def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        values = _values(points, law.name)
+        values = points.of_law(law.name)
+        for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):  # without a modulation
+            values[name] = np.where(np.isnan(values[name]), absent, values[name])
         for k in solvable(law, values, answers):
             point = {n: float(v[k]) for n, v in values.items()}
             named = {n: float(v[k]) for n, v in points.values.items()} | point
             _integrate(law, point, named, int(k), record["settings"], answers)
         return answers
-
-
-def _values(points: Points, law: str) -> dict[str, np.ndarray]:
-    """Values of the points, with an amplitude of 0 for points without a modulation."""
-    values = points.of_law(law)
-    for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):
-        values[name] = np.where(np.isnan(values[name]), absent, values[name])
-    return values
 
 
 def _integrate(
@@ -109,11 +103,8 @@ def _integrate(
     settings: Mapping[str, Any],
     answers: Answers,
 ) -> None:
-    lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
-    steps, mistakes = planned_steps(lines, Path())
-    if mistakes:
-        raise InputError("; ".join(map(str, mistakes)))
-    programme = Programme(*(s.step for s in steps), load=values["W0"], velocity=values["V"])
+    steps = _planned(settings["steps"], named, Path())
+    programme = Programme(*steps, load=values["W0"], velocity=values["V"])
     trajectory = transient(
         slider_from(law, values),
         programme,
@@ -142,13 +133,14 @@ def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
     return TAKEN[entry["take"]](channel[inside]) if inside.any() else float("nan")
 
 
-class _WithUnits(dict[str, Any]):
-    """Values with their SI units as texts, by name, as a protocol writes them."""
-
-    def __init__(self, values: Mapping[str, float]) -> None:
-        known = all_parameters([])
-        units = {n: known[n].unit if n in known else "" for n in values}
-        super().__init__({n: f"{v!r} {units[n]}".strip() for n, v in values.items()})
+def _planned(lines: Iterable[str], values: Mapping[str, float], folder: Path) -> list[Any]:
+    """Steps of a protocol's lines, with values in SI in place of the names in braces."""
+    known = all_parameters([])
+    texts = {n: f"{v!r} {known[n].unit if n in known else ''}".strip() for n, v in values.items()}
+    steps, mistakes = planned_steps([line.format_map(texts) for line in lines], folder)
+    if mistakes:
+        raise InputError("; ".join(map(str, mistakes)))
+    return [planned.step for planned in steps]
 
 
 def _number(name: str, entry: NumberTable) -> dict[str, Any]:
@@ -173,7 +165,4 @@ def _check_steps(plan: Sweep, table: TransientTable) -> None:
             if name is not None and name not in known:
                 rule = "name parameters in braces"
                 raise InputError("transient.steps", rule, f"'{{{name}}}'", closest(name, known))
-    examples = _WithUnits(dict.fromkeys(known, 0.5))
-    _, mistakes = planned_steps([line.format_map(examples) for line in table.steps], plan.folder)
-    if mistakes:
-        raise InputError("; ".join(map(str, mistakes)))
+    _planned(table.steps, dict.fromkeys(known, 0.5), plan.folder)
