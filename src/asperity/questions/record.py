@@ -161,7 +161,7 @@ def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
     mistakes: dict[str, InputError] = {}
     for place, kind, value in numbers if _units_required.get() else ():
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and np.isfinite(value) and KINDS[kind].si:
+        if number and abs(value) < np.inf and KINDS[kind].si:
             advice = f"write it like '{KINDS[kind].example}'"
             mistake = InputError(place, "carry a unit", shown(value), advice)
             mistakes.setdefault(str(mistake), mistake)

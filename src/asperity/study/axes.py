@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from asperity.arrays import spaced
 from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
-from asperity.parameters import Parameter, canonical_name, obeying, suggestion
-from asperity.parameters.arguments import shown
+from asperity.parameters import Parameter, canonical_name, suggestion
+from asperity.parameters.arguments import number, shown
 from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
@@ -215,9 +215,9 @@ def law_name(law: Any, folder: Path) -> str:
 
 def checked_value(parameter: Parameter, value: Any) -> float:
     """One number of a plan in SI."""
-    number = parameter.check(value, parameter.name)
-    require(not np.ndim(number), parameter.name, "be one number", shown(value))
-    return float(number)
+    checked = parameter.check(value, parameter.name)
+    require(not np.ndim(checked), parameter.name, "be one number", shown(value))
+    return float(checked)
 
 
 def _ends(
@@ -263,7 +263,7 @@ def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter])
     if set(table) == {"mean", "std"} and column not in TEXTS:
         parameter = known[column]
         mean = checked_value(parameter, table["mean"])
-        std = float(obeying(table["std"], f"{parameter.name}.std", parameter.kind, "positive"))
+        std = number(table["std"], f"{parameter.name}.std", parameter.kind, "positive")
         return {"low": mean, "high": std, "kind": "normal"}
     low, high, spacing = _ends(name, table, known)
     return {"low": low, "high": high, "kind": spacing}

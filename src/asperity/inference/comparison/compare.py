@@ -337,9 +337,9 @@ def _freed(comparison: Comparison) -> str:
         return ""
     # The law with the fewest parameters that does: those that extend it do as well.
     for f in sorted(fits, key=lambda f: len(f.parameters)):
-        said = stiffness_that_describes(f)
-        if said:
-            return f" {said[0].upper()}{said[1:]}."
+        sentence = stiffness_that_describes(f)
+        if sentence:
+            return f" {sentence[0].upper()}{sentence[1:]}."
     return ""
 
 
@@ -360,11 +360,11 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
         return sorted(name for name, j in comparison.laws.items() if j.excluded)
 
     which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
-    said = (
+    outliers = (
         f"No law describes {enumerated(rows)} together with the other rows; check that "
         f"measurement. With it, {which} are excluded. Without it: "
     )
-    return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
+    return replace(rest, verdict=outliers + rest.verdict, left_out=tuple(rows))
 
 
 def _examined(comparison: Comparison, report: Report) -> Comparison:
@@ -393,7 +393,7 @@ def _examined(comparison: Comparison, report: Report) -> Comparison:
 
 def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
     """Sentences on evidence and cross-validation of the laws that are not excluded."""
-    said = ""
+    sentences = ""
     left = [n for n, j in judged.items() if not j.excluded and j.evidence and n != best]
     for name in left if best in judged else ():
         apart = _evidence_lost(judged[best], judged[name])
@@ -403,18 +403,18 @@ def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
             tells = (
                 f"disfavours {behind} against" if factor >= FACTOR else f"cannot tell {behind} from"
             )
-            said += (
+            sentences += (
                 f" The evidence {tells} {ahead}: a factor of {factor:.2g}, of which {FACTOR:g} "
                 "decides, with the priors stated."
             )
         first, second = judged[best].cross_validation, judged[name].cross_validation
         if first and second and math.isfinite(first.log_density + second.log_density):
             gain, error = first.difference(second)
-            said += (
+            sentences += (
                 f" Runs that were left out are predicted by {best} better than by {name} by "
                 f"{gain:.2g} +- {error:.2g} in the log density."
             )
-    return said
+    return sentences
 
 
 def judge(fits: Mapping[str, Fit]) -> Comparison:

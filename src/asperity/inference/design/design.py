@@ -466,11 +466,11 @@ class _Task:
     ) -> Design:
         candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
-        said = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
+        warnings = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
         simulation = None
         if simulate:
             simulation = self._simulated(n.astype(float), simulate, rival)
-            said += _surprises(simulation, errors)
+            warnings += _surprises(simulation, errors)
         return Design(
             plan=self.plan,
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
@@ -486,7 +486,7 @@ class _Task:
             combinations=candidates.total,
             left_out=candidates.left_out,
             simulation=simulation,
-            **{**numbers, "warnings": tuple(said)},
+            **{**numbers, "warnings": tuple(warnings)},
         )
 
     def _errors(self, n: Float) -> tuple[dict[str, ExpectedError], Float]:
@@ -511,28 +511,28 @@ class _Task:
         return errors, covariance / np.outer(sd, sd)
 
     def _warnings(self, errors: Mapping[str, ExpectedError], shares: Shares) -> list[str]:
-        said, usable = [], self.candidates.index.size
+        warnings, usable = [], self.candidates.index.size
         for unknown in self.plan.truth.unknowns:
             error = errors[unknown.name]
             slope = abs(unknown.slope(error.value))
             if error.se > UNDETERMINED * slope and (
                 unknown.name in (self.plan.question.measure or errors)
             ):
-                said.append(
+                warnings.append(
                     f"{unknown.name} will not be determined by these readings: its standard error "
                     f"will be {error.se:.3g} {error.unit}".rstrip()
                 )
         if shares.efficiency < _TRUSTED:
-            said.append(
+            warnings.append(
                 f"the search for the best shares ended early: they are at least "
                 f"{shares.efficiency:.2g} times as good as the best possible"
             )
         if usable < _FEW * len(errors):
-            said.append(
+            warnings.append(
                 f"only {usable} of {self.candidates.total} combinations can be used; "
                 "the ranges decide this design more than the question"
             )
-        return said
+        return warnings
 
     def _point(self, i: int, n: NDArray[np.int64]) -> DesignedPoint:
         readings = self.expected
@@ -613,17 +613,17 @@ def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
 
 def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
     """Where the simulated fits differ from what was expected."""
-    said = []
+    warnings = []
     if simulation.failed:
-        said.append(
+        warnings.append(
             f"{simulation.failed} of {simulation.failed + simulation.sets} simulated fits did not "
             "converge"
         )
     for name, spread in simulation.spread.items():
         se, error = errors[name].se, simulation.uncertainty[name]
         if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
-            said.append(
+            warnings.append(
                 f"the simulated spread of {name}, {spread:.3g}, is not the expected standard error "
                 f"{se:.3g}: predictions are not linear in it over so wide a range"
             )
-    return said
+    return warnings
