@@ -88,38 +88,27 @@ class TransientSolve(SolveKind):
         values = points.of_law(law.name)
         for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):  # without a modulation
             values[name] = np.where(np.isnan(values[name]), absent, values[name])
+        settings = record["settings"]
         for k in solvable(law, values, answers):
             point = {n: float(v[k]) for n, v in values.items()}
             named = {n: float(v[k]) for n, v in points.values.items()} | point
-            _integrate(law, point, named, int(k), record["settings"], answers)
+            steps = _planned(settings["steps"], named, Path())
+            trajectory = transient(
+                slider_from(law, point),
+                Programme(*steps, load=point["W0"], velocity=point["V"]),
+                sampling=settings["sampling"],
+                inertia=bool(point["inertia"]),
+                radiation_damping=point["eta"] if point["eta"] > 0 else None,
+                rtol=settings["rtol"],
+                most_steps=settings["most_steps"],
+            )
+            if trajectory.termination is not None:
+                answers.fail(k, SweepOutcome.STOPPED, trajectory.termination.time)
+                continue
+            for name, entry in settings["numbers"].items():
+                answers.numbers[name][k] = _statistic(trajectory, entry)
+            answers.outcome[k] = SweepOutcome.CONVERGED
         return answers
-
-
-def _integrate(
-    law: type[Law],
-    values: dict[str, float],
-    named: Mapping[str, float],
-    row: int,
-    settings: Mapping[str, Any],
-    answers: Answers,
-) -> None:
-    steps = _planned(settings["steps"], named, Path())
-    programme = Programme(*steps, load=values["W0"], velocity=values["V"])
-    trajectory = transient(
-        slider_from(law, values),
-        programme,
-        sampling=settings["sampling"],
-        inertia=bool(values["inertia"]),
-        radiation_damping=values["eta"] if values["eta"] > 0 else None,
-        rtol=settings["rtol"],
-        most_steps=settings["most_steps"],
-    )
-    if trajectory.termination is not None:
-        answers.fail(row, SweepOutcome.STOPPED, trajectory.termination.time)
-        return
-    for name, entry in settings["numbers"].items():
-        answers.numbers[name][row] = _statistic(trajectory, entry)
-    answers.outcome[row] = SweepOutcome.CONVERGED
 
 
 def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
