@@ -139,7 +139,7 @@ def _warnings_as_sentences() -> Iterator[None]:
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
         text = printable(str(message))
         if issubclass(category, RuntimeWarning) and " encountered in " in text:
-            text = f"a number left the range of doubles on the way ({text})"
+            text = f"a number of the computation exceeded the range of doubles ({text})"
         if text not in shown:
             shown.add(text)
             click.echo(f"asperity: warning: {text}", err=True)

@@ -107,11 +107,6 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
             mistakes.append(error.about(place) if error.rule else f"axes.{name}: {error}")
     if not plan.axes:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
-    numbers: dict[str, float] = {}
-    origins: dict[str, str] = {}
-    settings: dict[str, Any] = {}
-    outputs: tuple[str, ...] = ()
-    supplied: tuple[str, ...] = ()
     with _noted(mistakes):
         numbers, origins = _numbers(plan, axes, laws, known)
     with _noted(mistakes):

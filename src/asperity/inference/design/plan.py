@@ -105,8 +105,8 @@ class DesignPlan:
 
     def candidates(self) -> dict[str, Float]:
         """Every combination of the levels, by name of the axis, the last axis fastest."""
-        grid = np.array(list(itertools.product(*self.axes.values())))
-        return dict(zip(self.axes, grid.T, strict=True))
+        grid = np.meshgrid(*self.axes.values(), indexing="ij")
+        return {name: levels.ravel() for name, levels in zip(self.axes, grid, strict=True)}
 
 
 def expected_values(hypothesis: Objective) -> dict[str, float]:

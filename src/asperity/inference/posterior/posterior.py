@@ -230,8 +230,8 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
             )
         elif min(p.ess_bulk, p.ess_tail) < _ENOUGH * chains:
             warnings.append(
-                f"draws of {name} are worth only {p.ess_bulk:.0f} independent ones (in the tails "
-                f"{p.ess_tail:.0f}); sample more"
+                f"draws of {name} say as much as {p.ess_bulk:.0f} independent ones (in the tails "
+                f"{p.ess_tail:.0f}), which is too few; sample more"
             )
     failed, lost = int(stats.failed.sum()), int((stats.diverging & ~stats.failed).sum())
     if lost:
