@@ -25,6 +25,7 @@ from asperity.operating_point import (
     without_numbers,
 )
 from asperity.parameters import Parameter, canonical_name, point_parameters
+from asperity.parameters.arguments import one_of
 from asperity.questions.record import without_unit
 from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
@@ -113,7 +114,9 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         solve = SOLVES[plan.solve]
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
-        outputs = solve.chosen_outputs(named)
+        offered = solve.known_outputs(laws, settings)
+        asked = plan.outputs or solve.defaults or offered
+        outputs = dict.fromkeys(one_of(name, offered, "outputs") for name in asked)
         supplied = solve.supplied(named)
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)

@@ -30,7 +30,6 @@ class ThresholdSolve(SolveKind):
         Output("mode_frequency", "Hz", "frequency of the mode that starts to grow, modulo f"),
         Output("bifurcation", "1", "0: fold, 1: period doubling, 2: Neimark-Sacker"),
     )
-    defaults = tuple(output.name for output in outputs)
     supplies = ("K",)
     # Enough to share the fixed costs of a search.
     fewest, most = 24, 480

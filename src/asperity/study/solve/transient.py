@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +47,6 @@ class TransientSolve(SolveKind):
     """`asperity.transient` at every point, from steady sliding at V under W0."""
 
     name = "transient"
-    outputs = ()
-    defaults = ()
     # A load programme need not have a modulation.
     supplies = ("epsilon", "frequency")
 
@@ -58,6 +56,9 @@ class TransientSolve(SolveKind):
         assert table is not None  # a plan has the settings of its solve
         advice = "write it like numbers.peak = { of = 'friction', take = 'max' }"
         require(table.numbers, "transient.numbers", "have at least one number", "none", advice)
+        if plan.outputs is not None:
+            rule = "be left out where solve is 'transient'"
+            raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
         numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
         _check_steps(plan, table)
         return {
@@ -68,18 +69,11 @@ class TransientSolve(SolveKind):
             "numbers": numbers,
         }
 
-    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
+    def known_outputs(self, laws: Sequence[str], settings: Mapping[str, Any]) -> dict[str, Output]:
         """The numbers that the plan names."""
-        if plan.outputs is not None:
-            rule = "be left out where solve is 'transient'"
-            raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
-        return tuple(plan.transient.numbers) if plan.transient is not None else ()
-
-    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
-        """As in `SolveKind`."""
         return {
             name: Output(name, CHANNELS[entry["of"]], f"{entry['take']} of {entry['of']}")
-            for name, entry in record["settings"]["numbers"].items()
+            for name, entry in settings["numbers"].items()
         }
 
     def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
