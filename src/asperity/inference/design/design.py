@@ -27,7 +27,13 @@ from asperity.inference.design.candidates import (
     with_readings,
 )
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
-from asperity.inference.design.rival import RivalFit, penalty, probability_of_deciding, separation
+from asperity.inference.design.rival import (
+    RivalFit,
+    penalty,
+    probability_of_deciding,
+    reached,
+    separation,
+)
 from asperity.inference.design.shares import (
     Determinant,
     EvenGrid,
@@ -130,7 +136,8 @@ class Design:
     correlation : array, shape (n, n)
         Of the coordinates of the free parameters.
     fewer : float
-        How many times fewer readings than an even grid give the same interval, or chi-squared.
+        How many times fewer readings than an even grid give the same interval, or chi-squared;
+        NaN where a fit of the rival has not reached a minimum.
     grid_levels : tuple of int
         Levels of the even grid along each axis of the plan.
     grid_usable : (int, int)
@@ -146,7 +153,7 @@ class Design:
     chi2, chi2_grid : float or None
         Expected chi-squared by which the refitted rival is behind.
     probability, probability_grid : float or None
-        Of excluding the rival.
+        Of excluding the rival; None where its fit has not reached a minimum.
     rival_values : mapping of str to float or None
         Parameters with which the rival comes nearest to the design's readings.
     simulation : Simulated or None
@@ -278,8 +285,9 @@ _FEW = 3
 #: A simulated spread surprises if it differs by more of its own standard errors, plus this share
 #: of the expected one.
 _SURPRISING, _LINEAR = 3.0, 0.1
-#: Decrease of chi-squared that is left at the end of a fit that has not converged.
-_LEFT = 0.01
+#: Mean chi-squared of a reading below which two laws give the same readings. Of the pairs of eight
+#: laws at numbers of PMMA, those of which one contains the other have 1e-27, all others 1 or more.
+_SAME = 1e-12
 
 
 def design(
@@ -409,32 +417,55 @@ class _Task:
         plan, total = self.plan, self.plan.budget
         fits = RivalFit(plan, rival, self.candidates.points, self.expected)
         result = separation(fits, self.cost, total, self.report)
-        grid = self.grid.readings(self.cost, total)
-        on_grid = fits.fitted(grid, result.u)
+        n, grid = result.readings.astype(float), self.grid.readings(self.cost, total)
+        best, name = result.fitted, rival.law.name
+        values = "; ".join(f"{key} = {v:.4g}" for key, v in rival.named(best.u).items())
+        field = f"{plan.name}.rival"
+        if not math.isfinite(best.chi2):
+            rule, got = "have responses where the law has them", f"'{name}', which lost them"
+            advice = "narrow the ranges, or free fewer of its parameters"
+            raise InputError(field, rule, got, advice)
+        if best.chi2 < _SAME * n.sum():
+            rule = f"give other readings than {plan.truth.law.name} in the ranges"
+            got, advice = f"'{name}', which gives the same with {values}", "exchange the two laws"
+            raise InputError(field, rule, got, f"{advice}, or fix some of its parameters")
+        on_grid = fits.fitted(grid, best.u)
         probable, probable_on_grid = (
             probability_of_deciding(self.jacobian, linear, readings, plan.question.seed)
-            for linear, readings in (
-                (result.criterion, result.readings.astype(float)),
-                (fits.criterion(on_grid.u)[0], grid),
+            if fits.reached(readings, end)
+            else None
+            for readings, end, linear in (
+                (n, best, result.criterion),
+                (grid, on_grid, fits.criterion(on_grid.u, grid)[0]),
             )
         )
+        warnings = [
+            f"the fit of {name} to {where} ended next to values with which it has no response: "
+            "its chi-squared is not the least, and the probability of deciding is not known"
+            for where, p in (("these readings", probable), ("the even grid", probable_on_grid))
+            if p is None
+        ]
+        fewer = best.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf
         numbers: dict[str, Any] = {
-            "fewer": result.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf,
-            "chi2": result.chi2,
+            "fewer": math.nan if warnings else fewer,
+            "chi2": best.chi2,
             "chi2_grid": on_grid.chi2,
             "probability": probable,
             "probability_grid": probable_on_grid,
-            "rival_values": rival.named(result.u),
+            "rival_values": rival.named(best.u),
         }
         if result.unseen:
-            numbers["warnings"] = (
-                f"{rival.law.name} has no response at {result.unseen} candidates with the "
-                "values that come nearest; they were not judged",
+            warnings.append(
+                f"{name} has no response at {result.unseen} candidates with the values that come "
+                "nearest; they were not judged"
             )
-        whole = result.criterion.least_efficiency(result.chi2_shares - result.chi2, result.chi2)
-        reached = result.shares.efficiency * whole
-        other = (fits, result.u)
-        return self._described(result.readings, result.shares, reached, simulate, numbers, other)
+        numbers["warnings"] = warnings
+        whole = result.criterion.least_efficiency(result.chi2_shares - best.chi2, best.chi2)
+        shares, other = result.shares, (fits, best.u)
+        if probable is None:  # the bound is of a minimum
+            shares = replace(shares, efficiency=0.0)
+        least = shares.efficiency * whole
+        return self._described(result.readings, shares, least, simulate, numbers, other)
 
     def _determinant(self) -> Determinant:
         """The criterion at the expected values, or averaged over the draws."""
@@ -597,8 +628,7 @@ def _refitted(
     other = term.with_table(readings).weighted(np.sqrt(counts))
     objective = replace(objective, terms=(other,))
     end = objective.minimise(u)
-    reached = math.isfinite(end.chi2) and objective.expected_decrease(end.u) < _LEFT
-    return end if reached else None
+    return end if reached(objective, end.u) else None
 
 
 def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
