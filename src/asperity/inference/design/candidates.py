@@ -22,9 +22,9 @@ from asperity.inference.objective import Objective
 from asperity.inference.tables.residuals import Prediction, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm, on_contacts
-from asperity.operating_point import respond
-from asperity.orbit import Outcome
+from asperity.orbit import Outcome, periodic_response
 from asperity.parameters.parameter import RULES
+from asperity.slider.named import slider_from
 
 Progress = Callable[[int, int, str], None]
 
@@ -155,16 +155,21 @@ def _reasons(
 ) -> NDArray[np.str_]:
     """Why each point has no stable response, shape (n,); empty where it has one."""
     given = on_contacts({**plan.truth.fixed, **points, **values})
-    given["inertia"] = float(plan.question.inertia)
-    if not plan.question.radiation_damping:
-        given["eta"] = 0.0
     beyond = given["epsilon"] >= 1
     reasons = np.where(beyond, "contact would be lost", "").astype(object)
     left = np.flatnonzero(~beyond)
     for start in range(0, left.size, _BLOCK):
         block = left[start : start + _BLOCK]
         some = {n: v[block] if np.ndim(v) else v for n, v in given.items()}
-        response = respond(plan.truth.law, some, harmonics=2)
+        response = periodic_response(
+            slider_from(plan.truth.law, some),
+            velocity=some["V"],
+            epsilon=some["epsilon"],
+            frequency=some["frequency"],
+            inertia=plan.question.inertia,
+            radiation_damping=some["eta"] if plan.question.radiation_damping else None,
+            harmonics=2,
+        )
         converged, stable, texts = (
             np.broadcast_to(a, block.shape)
             for a in (response.converged, response.stable, response.result)
