@@ -1,6 +1,6 @@
 """``python -m asperity`` is the command ``asperity``."""
 
-from asperity.cli.main import main
+from asperity.cli.main import run
 
 if __name__ == "__main__":
-    main(prog_name="asperity")
+    run()

@@ -34,6 +34,14 @@ class Argument(NamedTuple):
     key: str = ""
     value: str = ""
 
+    @property
+    def whole(self) -> str:
+        """The name without the numbers of the parts of lists at its end."""
+        name = self.name
+        while name.rpartition(".")[2].isdigit():
+            name = name.rpartition(".")[0]
+        return name
+
     def __str__(self) -> str:
         return _words.get()(self)
 

@@ -172,7 +172,7 @@ def test_a_warning_is_a_line_without_a_path(monkeypatch, capsys) -> None:
     shown = capsys.readouterr()
     assert shown.out == "answer\n"
     assert shown.err.splitlines() == [
-        "asperity: warning: a number left the range of doubles on the way "
+        "asperity: warning: a number of the computation exceeded the range of doubles "
         "(overflow encountered in square)",
         "asperity: warning: a library has its say",
     ]

@@ -24,8 +24,8 @@ from starlette.types import Receive, Scope, Send
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, question_in
+from asperity.app.jobs import threads as compiling
 from asperity.app.jobs.processes import Jobs
-from asperity.app.jobs.threads import Preparation
 from asperity.app.security import BODY_LIMIT, Guard, body_too_slow, sentence
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
@@ -81,10 +81,8 @@ def build(
             else:
                 handler = _answer(endpoint, threads)
             routes.append(Route(path, handler, methods=["POST"]))
-    preparation = Preparation(tasks)
-    for module in modules:
-        if hasattr(module, "use"):
-            module.use(preparation)
+    preparation = compiling.Preparation(tasks)
+    compiling.use(preparation)
 
     async def state(request: Request) -> Response:
         return _json(to_json(preparation.state()))

@@ -7,16 +7,14 @@ lists the modules.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import ValidationError
 from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
-from asperity.errors import InputError, require
+from asperity.errors import InputError, MistakesError, require
 from asperity.questions import record as questions
 
 
@@ -134,9 +132,9 @@ async def question_in(request: Request, kind: type[Question]) -> Any:
     holds = isinstance(value, dict)
     require(holds, "request.body", "be a JSON object", "another value", "send an object")
     try:
-        return kind.model_validate(value)
-    except ValidationError as error:
-        raise questions.mistakes_in(error, kind, "request", shown=_shown)[0] from None
+        return kind(**value)
+    except MistakesError as error:
+        raise error.errors[0] from None
     except RecursionError:
         raise InputError("request.body", "not be nested so deep", "more", "send less") from None
 
@@ -161,10 +159,3 @@ def _require_short(value: Any, field: str = "request") -> None:
 
 def _no_constant(name: str) -> float:
     raise ValueError(name)
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, float) and not math.isfinite(value):
-        return "a number out of range"
-    text = json.dumps(value, ensure_ascii=False, default=str)
-    return text if len(text) <= 60 else f"a value of {len(text)} characters"

@@ -53,10 +53,8 @@ _ROLES: Mapping[str, str] = {
 
 def in_labels(argument: Argument) -> str:
     """The words of the page: ``Normal load``, ``Unit of Fn: N``."""
-    name, key, value = argument
     # A part of a list has the label of the list.
-    while name.rpartition(".")[2].isdigit():
-        name = name.rpartition(".")[0]
+    name, key, value = argument.whole, argument.key, argument.value
     head, _, field = name.partition(".")
     if head in ("data", "runs") and field:
         head, _, field = (field.partition(".")[2] or field).rpartition(".")

@@ -23,18 +23,11 @@ if TYPE_CHECKING:
     from asperity.air import AirLayer
     from asperity.materials import Material
 
-#: Kind of each parameter, and the name of the material's number where it is another.
-_LAYER = {
-    "R": ("length", "R"),
-    "h0": ("length", "h0"),
-    "P0": ("pressure", "P0"),
-    "eta": ("viscosity", "eta_air"),
-}
-_CONTACT = {
-    "W0": ("force", "W0"),
-    "M": ("mass", "M"),
-    "lambda_z": ("length", "lambda_z"),
-}
+#: Kind of each number.
+_LAYER = {"R": "length", "h0": "length", "P0": "pressure", "eta": "viscosity"}
+_CONTACT = {"W0": "force", "M": "mass", "lambda_z": "length"}
+#: Names in materials, where they are others.
+_PUBLISHED = {"eta": "eta_air"}
 
 _EPILOG = """\b
 Examples:
@@ -49,12 +42,9 @@ Parameters: R, h0, P0, eta of the layer; W0, M, lambda_z of the slider.
 
 @click.command(epilog=_EPILOG)
 @option(
-    "-f --frequency frequencies",
-    "VALUE",
-    'Modulation frequency, like "120 Hz"; repeatable.',
-    multiple=True,
-    required=True,
-)
+    "-f --frequency frequencies", "VALUE", 'Modulation frequency, like "120 Hz"; repeatable.',
+    multiple=True, required=True,
+)  # fmt: skip
 @material_option()
 @set_option('--set "R=2.5 cm"')
 @switch("--vacuum", "Without air between the surfaces.")
@@ -89,18 +79,15 @@ def air(
     unknown = {"radius": "R", "gap": "h0"}.get(sought or "", "")
     numbers = _numbers(settings_of(settings), material_named(material), vacuum, unknown)
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
-    contact = {name: numbers[name] for name in _CONTACT}
     layer = None
     if not vacuum:
         # The layer must be complete, though the value of what is sought is not used.
-        R, h0, P0, eta = (1.0 if name == unknown else numbers[name] for name in _LAYER)
+        R, h0, P0, eta = (numbers.get(name, 1.0) for name in _LAYER)
         layer = AirLayer(P0=P0, h0=h0, eta=eta, R=R)
-    if inverse is None:
-        _forward(hertz, contact, layer, numbers, output)
-        return 0
-    assert layer is not None
+    if inverse is None or layer is None:
+        return _forward(hertz, layer, numbers, output)
     ratio = number(inverse, "--inverse", "dimensionless", "positive")
-    return _invert(ratio, unknown, hertz[0], contact, layer, numbers, output)
+    return _invert(ratio, unknown, hertz[0], layer, numbers, output)
 
 
 def _numbers(
@@ -109,42 +96,36 @@ def _numbers(
     """SI values of the parameters; the one that is sought need not be known."""
     from asperity.units import KINDS
 
-    chosen = _CONTACT if vacuum else _LAYER | _CONTACT
+    kinds = _CONTACT if vacuum else _LAYER | _CONTACT
     for name, text in given.items():
-        needless = vacuum and name in _LAYER
+        rule = "not be given with --vacuum"
         require(
-            not needless,
-            f"--set {name}",
-            "not be given with --vacuum",
-            f"'{text}'",
-            "leave one out",
+            not (vacuum and name in _LAYER), f"--set {name}", rule, f"'{text}'", "leave one out"
         )
-        one_of(name, chosen, "--set")
-    numbers = {n: number(text, f"--set {n}", chosen[n][0], "positive") for n, text in given.items()}
-    for name, (_, published) in chosen.items():
-        if name not in numbers and material is not None and published in material:
+        one_of(name, kinds, "--set")
+    numbers = {n: number(text, f"--set {n}", kinds[n], "positive") for n, text in given.items()}
+    for name in kinds:
+        published = _PUBLISHED.get(name, name)
+        if name not in (*numbers, unknown) and material is not None and published in material:
             numbers[name] = material[published].si
-    missing = [name for name in chosen if name not in numbers and name != unknown]
+    missing = [name for name in kinds if name not in (*numbers, unknown)]
     if missing:
-        example = f"{missing[0]}={KINDS[chosen[missing[0]][0]].example}"
+        example = f"{missing[0]}={KINDS[kinds[missing[0]]].example}"
         advice = f'name a material that has them or give each one, like --set "{example}"'
         require(False, "air", "have all its numbers", f"none for {', '.join(missing)}", advice)
     return numbers
 
 
 def _forward(
-    hertz: list[float],
-    contact: dict[str, float],
-    layer: AirLayer | None,
-    numbers: dict[str, float],
-    output: Output,
-) -> None:
+    hertz: list[float], layer: AirLayer | None, numbers: dict[str, float], output: Output
+) -> int:
     import numpy as np
 
     from asperity.air import effective_modulation, modulation_phase
     from asperity.outputs.tables import Section
     from asperity.units import format_si
 
+    contact = {name: numbers[name] for name in _CONTACT}
     head = ["frequency", "eps_eff/eps", "phase (rad)"]
     columns = {
         "ratio": effective_modulation(hertz, layer=layer, **contact),
@@ -172,13 +153,13 @@ def _forward(
         lambda: [Section("", head=tuple(head), rows=rows)],
         indent="",
     )
+    return 0
 
 
 def _invert(
     ratio: float,
     unknown: str,
     hertz: float,
-    contact: dict[str, float],
     layer: AirLayer,
     numbers: dict[str, float],
     output: Output,
@@ -189,7 +170,7 @@ def _invert(
 
     solve: Any
     sought, solve = {"R": ("radius", patch_radius), "h0": ("gap", gap)}[unknown]
-    result = solve(ratio, hertz, layer=layer, **contact)
+    result = solve(ratio, hertz, layer=layer, **{name: numbers[name] for name in _CONTACT})
     lengths = tuple(f"{unknown} = {format_si(v, 'length', 6)}" for v in result.solutions)
     if output.as_json or lengths:
         output.answer(

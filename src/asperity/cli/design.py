@@ -91,6 +91,8 @@ def _sections(result: Design) -> list[Section]:
     grid = " x ".join(f"{m} {n}" for n, m in zip(axes, result.grid_levels, strict=True))
     what = "chi-squared" if plan.rival is not None else "interval"
     fewer = "infinitely many" if math.isinf(result.fewer) else f"{result.fewer:.3g}"
+    if math.isnan(result.fewer):
+        fewer = "an unknown number of"
     lines = [
         f"{fewer} times fewer readings than an even grid for the same {what} ({grid}; "
         f"{result.grid_usable[0]} of {result.grid_usable[1]} usable)",
@@ -101,10 +103,18 @@ def _sections(result: Design) -> list[Section]:
     ]
     if plan.rival is not None:
         values = "; ".join(f"{n} = {v:.4g}" for n, v in (result.rival_values or {}).items())
+        chi2, chi2_grid, probable, on_grid = (
+            f"{x:.{digits}g}" if x is not None and math.isfinite(x) else "unknown"
+            for x, digits in (
+                (result.chi2, 4),
+                (result.chi2_grid, 4),
+                (result.probability, 3),
+                (result.probability_grid, 3),
+            )
+        )
         lines.append(
-            f"expected chi-squared {result.chi2:.4g} (even grid {result.chi2_grid:.4g}), "
-            f"probability of deciding {result.probability:.3g} "
-            f"(even grid {result.probability_grid:.3g}); "
+            f"expected chi-squared {chi2} (even grid {chi2_grid}), "
+            f"probability of deciding {probable} (even grid {on_grid}); "
             f"{plan.rival.law.name} comes nearest with {values}"
         )
     for axis, levels in result.alone.items():

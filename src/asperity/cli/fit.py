@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Command,
     Count,
+    Decorator,
     field_option,
     law_options,
     option,
     output_options,
     parameter_name,
     settings_of,
+    stacked,
     switch,
 )
 from asperity.cli.recording import listed_times, source_options, velocities_option
@@ -123,12 +125,7 @@ _THEN = (
 )
 
 
-def _with_name(prior: str) -> str:
-    name, equals, value = prior.partition("=")
-    return f"{parameter_name(name.strip())}={value}" if equals else prior
-
-
-def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _question_options(*further: Decorator) -> Decorator:
     """Options of data and estimation; the command gets `fields` of its question.
 
     Parameters
@@ -137,7 +134,7 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
         Of this command alone, which follow those that are needed first.
     """
 
-    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    def with_options(command: Command) -> Command:
         @wraps(command)
         def gathered(
             *,
@@ -163,7 +160,10 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
                     "data": [{"file": path, "source": source, **of_run} for path in data],
                     "fixed": settings_of(fixed, "--fix"),
                     "start": settings_of(start, "--start"),
-                    "prior": [_with_name(text) for text in prior],
+                    "prior": [
+                        f"{parameter_name(name.strip())}{equals}{value}" if equals else name
+                        for name, equals, value in (text.partition("=") for text in prior)
+                    ],
                     **{n: v for n in _FIELDS if (v := others.pop(n, None)) is not None},
                 }
                 if "free" in fields:
@@ -182,10 +182,7 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
             output_options(plot=True),
             *_FIRST,
         )
-        result: Callable[..., Any] = gathered
-        for add in reversed((*first, source_options, *_THEN, *further)):
-            result = add(result)
-        return result
+        return stacked(*first, source_options, *_THEN, *further)(gathered)
 
     return with_options
 

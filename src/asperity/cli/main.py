@@ -7,6 +7,7 @@ it runs, so that ``asperity --version`` costs nothing.
 from __future__ import annotations
 
 import os
+import signal
 
 import click
 
@@ -75,5 +76,15 @@ def main(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
+def run() -> None:
+    """Run the command as a process, which Ctrl-C ends without a word once the command is done."""
+    try:
+        main(prog_name="asperity")
+    finally:
+        # Threads and worker processes may take a while to end.
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 if __name__ == "__main__":
-    main(prog_name="asperity")
+    run()

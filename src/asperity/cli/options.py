@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable
-from functools import wraps
+from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
+
+
+def stacked(*decorators: Decorator) -> Decorator:
+    """Several decorators as one, the first of them outermost."""
+    return lambda command: reduce(lambda inner, add: add(inner), reversed(decorators), command)
 
 
 class Count(click.ParamType):
@@ -149,10 +154,7 @@ def output_options(*, plot: bool = False) -> Decorator:
         ) -> Any:
             return command(output=Output(as_json, names, plot), **others)
 
-        result: Command = gathered
-        for add in reversed(_OUTPUT if plot else _OUTPUT[1:]):
-            result = add(result)
-        return result
+        return stacked(*(_OUTPUT if plot else _OUTPUT[1:]))(gathered)
 
     return with_options
 
@@ -194,10 +196,7 @@ def point_options(command: Command) -> Command:
     drive = [_option(parameter) for parameter in DRIVE.values() if parameter.options]
     machine = [_option(parameter) for parameter in MACHINE.values() if parameter.options]
     numbers = set_option('--set A=0.013 --set "K=0.3 N/um"')
-    result: Command = gathered
-    for add in reversed((law_option(), material_option(), *drive, numbers, *machine)):
-        result = add(result)
-    return result
+    return stacked(law_option(), material_option(), *drive, numbers, *machine)(gathered)
 
 
 def law_option(
@@ -221,7 +220,7 @@ def law_options(command: Command) -> Command:
         parts = (part.strip() for text in texts for part in text.split(","))
         return tuple(known_place(part) for part in parts if part)
 
-    result: Command = option(
+    return option(
         "--law --laws laws",
         "NAME",
         "Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
@@ -229,7 +228,6 @@ def law_options(command: Command) -> Command:
         multiple=True,
         callback=names,
     )(command)
-    return result
 
 
 def known_place(text: str) -> str:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from asperity.cli.options import option
+from asperity.cli.options import Command, option, stacked
 from asperity.errors import InputError, require
-
-Command = Callable[..., Any]
-
 
 #: Where no channel has the motion of the drive.
 velocities_option = option(
@@ -95,17 +91,19 @@ def source_options(command: Command) -> Command:
         roles = {role: others.pop(o.lstrip("-")) for role, o in COLUMN_OPTIONS.items()}
         roles |= dict(_name_value_pairs(columns, "--column"))
         source = Source(
-            columns={role: _name_or_number(n) for role, n in roles.items() if n is not None},
+            # Columns of files without headers are chosen by number, in the digits 0 to 9.
+            columns={
+                role: int(name) if re.fullmatch(r"[0-9]{1,9}", name) else name
+                for role, name in roles.items()
+                if name is not None
+            },
             units=dict(_name_value_pairs(units, "--unit")),
             channels=_expressions_of(channels),
             **{name: others.pop(name) for name in _FIELDS},
         )
         return command(source=source, **others)
 
-    result: Command = gathered
-    for add in reversed(_OPTIONS):
-        result = add(result)
-    return result
+    return stacked(*_OPTIONS)(gathered)
 
 
 def _name_value_pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
@@ -131,8 +129,3 @@ def _expressions_of(texts: tuple[str, ...]) -> dict[str, str]:
         require(name not in made, "--channel", once, "two", "leave one out")
         made[name] = expression
     return made
-
-
-def _name_or_number(name: str) -> str | int:
-    """Columns of files without headers are chosen by number: in the digits 0 to 9."""
-    return int(name) if name.isascii() and name.isdigit() and len(name) < 10 else name

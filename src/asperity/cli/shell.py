@@ -95,18 +95,15 @@ class Shell(click.Group):
 
         Click's standalone mode is not used: its messages take several lines.
         """
-        try:
-            with ending_at_once(), _warnings_as_sentences(), naming(in_options):
-                try:
-                    code = super().main(
-                        args, prog_name, complete_var, standalone_mode=False, **extra
-                    )
-                except InputError as error:
-                    code = _print_error(str(error), _BAD_INPUT)
-        except click.Abort as abort:
-            code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
-        except click.ClickException as error:
-            code = _print_error(str(_in_our_words(error)), _BAD_INPUT)
+        with ending_at_once(), _warnings_as_sentences(), naming(in_options):
+            try:
+                code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            except InputError as error:
+                code = _print_error(str(error), _BAD_INPUT)
+            except click.Abort as abort:
+                code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
+            except click.ClickException as error:
+                code = _print_error(str(_in_our_words(error)), _BAD_INPUT)
         sys.exit(code)
 
 
@@ -142,7 +139,7 @@ def _warnings_as_sentences() -> Iterator[None]:
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
         text = printable(str(message))
         if issubclass(category, RuntimeWarning) and " encountered in " in text:
-            text = f"a number left the range of doubles on the way ({text})"
+            text = f"a number of the computation exceeded the range of doubles ({text})"
         if text not in shown:
             shown.add(text)
             click.echo(f"asperity: warning: {text}", err=True)

@@ -43,10 +43,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     from asperity.parameters import DRIVE, MACHINE
     from asperity.questions.options import COLUMN_OPTIONS, MEASURE_OPTIONS, SOURCE_OPTIONS
 
-    name, key, value = argument
     # A part of a list has the option of the list.
-    while name.rpartition(".")[2].isdigit():
-        name = name.rpartition(".")[0]
+    name, key, value = argument.whole, argument.key, argument.value
     if name in ("columns", "Trace.channel") and key:
         if key in COLUMN_OPTIONS:
             return f"{COLUMN_OPTIONS[key]} {_quoted(value)}".rstrip()

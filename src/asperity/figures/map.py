@@ -22,7 +22,7 @@ from scipy.ndimage import distance_transform_edt
 from asperity.arrays import Float
 from asperity.figures.style import new_figure
 from asperity.parameters import DRIVE, INTERFACE, MACHINE, OUTPUTS
-from asperity.units import KINDS
+from asperity.units import display_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -151,11 +151,8 @@ def keys(dataset: xarray.Dataset) -> list[Any]:
 
 def axis_unit(side: xarray.DataArray) -> tuple[float, str]:
     """Factor and name of the unit in which an axis reads best."""
-    unit = side.attrs["units"]
-    ladder = next((k.ladder for k in KINDS.values() if k.si == unit), ())
-    top = float(np.max(side.values))
-    fitting = [(10.0**power, name) for name, power in ladder if top >= 10.0**power]
-    return fitting[-1] if fitting else (1.0, "" if unit == "1" else unit)
+    unit, power = display_unit(float(np.max(side.values)), side.attrs["units"])
+    return 10.0**power, "" if unit == "1" else unit
 
 
 def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:

@@ -19,7 +19,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from asperity.arrays import Float, Index
+from asperity.arrays import Bool, Float, Index
 from asperity.errors import Argument, InputError
 from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
@@ -469,10 +469,14 @@ class Objective:
         """
         r, J = self.residuals(u)
         gradient = J.T @ r
-        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
-        outwards = np.where(gradient > 0, u - low, high - u) < _AT_BOUND
-        J, gradient = J[:, ~outwards], gradient[~outwards]
+        moving = ~self.held(u, gradient)
+        J, gradient = J[:, moving], gradient[moving]
         return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
+
+    def held(self, u: Float, gradient: Float) -> Bool:
+        """Coordinates that a bound keeps from lowering chi-squared, by its gradient at u."""
+        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
+        return np.asarray(np.where(gradient > 0, u - low, high - u) < _AT_BOUND)
 
     def terms_of(self, kind: type[T]) -> list[T]:
         """The sets of data of one kind, tables or recordings."""

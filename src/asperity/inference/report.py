@@ -131,7 +131,7 @@ def _gauges(table: LockInTable) -> str:
 
     A low-pass of first order with the corner f_c turns a phase at f by f/f_c.
     """
-    asked = [
+    corners = [
         (n * frequency / error, n * frequency, error)
         for n in (1, 2)
         for frequency, error in zip(
@@ -139,9 +139,9 @@ def _gauges(table: LockInTable) -> str:
         )
         if np.isfinite(error) and error > 0
     ]
-    if not asked:
+    if not corners:
         return ""
-    corner, frequency, error = max(asked)
+    corner, frequency, error = max(corners)
     return (
         f"{table.name}: noise leaves {error:.2g} rad to the phase at "
         f"{quantity_text(frequency, 'Hz', 3)}; a gauge or filter with a low-pass below "
@@ -189,7 +189,7 @@ def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[
         name: [w for w in j.fit.warnings if w not in j.fit.because.values()]
         for name, j in comparison.laws.items()
     }
-    # What every law is warned of is said once: it is about the data.
+    # A warning that every law has is about the data, and is given once.
     first = next(iter(warnings.values()), [])
     of_data = [w for w in first if all(w in warned for warned in warnings.values())]
     of_laws = [f"{n}: {w}" for n, warned in warnings.items() for w in warned if w not in of_data]

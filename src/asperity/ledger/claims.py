@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
-from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind, Uncertainty
+from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind
 from asperity.ledger.sentences import fill
 from asperity.materials import Material
 from asperity.outputs.json import plain
@@ -70,12 +70,8 @@ def find_checks(module: ModuleType) -> dict[str, Check]:
             for claim, arguments in getattr(value, _MARK, ()):
                 rule, advice = "be computed by one function", "remove one of the marks"
                 require(claim not in checks, f"checks.{claim}", rule, "two", advice)
-                checks[claim] = _bound(value, arguments)
+                checks[claim] = lambda model, f=value, a=arguments: f(model, *a)  # type: ignore[misc]
     return checks
-
-
-def _bound(function: Callable[..., Computed], arguments: tuple[Any, ...]) -> Check:
-    return lambda model: function(model, *arguments)
 
 
 @dataclass(frozen=True)
@@ -324,11 +320,16 @@ def judge_claims(
         ends = [altered(numbers, end) for end in (uncertainty.low, uncertainty.high)]
         models = [model(end) for end in ends]
         for entry in affected:
-            numbers_there = [
+            low, high = (
                 judged_numbers(entry, computed_numbers(entry, checks, *at))
                 for at in zip(models, ends, strict=True)
-            ]
-            varied[entry.id].append(_sensitivity(entry, uncertainty, numbers_there, stated))
+            )
+            numbers_there = {n: (float(low[n]), float(high[n])) for n in low if n in high}
+            verdicts = verdict(entry, low, stated), verdict(entry, high, stated)
+            texts = _text(uncertainty.low), _text(uncertainty.high)
+            varied[entry.id].append(
+                Sensitivity(uncertainty.quantity, texts, numbers_there, verdicts)
+            )
     return [replace(claim, sensitivity=tuple(varied[claim.id])) for claim in claims]
 
 
@@ -346,21 +347,6 @@ def computed_numbers(
         name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms)
         for name, formula in entry.values.items()
     }
-
-
-def _sensitivity(
-    entry: Entry,
-    uncertainty: Uncertainty,
-    numbers: Sequence[Mapping[str, float]],
-    stated: Mapping[str, float],
-) -> Sensitivity:
-    low, high = numbers
-    return Sensitivity(
-        quantity=uncertainty.quantity,
-        ends=(_text(uncertainty.low), _text(uncertainty.high)),
-        numbers={name: (float(low[name]), float(high[name])) for name in low if name in high},
-        verdicts=(verdict(entry, low, stated), verdict(entry, high, stated)),
-    )
 
 
 def _text(end: Mapping[str, float]) -> str:

@@ -60,10 +60,12 @@ def build_page(
     agreement : sequence of CurveComparison
         Of measured points with the curves, where points were given.
     """
-    about = paper.contents.paper
+    about, known = paper.contents.paper, {claim.id: claim for claim in claims}
     pictures = {figure.name: _picture(figure, folder) for _, figures in shown for figure in figures}
+    summary = "\n".join(_paragraph(one, known, pictures) for one in paper.contents.summary)
+    brief = f'<div class="summary">\n{summary}\n</div>\n{_conclusions(headlines, known)}'
     parts = {
-        "In brief": ("brief", _brief(paper.contents.summary, headlines, claims, pictures)),
+        "In brief": ("brief", brief),
         **{
             section.title: (
                 section.key,
@@ -175,23 +177,15 @@ def _reference(entry: str) -> str:
 # --- The head of the page: summary and conclusions ------------------------------------------------
 
 
-def _brief(
-    words: Sequence[SummaryWords],
-    headlines: Sequence[Headline],
-    claims: Sequence[Claim],
-    pictures: Mapping[str, str],
-) -> str:
-    """The paragraphs of the summary, then the table of conclusions."""
-    known = {claim.id: claim for claim in claims}
-    paragraphs = "\n".join(_paragraph(one, known, pictures) for one in words)
-    return f'<div class="summary">\n{paragraphs}\n</div>\n{_conclusions(headlines, known)}'
-
-
 def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[str, str]) -> str:
     computed = {name: claim.computed for name, claim in claims.items()}
     several = len(words.sentences) > 1
     items = [
-        rich(fill(sentence, computed, "summary.sentences")) + _links(names_in(sentence), claims)
+        rich(fill(sentence, computed, "summary.sentences"))
+        + "".join(
+            f' <a class="entry" href="#{escape(name)}">{rich(claims[name].place)}</a>'
+            for name in names_in(sentence)
+        )
         for sentence in words.sentences
     ]
     text = _list(items, "ol") if several else f"<p>{items[0]}</p>"
@@ -212,13 +206,6 @@ def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[
 
 def _list(items: Sequence[str], kind: str) -> str:
     return f"<{kind}>" + "".join(f"<li>{item}</li>" for item in items) + f"</{kind}>"
-
-
-def _links(names: Sequence[str], claims: dict[str, Claim]) -> str:
-    """A link to the entry of each claim that a sentence quotes."""
-    return "".join(
-        f' <a class="entry" href="#{escape(name)}">{rich(claims[name].place)}</a>' for name in names
-    )
 
 
 def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:

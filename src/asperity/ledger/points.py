@@ -194,7 +194,7 @@ def _row(point: pd.Series, table: pd.DataFrame, panel: Panel, where: str) -> dic
         known = [str(one) for one in table["curve"].unique()]
         rule, got = f"be a curve of {point['figure']}", f"'{point['series']}'"
         raise InputError(f"{where}: series", rule, got, closest(point["series"], known))
-    x = float(to_si(point["x"], panel.x_kind, f"{where}: x", require_unit=True))
+    x = to_si(str(point["x"]), panel.x_kind, f"{where}: x")
     at = curve[panel.x].to_numpy(float)
     if not at.min() <= x <= at.max():
         rule = f"lie on the curve, from {at.min():g} to {at.max():g} (SI)"

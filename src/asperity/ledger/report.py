@@ -159,7 +159,21 @@ def reproduce(
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
     begin("done")
     figures = [figure for _, drawn in shown for figure in drawn]
-    return _summary(paper, out, figures, claims, agreement, time.perf_counter() - start)
+    tests = Counter[str](claim.verdict for claim in claims if claim.is_test)
+    return ReproductionSummary(
+        paper=paper.contents.paper.short,
+        folder=out,
+        figures=len(figures),
+        points=sum(figure.points for figure in figures),
+        failed=sum(figure.failed for figure in figures),
+        claims=len(claims),
+        tests={v: tests[v] for v in VERDICTS if tests[v] or v != "undecided"},
+        exceptions=tuple(
+            (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
+        ),
+        agreement=tuple(agreement),
+        seconds=time.perf_counter() - start,
+    )
 
 
 def _show(
@@ -202,28 +216,3 @@ def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
     }
     text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _summary(
-    paper: Paper,
-    out: Path,
-    figures: Sequence[PaperFigure],
-    claims: Sequence[Claim],
-    agreement: Sequence[CurveComparison],
-    seconds: float,
-) -> ReproductionSummary:
-    tests = Counter[str](claim.verdict for claim in claims if claim.is_test)
-    return ReproductionSummary(
-        paper=paper.contents.paper.short,
-        folder=out,
-        figures=len(figures),
-        points=sum(figure.points for figure in figures),
-        failed=sum(figure.failed for figure in figures),
-        claims=len(claims),
-        tests={v: tests[v] for v in VERDICTS if tests[v] or v != "undecided"},
-        exceptions=tuple(
-            (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
-        ),
-        agreement=tuple(agreement),
-        seconds=seconds,
-    )

@@ -170,8 +170,36 @@ def _packaged_content(name: str) -> dict[str, Any]:
     return parsed_toml(text, "material", f"'{name}'")
 
 
-def load_material(name: str | PathLike[str]) -> Material:
-    """See `asperity.materials.load`."""
+def available() -> tuple[str, ...]:
+    """Names of the materials that come with the package."""
+    return tuple(sorted(packaged()))
+
+
+def load_from(folder: Path, name: str) -> Material:
+    """Load a material by its name, or by a path relative to the folder.
+
+    Raises
+    ------
+    InputError
+        As of `load`.
+    """
+    return load(folder / name if name.endswith(".toml") else name)
+
+
+def load(name: str | PathLike[str]) -> Material:
+    """Load a material by name, or a material file by its path.
+
+    Parameters
+    ----------
+    name : str or path
+        One of `available`, or the path of a TOML file: anything that is a path object, ends in
+        ``.toml`` or has a folder in it.
+
+    Raises
+    ------
+    InputError
+        If there is no such material, or the file is not a valid material file.
+    """
     text = fspath(file_path(name, "material"))
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
         file, content = toml_content(text, "material")

@@ -238,17 +238,18 @@ def one_of(value: Any, known: Iterable[str], label: str) -> str:
     return value
 
 
-def counted(progress: Callable[[int, int], None] | None, total: int) -> Callable[[int], None]:
+def counted(
+    progress: Callable[[int, int], None] | None, total: int, done: int = 0
+) -> Callable[[int], None]:
     """A function that takes the parts finished since its last call and reports their sum.
 
     Parameters
     ----------
     progress : callable or None
         As public functions take it: called with the work done so far and all work.
-    total : int
-        All parts.
+    total, done : int
+        All parts, and those that an earlier run has finished.
     """
-    done = 0
 
     def advance(count: int) -> None:
         nonlocal done

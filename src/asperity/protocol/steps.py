@@ -252,7 +252,7 @@ def _quantities(
             quantities[key] = text
             continue
         try:
-            quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
+            quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}")
         except InputError as error:
             raise error.noting(f", as in '{example}' (in '{line}')") from None
     return quantities

@@ -7,7 +7,7 @@ record. A quantity is a number in SI or a text with its unit; in a file it must 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -81,12 +81,7 @@ class Question(Record):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise self.mistakes_error(self.mistakes_in(error)) from None
-
-    @classmethod
-    def mistakes_in(cls, error: ValidationError) -> list[InputError]:
-        """The mistakes that pydantic reports."""
-        return mistakes_in(error, cls, cls.subject, prefix=cls.prefix)
+            raise self.mistakes_error(mistakes_in(error, type(self))) from None
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
@@ -161,7 +156,7 @@ def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
     mistakes: dict[str, InputError] = {}
     for place, kind, value in numbers if _units_required.get() else ():
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and np.isfinite(value) and KINDS[kind].si:
+        if number and abs(value) < np.inf and KINDS[kind].si:
             advice = f"write it like '{KINDS[kind].example}'"
             mistake = InputError(place, "carry a unit", shown(value), advice)
             mistakes.setdefault(str(mistake), mistake)
@@ -233,31 +228,11 @@ def shown(value: Any) -> str:
     return shown_value(value)
 
 
-def mistakes_in(
-    error: ValidationError,
-    model: type[BaseModel],
-    subject: str,
-    *,
-    prefix: str = "",
-    shown: Callable[[Any], str] = shown,
-) -> list[InputError]:
-    """The mistakes that pydantic reports, each once.
-
-    Parameters
-    ----------
-    error : ValidationError
-    model : type of BaseModel
-        What was to be filled, to suggest names of fields.
-    subject : str
-        What is mistaken where no field is named, such as ``"protocol"``.
-    prefix : str
-        What stands before the place of a field.
-    shown : callable
-        Words for a value.
-    """
+def mistakes_in(error: ValidationError, model: type[Question]) -> list[InputError]:
+    """The mistakes that pydantic reports in a question, each once."""
     mistakes: dict[tuple[str, ...], InputError] = {}
     for reported in error.errors(include_url=False):
-        for mistake in _mistakes(reported, model, subject, prefix, shown):
+        for mistake in _mistakes(reported, model):
             key = (*mistake.field, mistake.got, mistake.advice)
             other = mistakes.get(key)
             if other is not None and mistake.rule not in other.rule:
@@ -268,13 +243,7 @@ def mistakes_in(
     return list(mistakes.values())
 
 
-def _mistakes(
-    reported: Mapping[str, Any],
-    model: type[BaseModel],
-    subject: str,
-    prefix: str,
-    shown: Callable[[Any], str],
-) -> tuple[InputError, ...]:
+def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[InputError, ...]:
     raised = reported.get("ctx", {}).get("error")
     if isinstance(raised, MistakesError):
         return raised.errors
@@ -284,7 +253,7 @@ def _mistakes(
         for i, part in enumerate(reported["loc"])
         if not (i and isinstance(part, str) and ("[" in part or part in _TYPES | records))
     ]
-    field = prefix + ".".join(place) if place else subject
+    field = model.prefix + ".".join(place) if place else model.subject
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)

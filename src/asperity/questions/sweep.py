@@ -86,7 +86,7 @@ class ThresholdTable(Record):
     """
 
     between: tuple[float, float] = (0.3, 4.0)
-    scan: PositiveInt = 24
+    scan: Annotated[PositiveInt, Field(lt=2**63)] = 24
 
 
 class NumberTable(Record):

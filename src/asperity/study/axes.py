@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import spaced
 from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
-from asperity.parameters import Parameter, canonical_name, obeying, suggestion
-from asperity.parameters.arguments import shown
+from asperity.parameters import Parameter, canonical_name, suggestion
+from asperity.parameters.arguments import number, shown
 from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
@@ -59,7 +60,8 @@ class SweepAxis:
         self.name, self._record = name, record
         self.names = columns_of(record)
         columns = record.get("columns", {})
-        self._listed = {column: _listed_values(column, v) for column, v in columns.items()}
+        # None, where a row has no value, becomes NaN.
+        self._listed = {n: np.array(v, object if n in TEXTS else float) for n, v in columns.items()}
         self.length = record["count"] if "over" in record else len(columns[self.names[0]])
 
     def rows(self, start: int, stop: int) -> dict[str, Column]:
@@ -101,12 +103,6 @@ class SweepAxis:
             # SciPy warns where the number of Sobol points is not a power of two.
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(sequence.random(stop - start))
-
-
-def _listed_values(column: str, values: Sequence[Any]) -> Column:
-    if column in TEXTS:
-        return np.array(values, dtype=object)
-    return np.array([math.nan if value is None else value for value in values], dtype=float)
 
 
 def _quantile(spread: Mapping[str, Any], u: Column) -> Column:
@@ -167,7 +163,7 @@ def axis_record(
     column = _name(name, known)
     if table.values is not None:
         return column, _listed({column: _column(name, table.values, known, plan.folder)})
-    grid = {"from": table.from_, "to": table.to, "count": table.count, "spacing": table.spacing}
+    grid = table.model_dump(by_alias=True, exclude_none=True)
     return column, _listed({column: _grid(name, grid, known)})
 
 
@@ -219,9 +215,9 @@ def law_name(law: Any, folder: Path) -> str:
 
 def checked_value(parameter: Parameter, value: Any) -> float:
     """One number of a plan in SI."""
-    number = parameter.check(value, parameter.name)
-    require(not np.ndim(number), parameter.name, "be one number", shown(value))
-    return float(number)
+    checked = parameter.check(value, parameter.name)
+    require(not np.ndim(checked), parameter.name, "be one number", shown(value))
+    return float(checked)
 
 
 def _ends(
@@ -244,7 +240,7 @@ def _ends(
     advice = "write it like { from = 0.01, to = 0.5, count = 20 }, or draw it with mean and std"
     require(holds, name, rule, ", ".join(sorted(table)) or "nothing", advice)
     low, high = (checked_value(known[column], table[end]) for end in ("from", "to"))
-    spacing = table.get("spacing") or "linear"
+    spacing = table.get("spacing", "linear")
     rule = "be linear or log"
     require(spacing in ("linear", "log"), f"{name}.spacing", rule, shown(spacing), "choose one")
     rule, got = "have ends above zero to be logarithmic", f"{low:g} and {high:g}"
@@ -258,11 +254,7 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     count = table["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LISTED:
         raise InputError("count", f"be from 1 to {MOST_LISTED:,}", shown(count))
-    u = np.linspace(0.0, 1.0, count)
-    values = low * (high / low) ** u if spacing == "log" else low + (high - low) * u
-    # Rounding to 15 digits: a longer grid of the same step then has bit for bit the same values,
-    # and a decimal step gives decimal values (0.3, not 0.30000000000000004).
-    return [float(f"{value:.15g}") for value in values]
+    return spaced(low, high, count, log=spacing == "log").tolist()
 
 
 def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
@@ -271,7 +263,7 @@ def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter])
     if set(table) == {"mean", "std"} and column not in TEXTS:
         parameter = known[column]
         mean = checked_value(parameter, table["mean"])
-        std = float(obeying(table["std"], f"{parameter.name}.std", parameter.kind, "positive"))
+        std = number(table["std"], f"{parameter.name}.std", parameter.kind, "positive")
         return {"low": mean, "high": std, "kind": "normal"}
     low, high, spacing = _ends(name, table, known)
     return {"low": low, "high": high, "kind": spacing}

@@ -1,8 +1,7 @@
-"""The engine of tables, maps and sweeps: it hands out chunks of points, and counts them.
+"""The engine of sweeps: it hands out chunks of points, and counts them.
 
-A chunk is the unit of all work. For a sweep a worker solves it, writes it and returns a
-`DoneChunk`; the engine keeps no results, so that its memory does not grow with the number of
-chunks. Tables and maps are solved in this process, in order.
+A worker solves a chunk, writes it and returns a `DoneChunk`; the engine keeps no results, so that
+its memory does not grow with the number of chunks. Tables and maps are solved in this process.
 """
 
 from __future__ import annotations
@@ -209,35 +208,3 @@ def solve_chunks(
                 log(f"chunk {chunk} kills its process each time; its points are given up")
         progress.estimate(time.perf_counter() - begin, workers.count)
         tick(progress)
-
-
-def solve_here(
-    total: int,
-    size: int,
-    solve: Callable[[int, int, Callable[[int], None]], None],
-    progress: Callable[[int, int], None] | None = None,
-    done: int = 0,
-) -> None:
-    """Solve chunks of at most `size` points in this process, in order.
-
-    Parameters
-    ----------
-    total, done : int
-        Number of points; the first `done` of them are solved already.
-    size : int
-    solve : callable
-        ``solve(start, stop, advance)`` solves and keeps the points from `start` to before `stop`,
-        and calls ``advance`` with the number of points finished since its last call.
-    progress : callable, optional
-        Called with the number of points done so far and of all points.
-    """
-
-    def advance(points: int) -> None:
-        nonlocal done
-        done += points
-        if progress is not None:
-            progress(done, total)
-
-    advance(0)
-    for start in range(done, total, size):
-        solve(start, min(start + size, total), advance)

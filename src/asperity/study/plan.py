@@ -25,6 +25,7 @@ from asperity.operating_point import (
     without_numbers,
 )
 from asperity.parameters import Parameter, canonical_name, point_parameters
+from asperity.parameters.arguments import one_of
 from asperity.questions.record import without_unit
 from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
@@ -107,18 +108,15 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
             mistakes.append(error.about(place) if error.rule else f"axes.{name}: {error}")
     if not plan.axes:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
-    numbers: dict[str, float] = {}
-    origins: dict[str, str] = {}
-    settings: dict[str, Any] = {}
-    outputs: tuple[str, ...] = ()
-    supplied: tuple[str, ...] = ()
     with _noted(mistakes):
         numbers, origins = _numbers(plan, axes, laws, known)
     with _noted(mistakes):
         solve = SOLVES[plan.solve]
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
-        outputs = solve.chosen_outputs(named)
+        offered = solve.known_outputs(laws, settings)
+        asked = plan.outputs or solve.defaults or offered
+        outputs = dict.fromkeys(one_of(name, offered, "outputs") for name in asked)
         supplied = solve.supplied(named)
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)

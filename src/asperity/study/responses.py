@@ -46,7 +46,11 @@ def answers_of_law(
         index = sound[group]
         of_group = {n: v[index] for n, v in values.items()}
         response = respond(law, of_group, increments(progress), workers=1)
-        answers.put(index, _answers_of(response, outputs))
+        converged = response.converged
+        # A point that failed may have a phase of 0 with an amplitude of NaN.
+        numbers = {n: np.where(converged, _output(response, n), np.nan) for n in outputs}
+        detail = np.where(converged, 0.0, response.detail)
+        answers.put(index, Answers(numbers, response.outcome.astype(np.int16), detail))
     return answers
 
 
@@ -76,14 +80,6 @@ def is_stable(answers: Answers) -> Bool:
 def bifurcation_kinds(answers: Answers) -> NDArray[np.object_]:
     """Bifurcation at which the leading multiplier crosses the unit circle; "" where unknown."""
     return kind_of_crossing(answers["log_multiplier"] + 1j * answers["multiplier_argument"])
-
-
-def _answers_of(response: PeriodicResponse, outputs: Sequence[str]) -> Answers:
-    converged = response.converged
-    # A point that failed may have a phase of 0 with an amplitude of NaN.
-    numbers = {n: np.where(converged, _output(response, n), np.nan) for n in outputs}
-    detail = np.where(converged, 0.0, response.detail)
-    return Answers(numbers, response.outcome.astype(np.int16), detail)
 
 
 def _output(response: PeriodicResponse, name: str) -> Float:

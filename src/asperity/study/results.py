@@ -171,7 +171,6 @@ def _whole(parts: list[tuple[float, ...]]) -> dict[str, float]:
 
 #: Columns of texts.
 _TEXTS = (*TEXTS, "outcome")
-_FORMATS = (".nc", ".csv", ".parquet")
 
 
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
@@ -200,9 +199,10 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     """
     opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     target = output_file(out, example="results.nc")
-    write = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}.get(target.suffix.lower())
+    writers = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}
+    write = writers.get(target.suffix.lower())
     if write is None:
-        rule = f"end in {', '.join(_FORMATS)}"
+        rule = f"end in {', '.join(writers)}"
         raise InputError("out", rule, f"'{target.name}'", "write it like results.nc")
     require_disk(
         opened.grid.points * 8.0 * (len(opened.record["outputs"]) + 2),

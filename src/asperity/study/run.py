@@ -105,7 +105,10 @@ def run_sweep(
     pool = _workers(workers, cluster, address)
     with store_lock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
-        _require_coordinates(grid, path.parent)
+        # Coordinates are written first.
+        numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
+        what = f"{numbers:.3g} numbers along them"
+        require_disk(8.0 * numbers, path.parent, "axes", what, "shorten them")
         with _writing(path):
             store = _opened(path, plan, text, grid, extend_store, retry_failed, log)
             swept = store.sweep_orphans()
@@ -206,14 +209,6 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
         "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
         "references": [works[key] for key in sorted(works)],
     }
-
-
-def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
-    """Refuse axes whose coordinates do not fit on the disk; coordinates are written first."""
-    numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
-    require_disk(
-        8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
-    )  # fmt: skip
 
 
 def _run(

@@ -31,8 +31,8 @@ from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
+from asperity.parameters.arguments import counted
 from asperity.parameters.columns import csv_rows, headings, readable
-from asperity.study.engine import solve_here
 from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
 
@@ -102,20 +102,16 @@ def run_table(
     table = TableSource(source, law, filled)
     output = UnfinishedText(out, {"table": table.digest, "law": law, "filled": filled})
     output.start(resume)
-    chunks = table.blocks(block, skip=output.rows)
-
-    def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
-        rows = next(chunks)
-        answers, results = _solved(table, rows, advance)
-        header = None if start else [*table.header, *RESULT_COLUMNS]
-        cells = zip(rows, _cells(answers, results), strict=True)
-        # Rows with as many cells as the header.
-        width = len(table.header)
-        lines = [(*(row + [""] * width)[:width], *answer) for row, answer in cells]
-        output.append_rows(lines, table.delimiter, header, failed=answers.failed)
-
     with output.interruptible("rows", table.rows):
-        solve_here(table.rows, block, solve, progress, output.rows)
+        advance, width = counted(progress, table.rows, output.rows), len(table.header)
+        advance(0)
+        for rows in table.blocks(block, skip=output.rows):
+            answers, results = _solved(table, rows, advance)
+            header = None if output.rows else [*table.header, *RESULT_COLUMNS]
+            cells = zip(rows, _cells(answers, results), strict=True)
+            # Rows with as many cells as the header.
+            lines = [(*(row + [""] * width)[:width], *answer) for row, answer in cells]
+            output.append_rows(lines, table.delimiter, header, failed=answers.failed)
         output.finish()
     return TableSummary(table.rows, int(output.progress["failed"]), out)
 

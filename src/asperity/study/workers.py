@@ -60,10 +60,7 @@ class LocalProcesses(Workers):
     def __init__(self, count: int) -> None:
         self.count = count
         self.about = f"{count} processes of one machine"
-        self._executor = self._start()
-
-    def _start(self) -> Any:
-        return kept_processes(self.count)
+        self.restart()
 
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
         """As in `Workers`."""
@@ -75,7 +72,7 @@ class LocalProcesses(Workers):
 
     def restart(self) -> None:
         """As in `Workers`."""
-        self._executor = self._start()
+        self._executor: Any = kept_processes(self.count)
 
     def close(self, *, kill: bool) -> None:
         """As in `Workers`; without `kill` idle processes stay ten minutes for the next sweep."""

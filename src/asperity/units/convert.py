@@ -25,12 +25,10 @@ _RADIANS = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "degrees": 
 
 
 @overload
-def to_si(value: str, kind: str, name: str, *, require_unit: bool = ...) -> float: ...
+def to_si(value: str | float, kind: str, name: str) -> float: ...
 @overload
-def to_si(value: float, kind: str, name: str, *, require_unit: bool = ...) -> float: ...
-@overload
-def to_si(value: Any, kind: str, name: str, *, require_unit: bool = ...) -> Any: ...
-def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> Any:
+def to_si(value: Any, kind: str, name: str) -> Any: ...
+def to_si(value: Any, kind: str, name: str) -> Any:
     """Convert user input to SI.
 
     Parameters
@@ -41,9 +39,6 @@ def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> An
         A key of `KINDS`.
     name : str
         Name of the value in messages, as ``<object>.<field>``.
-    require_unit : bool
-        Refuse numbers without a unit too, as the command line and files do. A pure number
-        needs none.
 
     Returns
     -------
@@ -62,13 +57,11 @@ def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> An
     if is_traced(value):
         return value
     if getattr(getattr(value, "dtype", None), "kind", None) in ("U", "O"):
-        return to_si(np.asarray(value).tolist(), kind, name, require_unit=require_unit)
+        return to_si(np.asarray(value).tolist(), kind, name)
     if isinstance(value, list | tuple):
-        return _stacked([to_si(v, kind, name, require_unit=require_unit) for v in value], name)
+        return _stacked([to_si(v, kind, name) for v in value], name)
     if isinstance(value, int) and not abs(value) < 10**308:
         raise _beyond_doubles(name, "an integer of more than 308 figures", spec)
-    if require_unit and spec.si:
-        raise InputError(name, "carry a unit", _shown(value), f"write it like '{spec.example}'")
     return _number_to_si(value, spec, name)
 
 

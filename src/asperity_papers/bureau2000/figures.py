@@ -27,21 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Figures made of curves: those of the paper, and four that are not in it.
-_OF_THE_PAPER = (
-    *(
-        curves.figure_2,
-        curves.figure_3,
-        curves.figure_5,
-        curves.figure_6,
-        curves.figure_7,
-    ),
-    *(curves.figure_4, curves.figure_8, curves.figure_9, curves.figure_11),
-)
+_OF_THE_PAPER = [getattr(curves, f"figure_{n}") for n in (2, 3, 4, 5, 6, 7, 8, 9, 11)]
 _FURTHER = (
-    stability.floquet_figure,
-    curves.phase_figure,
-    motion.resonance_figure,
-    curves.law_figure,
+    *(stability.floquet_figure, curves.phase_figure),
+    *(motion.resonance_figure, curves.law_figure),
 )
 #: What computes each figure.
 NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
@@ -49,7 +38,7 @@ NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
     "figure-13": motion.period_figure,
 }
 #: Lines of each figure of the paper.
-CURVES = {figure.name: figure.curves for figure in sorted(_OF_THE_PAPER, key=lambda f: f.name)}
+CURVES = {figure.name: figure.curves for figure in _OF_THE_PAPER}
 #: Figures with more than their plot.
 DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
     "figure-03": curves.draw_3,

@@ -81,16 +81,19 @@ class VirtualFigure:
     ----------
     numbers : FigureNumbers
         The model's lines, and points with the columns ``point_column`` of figures.toml.
-    points : DataFrame
-        The points of `numbers`.
     series : tuple of Series
     recovered : tuple of RecoveredQuantity
     """
 
     numbers: FigureNumbers
-    points: pd.DataFrame
     series: tuple[Series, ...]
     recovered: tuple[RecoveredQuantity, ...]
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """The points of `numbers`."""
+        assert self.numbers.points is not None  # a virtual figure has points
+        return self.numbers.points
 
 
 def _of(points: pd.DataFrame, series: str) -> pd.DataFrame:
@@ -168,7 +171,7 @@ def _figure(
         for part in ("value", "uncertainty", "true_value")
     }
     numbers = figure_numbers(PRINTED, name, lines, scalars | slopes, quoted=quoted, points=points)
-    return VirtualFigure(numbers, points, series, recovered)
+    return VirtualFigure(numbers, series, recovered)
 
 
 @cache

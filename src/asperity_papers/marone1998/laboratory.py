@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -15,11 +16,22 @@ from asperity.laws import RiceRuina
 from asperity.materials import Material
 
 Float = NDArray[np.float64]
+Numbers = dict[str, float]
 
 #: The paper's laws by the names of the library, with its letters for them.
 AGEING, SLIP, PRZ = "rice-ruina", "ruina-slip", "perrin-rice-zheng"
 LAWS = {AGEING: "D", SLIP: "R", PRZ: "PRZ"}
 DECADE = float(np.log(10))
+
+
+def by_law(value: Callable[[str], Any]) -> Numbers:
+    """A number of each law, under the paper's letter for it."""
+    return {letter: float(value(name)) for name, letter in LAWS.items()}
+
+
+def by_time(times: Float, values: Float, prefix: str = "") -> Numbers:
+    """Numbers at several times (s), under names such as ``"10 s"``."""
+    return {f"{prefix}{t:g} s": float(v) for t, v in zip(times, values, strict=True)}
 
 
 @cache

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from asperity.cli.design import _sections
 from asperity.errors import InputError
 from asperity.inference import design, fit, table_of
+from asperity.inference.design.rival import RivalFit
+from asperity.outputs.tables import as_text
 
 #: Settings that the elasto-plastic law leaves steady at 120 Hz, and two that it does not.
 PLAN = {
@@ -119,3 +122,43 @@ def test_the_record_and_the_table_hold_the_points(found):
     assert row["A"] == 0.013
     assert row["W0"] == 3.0
     assert "eps_ratio" not in row
+
+
+#: One operating point of which three observables leave one combination of two parameters.
+ONE_POINT = {
+    "material": "bureau2000",
+    "points": 3,
+    "ranges": {"V": "1 um/s", "epsilon": [0.3], "frequency": "120 Hz", "K": "0.5 N/um"},
+    "noise": {"mean_friction": 1e-3, "mu1": {"absolute": 2e-5, "relative": "1 %"},
+              "phase1": "1 deg"},
+    "law": "elasto-plastic",
+    "free": ["A", "B"],
+    "rival": "rice-ruina",
+    "rival_free": ["A", "B"],
+}  # fmt: skip
+
+
+def test_a_law_that_gives_the_same_readings_is_not_to_be_excluded():
+    plan = {**ONE_POINT, "law": "rice-ruina", "rival": "linker-dieterich"}
+    with pytest.raises(InputError, match=r"rival must give other readings than rice-ruina.*alpha"):
+        design({**plan, "rival_free": ["A", "alpha"]})
+
+
+def test_a_rival_at_a_bound_of_its_parameters_is_excluded_as_its_misfit_says():
+    """Its chi-squared lies far beyond what noise can change."""
+    found = design(ONE_POINT, simulate=5)
+    assert found.chi2 > 1e4
+    assert found.probability == found.simulation.decided == 1
+    assert found.fewer == pytest.approx(1)
+
+
+def test_where_the_rival_loses_its_response_its_misfit_is_a_bound(monkeypatch):
+    monkeypatch.setattr(RivalFit, "reached", lambda fits, n, end: False)
+    found = design(ONE_POINT)
+    assert found.probability is found.probability_grid is None
+    assert np.isnan(found.fewer)
+    assert found.efficiency == found.efficiency_whole == 0
+    assert sum("next to values with which it has no response" in w for w in found.warnings) == 2
+    text = as_text(_sections(found))
+    assert "an unknown number of times fewer readings" in text
+    assert "probability of deciding unknown (even grid unknown)" in text

@@ -70,6 +70,7 @@ def test_time_is_spent_on_settling_and_reading():
         ({"rival_free": ["A"]}, "rival_free must go with a rival"),
         ({"free": []}, "free must have at least 1 part, got 0"),
         ({"free": ["V"]}, "free must not have what ranges has, got 'V'"),
+        ({"free": ["Z"]}, "free must be parameters of elasto-plastic, got 'Z'; choose one of A"),
         ({"points": None}, "must have points or time, got none"),
         ({"points": 2.5}, "whole number"),
         ({"points": 0}, "points must be at least 1, got 0"),

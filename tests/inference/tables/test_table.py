@@ -233,3 +233,10 @@ def test_the_errors_of_a_measured_epsilon_are_errors_of_what_it_predicts(pmma):
     deviance = np.sum(np.log1p(of_epsilon))
     densities = [f.objective.log_likelihood(f.objective.coordinates(f.values)) for f in found]
     assert 2 * (densities[0] - densities[1]) == pytest.approx(deviance, rel=1e-3)
+
+
+def test_a_table_without_headings_lacks_its_columns(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("1e-6,0.1\n2e-6,0.2\n")
+    with pytest.raises(InputError, match="must have the columns V, epsilon, frequency"):
+        read_table(path)

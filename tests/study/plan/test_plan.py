@@ -78,6 +78,28 @@ def test_a_file_says_its_units(tmp_path: Path) -> None:
         load_plan(plan)
 
 
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"parameters": {"V": 10**400}}, r"parameters\.V must"),
+        ({"solve": "threshold", "threshold": {"scan": 10**400}}, r"threshold\.scan must"),
+        (
+            {
+                "axes": {
+                    "s": {"draw": "random", "count": 2, "over": {"M": {"mean": "1 kg", "std": []}}}
+                }
+            },
+            r"axes\.s\.M\.std must be one number",
+        ),
+    ],
+)
+def test_no_value_of_a_plan_is_beyond_a_sentence(fields: dict[str, object], message: str) -> None:
+    axes = {"epsilon": {"values": [0.1]}}
+    plan = {"law": "rice-ruina", "material": "bureau2000", "axes": axes, **fields}
+    with pytest.raises(InputError, match=message):
+        SweepGrid.of(SweepPlan.of_content(plan, "plan"))
+
+
 def test_an_unknown_law_is_the_one_mistake_of_a_plan() -> None:
     """The parameters, which the law that was meant may have, are no second mistake."""
     axes = {"K": {"values": (1e5, 2e5)}}

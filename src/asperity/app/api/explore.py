@@ -22,7 +22,7 @@ from asperity.app.api.operating_point import (
     solve,
 )
 from asperity.app.endpoints import Answer, Job
-from asperity.app.jobs.threads import Preparation
+from asperity.app.jobs.threads import is_ready
 from asperity.laws import get_law, registered
 from asperity.orbit import (
     Outcome,
@@ -69,15 +69,6 @@ class Explored(OperatingPoint):
         return np.geomspace(slider["low"], slider["high"], _FREQUENCIES)
 
 
-_preparation: Preparation | None = None
-
-
-def use(preparation: Preparation) -> None:
-    """Let programs be compiled before they are needed."""
-    global _preparation
-    _preparation = preparation
-
-
 def explore(question: Explored) -> dict[str, Any]:
     """Response, curves and share of the air layer, as far as the fast methods solve them."""
     numbers = question.sourced()
@@ -92,7 +83,7 @@ def explore(question: Explored) -> dict[str, Any]:
         "epsilon": epsilon,
         "air": _air(question, values),
     }
-    waiting = [n for n in laws if _preparation is not None and not _preparation.want(n)]
+    waiting = [n for n in laws if not is_ready(n)]
     if waiting:
         answer["preparing"] = waiting[0]
     if question.law in waiting:

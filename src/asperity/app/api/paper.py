@@ -12,7 +12,7 @@ from pydantic import Field
 
 from asperity.app.api.operating_point import Name, Value
 from asperity.app.endpoints import Answer, Job, Question
-from asperity.app.jobs.threads import Preparation
+from asperity.app.jobs.threads import is_ready
 from asperity.errors import InputError, require
 from asperity.ledger import Paper, altered, available, find_paper
 from asperity.materials import Material
@@ -25,8 +25,6 @@ _FACTOR = 4.0
 #: Largest factor between a number and the printed number: farther away the equations are so stiff
 #: that curves take minutes.
 _BEYOND = 100.0
-
-_preparation: Preparation | None = None
 
 
 class ChosenPaper(Question):
@@ -58,12 +56,6 @@ class MovedFigure(ChosenPaper):
 @cache
 def _paper(name: str) -> Paper:
     return find_paper(name or None)
-
-
-def use(preparation: Preparation) -> None:
-    """Let programs be compiled before they are needed."""
-    global _preparation
-    _preparation = preparation
 
 
 def preparations() -> dict[str, Callable[[], Any]]:
@@ -186,7 +178,7 @@ def figure(question: MovedFigure) -> dict[str, Any]:
         "command": f"asperity reproduce {paper.name} --out report",
     }
     task = _task(paper, question.figure)
-    if _preparation is not None and not _preparation.want(task):
+    if not is_ready(task):
         return {**answer, "preparing": task}
     before = _printed_lines(paper.name, question.figure)
     after = chosen.lines(numbers) if question.numbers else before

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 
@@ -20,59 +20,56 @@ class Preparation:
 
     def __init__(self, tasks: Mapping[str, Callable[[], Any]]) -> None:
         self._tasks = dict(tasks)
-        self._queue: list[str] = []
-        self._done: set[str] = set()
-        self._current: str | None = None
-        self._closed = False
+        self._futures: dict[str, Future[Any]] = {}
         self._lock = threading.Lock()
         # The interpreter waits for this thread at exit: stopping it while it compiles would crash
-        # the process. The thread has the current task only.
+        # the process.
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="asperity-preparation")
 
-    def start(self, names: list[str]) -> None:
+    def start(self, names: Iterable[str]) -> None:
         """Queue some tasks; the others are not run before `want`."""
-        with self._lock:
-            self._queue += [n for n in names if n not in self._queue]
-        self._next()
+        for name in names:
+            with contextlib.suppress(RuntimeError):  # the process is ending
+                self._futures[name] = self._pool.submit(self._tasks[name])
 
     def want(self, name: str) -> bool:
-        """Whether a task is done; a task that is not becomes the next in the queue."""
+        """Whether a task is done, or has failed; one that is not becomes the next in the queue.
+
+        The request that needs the program reports what is wrong with a task that failed.
+        """
         with self._lock:
-            if name in self._done or name not in self._tasks:
+            future = self._futures.get(name)
+            if name not in self._tasks or (future is not None and future.done()):
                 return True
-            if name != self._current:
-                self._queue = [name, *(n for n in self._queue if n != name)]
-        self._next()
+            if future is None or future.cancel():
+                waiting = [n for n, f in self._futures.items() if n != name and f.cancel()]
+                self.start([name, *waiting])
         return False
 
     def state(self) -> dict[str, Any]:
         """Tasks that are done, the current one, and the number of tasks that are not done."""
         with self._lock:
-            return {
-                "ready": sorted(self._done),
-                "preparing": self._current,
-                "left": len(self._queue) + (self._current is not None),
-            }
+            futures = dict(self._futures)
+        return {
+            "ready": sorted(name for name, future in futures.items() if future.done()),
+            "preparing": next((n for n, future in futures.items() if future.running()), None),
+            "left": sum(not future.done() for future in futures.values()),
+        }
 
     def close(self) -> None:
         """Start no further task."""
-        with self._lock:
-            self._closed = True
-        self._pool.shutdown(wait=False)
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _next(self) -> None:
-        with self._lock:
-            if self._closed or self._current is not None or not self._queue:
-                return
-            self._current = self._queue.pop(0)
-            with contextlib.suppress(RuntimeError):  # the process is ending
-                self._pool.submit(self._run, self._current)
 
-    def _run(self, name: str) -> None:
-        # The request that needs the program reports what is wrong.
-        with contextlib.suppress(Exception):
-            self._tasks[name]()
-        with self._lock:
-            self._done.add(name)
-            self._current = None
-        self._next()
+_preparation: Preparation | None = None
+
+
+def use(preparation: Preparation) -> None:
+    """Let answers of this process wait for programs that are being compiled."""
+    global _preparation
+    _preparation = preparation
+
+
+def is_ready(task: str) -> bool:
+    """Whether a program is compiled, or there is no preparation; else it is the next to be."""
+    return _preparation is None or _preparation.want(task)

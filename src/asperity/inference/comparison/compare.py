@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,10 +17,8 @@ from asperity.inference.comparison.evidence import (
     IMPOSSIBLE,
     CrossValidation,
     Evidence,
-    Standing,
     evidence_of,
     leave_one_run_out,
-    standing,
     support,
 )
 from asperity.inference.fitting.fit import Data, fit, listed_data
@@ -80,6 +77,20 @@ class Judged:
     cross_validation: CrossValidation | None = None
 
 
+class Standing(NamedTuple):
+    """Where a law stands relative to the best one.
+
+    Attributes
+    ----------
+    word : {"excluded", "disfavoured", "cannot tell", "no fit"}
+    number : str
+        The number that decides, with its thresholds.
+    """
+
+    word: Literal["excluded", "disfavoured", "cannot tell", "no fit"]
+    number: str
+
+
 @dataclass(frozen=True, repr=False)
 class Comparison(Drawn):
     """Laws fitted to the same data.
@@ -117,19 +128,34 @@ class Comparison(Drawn):
         return "Comparison of laws", lines
 
     def standing(self, name: str) -> Standing:
-        """Where a law stands on the scale of verdicts, and by which number."""
+        """Where a law stands relative to the best one, and by which number."""
         judged, best = self.laws[name], self.laws.get(self.best)
-        behind = judged.fit.aicc - best.fit.aicc if best else math.nan
-        pair = best.evidence if best else None, judged.evidence
-        lost = math.nan
-        if pair[0] and pair[1] and pair[0].reliable and pair[1].reliable:
-            lost = pair[0].log - pair[1].log
-        return standing(
-            excluded=judged.why if judged.excluded else "",
-            behind=behind if judged.fit.converged else math.nan,
-            evidence_behind=lost,
-            p_value=judged.fit.p_value if judged.fit.judged_by_chi2 else None,
+        result = judged.fit
+        if best is None or not result.converged:
+            return Standing("no fit", "")
+        behind = result.aicc - best.fit.aicc
+        by_aicc = (
+            f"AICc {behind:.3g} above the lowest (from {DISFAVOURED:g} disfavoured, from "
+            f"{EXCLUDED:g} excluded)"
         )
+        if judged.excluded:
+            if result.judged_by_chi2 and result.p_value < IMPOSSIBLE and behind < EXCLUDED:
+                by_chi2 = f"p = {result.p_value:.2g} (excluded below {IMPOSSIBLE:g})"
+                return Standing("excluded", by_chi2)
+            return Standing("excluded", by_aicc)
+        if behind >= DISFAVOURED:
+            return Standing("disfavoured", by_aicc)
+        lost = _evidence_lost(best, judged)
+        if lost >= math.log(FACTOR):
+            factor = f"{math.exp(min(lost, 700.0)):.2g} (from {FACTOR:g} disfavoured)"
+            return Standing("disfavoured", f"evidence lower by a factor of {factor}")
+        return Standing("cannot tell", by_aicc)
+
+
+def _evidence_lost(best: Judged, other: Judged) -> float:
+    """Logarithm of the evidence of one law over that of another; NaN where it is not reliable."""
+    a, b = best.evidence, other.evidence
+    return a.log - b.log if a and b and a.reliable and b.reliable else math.nan
 
 
 @typed
@@ -182,9 +208,9 @@ def compare(
     rule = "be two or more"
     require(len(set(laws)) >= 2, "laws", rule, ", ".join(laws) or "none", "name those to compare")
     # Parameters of laws; those of machine and runs, and unknown names, are checked by the fit.
-    nobodys = [
-        p for p in free or () if p in _of_any_law() and not any(p in _parameters(n) for n in laws)
-    ]
+    of_any_law = {p for law in registered() for p in _parameters(law)}
+    of_these = {p for law in laws for p in _parameters(law)}
+    nobodys = [p for p in free or () if p in of_any_law - of_these]
     if nobodys:
         rule = "be parameters of the laws that are compared"
         got = f"'{nobodys[0]}', which none of {', '.join(dict.fromkeys(laws))} has"
@@ -239,7 +265,7 @@ def compare(
                     bare=True,
                     simpler=list(done.values()),
                     check_stiffness=False,
-                    progress=partial(_within_law, report, k),
+                    progress=lambda done, total, k=k: report(k + done / total),  # type: ignore[misc]
                     **mine,
                     **chosen,
                 )
@@ -264,15 +290,13 @@ def compare(
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())
     doubt, stretches = _support(result)
-    result = replace(
-        result,
-        not_compared=not_compared,
-        verdict=doubt
-        + result.verdict
-        + stretches
-        + _freed(result)
-        + _without_numbers(not_compared),
-    )
+    # The table has the reason of each.
+    lacking = (
+        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither "
+        "free nor given, or of samples."
+    ) * bool(not_compared)
+    verdict = doubt + result.verdict + stretches + _freed(result) + lacking
+    result = replace(result, not_compared=not_compared, verdict=verdict)
     return _examined(result, lambda laws: report(len(own) + laws)) if evidence else result
 
 
@@ -306,20 +330,6 @@ def _support(comparison: Comparison) -> tuple[str, str]:
     return "", ""
 
 
-def _without_numbers(not_compared: Mapping[str, str]) -> str:
-    """A sentence on laws that were not compared; the table has the reason of each."""
-    if not not_compared:
-        return ""
-    return (
-        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither "
-        "free nor given, or of samples."
-    )
-
-
-def _within_law(report: Report, laws: int, done: int, total: int) -> None:
-    report(laws + done / total)
-
-
 def _freed(comparison: Comparison) -> str:
     """A sentence on the law that describes the data with a free stiffness, where none does."""
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
@@ -327,9 +337,9 @@ def _freed(comparison: Comparison) -> str:
         return ""
     # The law with the fewest parameters that does: those that extend it do as well.
     for f in sorted(fits, key=lambda f: len(f.parameters)):
-        said = stiffness_that_describes(f)
-        if said:
-            return f" {said[0].upper()}{said[1:]}."
+        sentence = stiffness_that_describes(f)
+        if sentence:
+            return f" {sentence[0].upper()}{sentence[1:]}."
     return ""
 
 
@@ -350,11 +360,11 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
         return sorted(name for name, j in comparison.laws.items() if j.excluded)
 
     which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
-    said = (
+    outliers = (
         f"No law describes {enumerated(rows)} together with the other rows; check that "
         f"measurement. With it, {which} are excluded. Without it: "
     )
-    return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
+    return replace(rest, verdict=outliers + rest.verdict, left_out=tuple(rows))
 
 
 def _examined(comparison: Comparison, report: Report) -> Comparison:
@@ -383,30 +393,28 @@ def _examined(comparison: Comparison, report: Report) -> Comparison:
 
 def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
     """Sentences on evidence and cross-validation of the laws that are not excluded."""
-    said = ""
+    sentences = ""
     left = [n for n, j in judged.items() if not j.excluded and j.evidence and n != best]
-    top = judged[best].evidence if best in judged else None
-    for name in left:
-        other = judged[name].evidence
-        if top and other and top.reliable and other.reliable:
-            apart = top.log - other.log
+    for name in left if best in judged else ():
+        apart = _evidence_lost(judged[best], judged[name])
+        if not math.isnan(apart):
             ahead, behind = (best, name) if apart >= 0 else (name, best)
             factor = math.exp(min(abs(apart), 700.0))
             tells = (
                 f"disfavours {behind} against" if factor >= FACTOR else f"cannot tell {behind} from"
             )
-            said += (
+            sentences += (
                 f" The evidence {tells} {ahead}: a factor of {factor:.2g}, of which {FACTOR:g} "
                 "decides, with the priors stated."
             )
         first, second = judged[best].cross_validation, judged[name].cross_validation
         if first and second and math.isfinite(first.log_density + second.log_density):
             gain, error = first.difference(second)
-            said += (
+            sentences += (
                 f" Runs that were left out are predicted by {best} better than by {name} by "
                 f"{gain:.2g} +- {error:.2g} in the log density."
             )
-    return said
+    return sentences
 
 
 def judge(fits: Mapping[str, Fit]) -> Comparison:
@@ -439,10 +447,6 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
 
 def _parameters(law: str) -> Collection[str]:
     return law_parameters(get_law(law))
-
-
-def _of_any_law() -> set[str]:
-    return {p for law in registered().values() for p in law_parameters(law)}
 
 
 def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
@@ -534,11 +538,6 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
     return "; ".join(p for p in parts if p) + "."
 
 
-def _value(result: Fit, name: str) -> Any:
-    """A parameter of a fit, free or fixed."""
-    return result.values.get(name, result.objective.fixed.get(name))
-
-
 def what_would_tell(first: Fit, second: Fit) -> str:
     """Where the predictions of two fitted laws differ most, as a sentence.
 
@@ -550,7 +549,8 @@ def what_would_tell(first: Fit, second: Fit) -> str:
         return ""
     table, motion = terms[0].table, terms[0].motion
     largest = float(table.points["epsilon"].max())
-    ratio = max(float(_value(f, "eps_ratio")) for f in (first, second))
+    # Free or fixed.
+    ratio = max(float({**f.objective.fixed, **f.values}["eps_ratio"]) for f in (first, second))
     trials = []
     for name in ("V", "epsilon", "frequency"):
         for factor in _FACTORS:

@@ -27,7 +27,13 @@ from asperity.inference.design.candidates import (
     with_readings,
 )
 from asperity.inference.design.plan import DesignPlan, expected_values, plan_of, read_plan
-from asperity.inference.design.rival import RivalFit, penalty, probability_of_deciding, separation
+from asperity.inference.design.rival import (
+    RivalFit,
+    penalty,
+    probability_of_deciding,
+    reached,
+    separation,
+)
 from asperity.inference.design.shares import (
     Determinant,
     EvenGrid,
@@ -130,7 +136,8 @@ class Design:
     correlation : array, shape (n, n)
         Of the coordinates of the free parameters.
     fewer : float
-        How many times fewer readings than an even grid give the same interval, or chi-squared.
+        How many times fewer readings than an even grid give the same interval, or chi-squared;
+        NaN where a fit of the rival has not reached a minimum.
     grid_levels : tuple of int
         Levels of the even grid along each axis of the plan.
     grid_usable : (int, int)
@@ -146,7 +153,7 @@ class Design:
     chi2, chi2_grid : float or None
         Expected chi-squared by which the refitted rival is behind.
     probability, probability_grid : float or None
-        Of excluding the rival.
+        Of excluding the rival; None where its fit has not reached a minimum.
     rival_values : mapping of str to float or None
         Parameters with which the rival comes nearest to the design's readings.
     simulation : Simulated or None
@@ -278,8 +285,9 @@ _FEW = 3
 #: A simulated spread surprises if it differs by more of its own standard errors, plus this share
 #: of the expected one.
 _SURPRISING, _LINEAR = 3.0, 0.1
-#: Decrease of chi-squared that is left at the end of a fit that has not converged.
-_LEFT = 0.01
+#: Mean chi-squared of a reading below which two laws give the same readings. Of the pairs of eight
+#: laws at numbers of PMMA, those of which one contains the other have 1e-27, all others 1 or more.
+_SAME = 1e-12
 
 
 def design(
@@ -409,32 +417,55 @@ class _Task:
         plan, total = self.plan, self.plan.budget
         fits = RivalFit(plan, rival, self.candidates.points, self.expected)
         result = separation(fits, self.cost, total, self.report)
-        grid = self.grid.readings(self.cost, total)
-        on_grid = fits.fitted(grid, result.u)
+        n, grid = result.readings.astype(float), self.grid.readings(self.cost, total)
+        best, name = result.fitted, rival.law.name
+        values = "; ".join(f"{key} = {v:.4g}" for key, v in rival.named(best.u).items())
+        field = f"{plan.name}.rival"
+        if not math.isfinite(best.chi2):
+            rule, got = "have responses where the law has them", f"'{name}', which lost them"
+            advice = "narrow the ranges, or free fewer of its parameters"
+            raise InputError(field, rule, got, advice)
+        if best.chi2 < _SAME * n.sum():
+            rule = f"give other readings than {plan.truth.law.name} in the ranges"
+            got, advice = f"'{name}', which gives the same with {values}", "exchange the two laws"
+            raise InputError(field, rule, got, f"{advice}, or fix some of its parameters")
+        on_grid = fits.fitted(grid, best.u)
         probable, probable_on_grid = (
             probability_of_deciding(self.jacobian, linear, readings, plan.question.seed)
-            for linear, readings in (
-                (result.criterion, result.readings.astype(float)),
-                (fits.criterion(on_grid.u)[0], grid),
+            if fits.reached(readings, end)
+            else None
+            for readings, end, linear in (
+                (n, best, result.criterion),
+                (grid, on_grid, fits.criterion(on_grid.u, grid)[0]),
             )
         )
+        warnings = [
+            f"the fit of {name} to {where} ended next to values with which it has no response: "
+            "its chi-squared is not the least, and the probability of deciding is not known"
+            for where, p in (("these readings", probable), ("the even grid", probable_on_grid))
+            if p is None
+        ]
+        fewer = best.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf
         numbers: dict[str, Any] = {
-            "fewer": result.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf,
-            "chi2": result.chi2,
+            "fewer": math.nan if warnings else fewer,
+            "chi2": best.chi2,
             "chi2_grid": on_grid.chi2,
             "probability": probable,
             "probability_grid": probable_on_grid,
-            "rival_values": rival.named(result.u),
+            "rival_values": rival.named(best.u),
         }
         if result.unseen:
-            numbers["warnings"] = (
-                f"{rival.law.name} has no response at {result.unseen} candidates with the "
-                "values that come nearest; they were not judged",
+            warnings.append(
+                f"{name} has no response at {result.unseen} candidates with the values that come "
+                "nearest; they were not judged"
             )
-        whole = result.criterion.least_efficiency(result.chi2_shares - result.chi2, result.chi2)
-        reached = result.shares.efficiency * whole
-        other = (fits, result.u)
-        return self._described(result.readings, result.shares, reached, simulate, numbers, other)
+        numbers["warnings"] = warnings
+        whole = result.criterion.least_efficiency(result.chi2_shares - best.chi2, best.chi2)
+        shares, other = result.shares, (fits, best.u)
+        if probable is None:  # the bound is of a minimum
+            shares = replace(shares, efficiency=0.0)
+        least = shares.efficiency * whole
+        return self._described(result.readings, shares, least, simulate, numbers, other)
 
     def _determinant(self) -> Determinant:
         """The criterion at the expected values, or averaged over the draws."""
@@ -466,11 +497,11 @@ class _Task:
     ) -> Design:
         candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
-        said = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
+        warnings = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
         simulation = None
         if simulate:
             simulation = self._simulated(n.astype(float), simulate, rival)
-            said += _surprises(simulation, errors)
+            warnings += _surprises(simulation, errors)
         return Design(
             plan=self.plan,
             points=tuple(self._point(int(i), n) for i in np.flatnonzero(n)),
@@ -486,7 +517,7 @@ class _Task:
             combinations=candidates.total,
             left_out=candidates.left_out,
             simulation=simulation,
-            **{**numbers, "warnings": tuple(said)},
+            **{**numbers, "warnings": tuple(warnings)},
         )
 
     def _errors(self, n: Float) -> tuple[dict[str, ExpectedError], Float]:
@@ -511,28 +542,28 @@ class _Task:
         return errors, covariance / np.outer(sd, sd)
 
     def _warnings(self, errors: Mapping[str, ExpectedError], shares: Shares) -> list[str]:
-        said, usable = [], self.candidates.index.size
+        warnings, usable = [], self.candidates.index.size
         for unknown in self.plan.truth.unknowns:
             error = errors[unknown.name]
             slope = abs(unknown.slope(error.value))
             if error.se > UNDETERMINED * slope and (
                 unknown.name in (self.plan.question.measure or errors)
             ):
-                said.append(
+                warnings.append(
                     f"{unknown.name} will not be determined by these readings: its standard error "
                     f"will be {error.se:.3g} {error.unit}".rstrip()
                 )
         if shares.efficiency < _TRUSTED:
-            said.append(
+            warnings.append(
                 f"the search for the best shares ended early: they are at least "
                 f"{shares.efficiency:.2g} times as good as the best possible"
             )
         if usable < _FEW * len(errors):
-            said.append(
+            warnings.append(
                 f"only {usable} of {self.candidates.total} combinations can be used; "
                 "the ranges decide this design more than the question"
             )
-        return said
+        return warnings
 
     def _point(self, i: int, n: NDArray[np.int64]) -> DesignedPoint:
         readings = self.expected
@@ -597,8 +628,7 @@ def _refitted(
     other = term.with_table(readings).weighted(np.sqrt(counts))
     objective = replace(objective, terms=(other,))
     end = objective.minimise(u)
-    reached = math.isfinite(end.chi2) and objective.expected_decrease(end.u) < _LEFT
-    return end if reached else None
+    return end if reached(objective, end.u) else None
 
 
 def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
@@ -613,17 +643,17 @@ def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
 
 def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
     """Where the simulated fits differ from what was expected."""
-    said = []
+    warnings = []
     if simulation.failed:
-        said.append(
+        warnings.append(
             f"{simulation.failed} of {simulation.failed + simulation.sets} simulated fits did not "
             "converge"
         )
     for name, spread in simulation.spread.items():
         se, error = errors[name].se, simulation.uncertainty[name]
         if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
-            said.append(
+            warnings.append(
                 f"the simulated spread of {name}, {spread:.3g}, is not the expected standard error "
                 f"{se:.3g}: predictions are not linear in it over so wide a range"
             )
-    return said
+    return warnings

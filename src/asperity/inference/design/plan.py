@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Float
+from asperity.arrays import Float, spaced
 from asperity.errors import InputError, closest, require
 from asperity.inference.fitting.inputs import (
     fixed_values,
@@ -105,8 +105,8 @@ class DesignPlan:
 
     def candidates(self) -> dict[str, Float]:
         """Every combination of the levels, by name of the axis, the last axis fastest."""
-        grid = np.array(list(itertools.product(*self.axes.values())))
-        return dict(zip(self.axes, grid.T, strict=True))
+        grid = np.meshgrid(*self.axes.values(), indexing="ij")
+        return {name: levels.ravel() for name, levels in zip(self.axes, grid, strict=True)}
 
 
 def expected_values(hypothesis: Objective) -> dict[str, float]:
@@ -256,11 +256,10 @@ def _levels(name: str, given: Range, parameter: Parameter) -> Float:
     low = _quantity(given.from_, parameter, f"{label}.from")
     high = _quantity(given.to, parameter, f"{label}.to")
     require(low < high, f"{label}.to", "be above from", f"{high:g}", "exchange the two")
-    if (given.spacing or ("log" if name in _LOGARITHMIC else "linear")) == "linear":
-        return np.linspace(low, high, given.levels)
-    rule = "be positive with spacing 'log'"
-    require(not low <= 0, f"{label}.from", rule, f"{low:g}", "raise it, or choose 'linear'")
-    return np.geomspace(low, high, given.levels)
+    log = (given.spacing or ("log" if name in _LOGARITHMIC else "linear")) == "log"
+    rule, advice = "be positive with spacing 'log'", "raise it, or choose 'linear'"
+    require(low > 0 or not log, f"{label}.from", rule, f"{low:g}", advice)
+    return spaced(low, high, given.levels, log=log)
 
 
 def _noise(question: Design) -> dict[str, NoiseLevel]:
@@ -327,6 +326,8 @@ def _hypothesis(
     rule = f"have a value for each free parameter of {law.name}"
     got = f"none for {', '.join(missing)}"
     require(not missing, "plan.values", rule, got, "a design is made for values that are expected")
+    constants = fixed_values(law, table, free, fixed, material)
+    constants = {n: float(v) for n, v in constants.items() if n not in table.points}
     unknowns = unknowns_of(
         law,
         free,
@@ -334,8 +335,6 @@ def _hypothesis(
         start=start,
         priors=priors_of(question.prior, free),
     )
-    constants = fixed_values(law, table, free, fixed, material)
-    constants = {n: float(v) for n, v in constants.items() if n not in table.points}
     return Objective((), law, unknowns, constants)
 
 

@@ -9,6 +9,7 @@ rival follows from the linear predictions of both laws.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -33,6 +34,8 @@ _NEGLIGIBLE = 1e-4
 _EXCHANGES = 4
 #: Synthetic sets of readings, linear in the parameters, for the probability of deciding.
 _DRAWS = 20_000
+#: Decrease of chi-squared that is left at the end of a fit that has not reached a minimum.
+_LEFT = 0.01
 
 
 class Separation(NamedTuple):
@@ -42,10 +45,10 @@ class Separation(NamedTuple):
     ----------
     shares : Shares
     readings : int array, shape (candidates,)
-    chi2, chi2_shares : float
-        Of the rival refitted to the expected readings, for whole readings and for the shares.
-    u : array, shape (p,)
-        Coordinates of the rival there.
+    fitted : Minimum
+        The rival refitted to the expected whole readings.
+    chi2_shares : float
+        Of the rival refitted to the shares.
     criterion : Misfit
         At that fit.
     unseen : int
@@ -54,9 +57,8 @@ class Separation(NamedTuple):
 
     shares: Shares
     readings: NDArray[np.int64]
-    chi2: float
+    fitted: Minimum
     chi2_shares: float
-    u: Float
     criterion: Misfit
     unseen: int
 
@@ -92,14 +94,24 @@ class RivalFit:
         objective = self.to(n)
         return min((objective.minimise(u) for u in (*starts, self.start)), key=lambda m: m.chi2)
 
-    def criterion(self, u: Float) -> tuple[Misfit, Bool]:
-        """Misfit linear at the coordinates u, and the candidates at which there is a response."""
+    def reached(self, n: Float, end: Minimum) -> bool:
+        """Whether a fit to n readings of each candidate has reached a minimum."""
+        return reached(self.to(n), end.u)
+
+    def criterion(self, u: Float, n: Float) -> tuple[Misfit, Bool]:
+        """Misfit linear at a fit u to n readings, and the candidates at which there is a response.
+
+        A coordinate that is held at its bound does not move.
+        """
         values = self.rival.named(u)
         at = predicted(self.plan, self.rival, self.points, values)
         residual, jacobian = differences(self.rival, self.expected, at, values)
         # A point without a response is not judged: it tells nothing.
         residual = np.where(at.seen[:, None], residual, 0.0)
-        return Misfit(residual, jacobian, *self.rival.prior_residuals(u)), at.seen
+        prior, prior_slopes = self.rival.prior_residuals(u)
+        slope = np.einsum("i,im,imp->p", n, residual, jacobian) + prior @ prior_slopes
+        moving = ~self.rival.held(u, slope)
+        return Misfit(residual, jacobian * moving, prior, prior_slopes * moving), at.seen
 
 
 def separation(
@@ -117,12 +129,12 @@ def separation(
     progress : callable
     """
     readings = total / cost
-    criterion, _ = fits.criterion(fits.start)
+    criterion, _ = fits.criterion(fits.start, readings / readings.size)
     shares = _cleaned(optimal_shares(criterion, readings).shares)
     best, efficiency = fits.fitted(shares * readings), 0.0
     for round_ in range(_ROUNDS):
         progress(round_, _ROUNDS, "refits of the rival")
-        criterion, _ = fits.criterion(best.u)
+        criterion, _ = fits.criterion(best.u, shares * readings)
         slope = criterion.gradient(shares * readings) * readings
         gap = float(slope.max() - shares @ slope)
         efficiency = criterion.least_efficiency(gap, best.chi2)
@@ -133,7 +145,7 @@ def separation(
         for part in _PARTS:
             tried = _cleaned((1 - part) * shares + part * proposed)
             result = fits.fitted(tried * readings, best.u)
-            if result.chi2 > best.chi2 * (1 + 1e-6):
+            if best.chi2 * (1 + 1e-6) < result.chi2 < np.inf:
                 shares, best = tried, result
                 break
         else:
@@ -142,15 +154,20 @@ def separation(
     fitted = fits.fitted(n.astype(float), best.u)
     for _ in range(_EXCHANGES):
         progress(_ROUNDS, _ROUNDS, "whole readings")
-        linear, _ = fits.criterion(fitted.u)
+        linear, _ = fits.criterion(fitted.u, n.astype(float))
         changed = whole_readings(linear, cost, total, n * cost / total)
         again = fits.fitted(changed.astype(float), fitted.u)
-        if again.chi2 <= fitted.chi2 * (1 + 1e-6):
+        if not fitted.chi2 * (1 + 1e-6) < again.chi2 < np.inf:
             break
         n, fitted = changed, again
-    last, seen = fits.criterion(fitted.u)
+    last, seen = fits.criterion(fitted.u, n.astype(float))
     shared = Shares(shares, efficiency)
-    return Separation(shared, n, fitted.chi2, best.chi2, fitted.u, last, int((~seen).sum()))
+    return Separation(shared, n, fitted, best.chi2, last, int((~seen).sum()))
+
+
+def reached(objective: Objective, u: Float) -> bool:
+    """Whether u is a minimum, and not at the edge of where the law has responses."""
+    return math.isfinite(objective.chi2(u)) and objective.expected_decrease(u) < _LEFT
 
 
 def _cleaned(shares: Float) -> Float:

@@ -173,7 +173,7 @@ class Misfit:
 
     def least_efficiency(self, gap: float, value: float) -> float:
         """Of chi-squared."""
-        return float(value / (value + max(gap, 0.0))) if value > 0 else 0.0
+        return float(value / (value + max(gap, 0.0))) if 0 < value < math.inf else 0.0
 
     def restricted(self, rows: Index) -> Misfit:
         """The same for some of the candidates."""

@@ -119,7 +119,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
             f"{', '.join(missing)}; add them, or fix V and K where they are the same in all rows"
         )
     with_load = "W0" in columns
-    found = {}
+    arrays = {}
     for column, values in columns.items():
         if column not in _KINDS:
             continue
@@ -128,18 +128,18 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
         label = f"{name}.{column}"
         texts = isinstance(values, list | tuple) and any(isinstance(v, str) for v in values)
         plain = [to_si(v, kind, label) for v in values] if texts else values
-        found[column] = np.atleast_1d(np.asarray(obeying(plain, label, kind, rule), float))
-    rows = max(a.size for a in found.values())
-    for column, array in found.items():
+        arrays[column] = np.atleast_1d(np.asarray(obeying(plain, label, kind, rule), float))
+    rows = max(a.size for a in arrays.values())
+    for column, array in arrays.items():
         if array.ndim != 1 or array.size not in (1, rows):
             raise InputError(
                 f"{name}.{column} must have one value or {rows}, got an array of shape "
                 f"{array.shape}; give columns of one length"
             )
-        found[column] = np.broadcast_to(array, (rows,)).copy()
-    K = found["K"] / found["W0"] if with_load else found["K"]
+        arrays[column] = np.broadcast_to(array, (rows,)).copy()
+    K = arrays["K"] / arrays["W0"] if with_load else arrays["K"]
     return HealingTable(
-        name, found["hold_time"], found[HEALING], found.get("healing_err"), found["V"], K
+        name, arrays["hold_time"], arrays[HEALING], arrays.get("healing_err"), arrays["V"], K
     )
 
 

@@ -220,33 +220,33 @@ def posterior_of(
 
 
 def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str]:
-    said = []
+    warnings = []
     chains = stats.log_density.shape[0]
     for name, p in marginals.items():
         if not p.r_hat <= _AGREE:
-            said.append(
+            warnings.append(
                 f"chains disagree about {name} (R-hat {p.r_hat:.3f}); sample more draws, and look "
                 "for more than one maximum"
             )
         elif min(p.ess_bulk, p.ess_tail) < _ENOUGH * chains:
-            said.append(
-                f"draws of {name} are worth only {p.ess_bulk:.0f} independent ones (in the tails "
-                f"{p.ess_tail:.0f}); sample more"
+            warnings.append(
+                f"draws of {name} say as much as {p.ess_bulk:.0f} independent ones (in the tails "
+                f"{p.ess_tail:.0f}), which is too few; sample more"
             )
     failed, lost = int(stats.failed.sum()), int((stats.diverging & ~stats.failed).sum())
     if lost:
-        said.append(
+        warnings.append(
             f"{lost} of {stats.diverging.size} trajectories diverged: the posterior bends more "
             "sharply somewhere than the sampler can follow, and draws there are missing"
         )
     if failed > _FEW_FAILED * stats.failed.size:
-        said.append(
+        warnings.append(
             f"{failed} of {stats.failed.size} trajectories ended where the law has no motion that "
             "the program can compute (at some row of a table the fast method finds no periodic "
             "orbit, or in a recording sliding accelerates without bound); the posterior is cut off "
             "there"
         )
-    return said
+    return warnings
 
 
 def _observed(fit: Fit) -> dict[str, Float]:

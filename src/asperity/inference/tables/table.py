@@ -201,8 +201,7 @@ def read_table(
         _, lines = csv_rows(text.splitlines(keepends=True))
         header, *cells = list(lines) or [[]]
     texts, units = _columns(shown, header, cells)
-    rows = len(next(iter(texts.values())))
-    blank = np.full(rows, "")
+    blank = np.full(len(cells), "")
     kind, failed = texts.get(_KIND, blank), texts.get(_REASON, blank) != ""
     # Of a campaign, a level without modulation is a reading too.
     level = (kind == "level") & np.isin(texts.get("epsilon", blank), ("0", "0.0"))

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from asperity.arrays import Float
+from asperity.arrays import Float, between
 from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
@@ -114,10 +114,8 @@ class Axis:
     def at(self, u: Any) -> Float:
         """SI values at the fractions `u` of the axis, 0 at its lower and 1 at its upper end."""
         low, high = self._ends
-        u = np.asarray(u, dtype=float)
-        inner = low * (high / low) ** u if self.log else low + (high - low) * u
         # Rounding may leave the interval by a unit in the last place.
-        return np.clip(inner, low, high)
+        return np.clip(between(low, high, np.asarray(u, dtype=float), log=self.log), low, high)
 
     @property
     def _ends(self) -> tuple[float, float]:

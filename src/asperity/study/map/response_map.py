@@ -17,8 +17,7 @@ from asperity.operating_point import (
 )
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
-from asperity.parameters.arguments import FilePath, typed
-from asperity.study.engine import solve_here
+from asperity.parameters.arguments import FilePath, counted, typed
 from asperity.study.map.boundary import MapBoundary, trace_boundary
 from asperity.study.map.dataset import as_dataset
 from asperity.study.map.plane import OUTPUTS, Axis, MapPlane
@@ -167,14 +166,15 @@ def _solved(
                 grid.numbers[name][i] = float(cell)
             grid.outcome[i], grid.detail[i] = int(outcome), float(detail)
 
-    def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
-        part = plane.solve(nodes[start:stop], advance)
-        grid.put(slice(start, stop), part)
+    done = 0 if kept is None else kept.rows
+    advance = counted(progress, len(nodes), done)
+    advance(0)
+    for start in range(done, len(nodes), chunk):
+        part = plane.solve(nodes[start : start + chunk], advance)
+        grid.put(slice(start, start + chunk), part)
         if kept is not None:
             columns: list[Any] = [*part.numbers.values(), part.outcome, part.detail]
             kept.append_rows(list(zip(*(c.tolist() for c in columns), strict=True)))
-
-    solve_here(len(nodes), chunk, solve, progress, 0 if kept is None else kept.rows)
     return grid
 
 

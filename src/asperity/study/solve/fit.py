@@ -22,7 +22,6 @@ from asperity.parameters import (
     known_name,
     point_parameters,
 )
-from asperity.parameters.arguments import one_of
 from asperity.parameters.columns import readable
 from asperity.parameters.toml_file import file_content
 from asperity.questions.sweep import FitTable, Sweep
@@ -74,8 +73,6 @@ class FitSolve(SolveKind):
     """
 
     name = "fit"
-    outputs = ()
-    defaults = ()
 
     def parameters(self) -> dict[str, Parameter]:
         """As in `SolveKind`."""
@@ -110,17 +107,16 @@ class FitSolve(SolveKind):
         # A fit chooses missing start values; a simulation needs the true value of every parameter.
         return tuple(sorted(common | (set() if simulated else set(_free(table)))))
 
-    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
+    def known_outputs(self, laws: Sequence[str], settings: Mapping[str, Any]) -> dict[str, Output]:
         """As in `SolveKind`."""
-        known = list(_outputs(_free(_table(plan)), {}))
-        if plan.outputs is None:
-            return tuple(known)
-        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
-
-    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
-        """As in `SolveKind`."""
-        known = {**all_parameters(map(get_law, record["laws"])), **self.parameters()}
-        return _outputs(record["settings"]["free"], known)
+        known = {**all_parameters(map(get_law, laws)), **self.parameters()}
+        estimates = [
+            Output(f"{name}_{what}", known[name].unit or "1" if name in known else "1",
+                   f"{words} of {name}")
+            for name in settings["free"]
+            for what, words in _ESTIMATE.items()
+        ]  # fmt: skip
+        return {output.name: output for output in (*estimates, *_QUALITY)}
 
     def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
@@ -190,16 +186,6 @@ def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list
             written[canonical] = prior
     priors = priors_of(written, free)
     return {name: [p.mean, p.sd, p.source] for name, p in priors.items()}
-
-
-def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, Output]:
-    estimates = [
-        Output(f"{name}_{what}", known[name].unit or "1" if name in known else "1",
-               f"{words} of {name}")
-        for name in free
-        for what, words in _ESTIMATE.items()
-    ]  # fmt: skip
-    return {output.name: output for output in (*estimates, *_QUALITY)}
 
 
 def _digest(path: Path) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from asperity.laws import Law, get_law
 from asperity.outputs import require_memory
 from asperity.parameters import OUTPUTS, Output, Parameter
-from asperity.parameters.arguments import one_of
 from asperity.questions.sweep import Sweep
 from asperity.study.axes import columns_of
 from asperity.study.points import POINT_BYTES, Answers, Points
@@ -28,8 +27,8 @@ class SolveKind(ABC):
         Name in plans.
     outputs : tuple of Output
         Numbers that a store can keep of a point.
-    defaults : tuple of str
-        Names of the outputs that are kept if the plan names none.
+    defaults : tuple of str, optional
+        Names of the outputs that are kept if the plan names none; all by default.
     supplies : tuple of str
         Parameters of the law that a point need not have.
     fewest, most : int
@@ -37,8 +36,8 @@ class SolveKind(ABC):
     """
 
     name: ClassVar[str]
-    outputs: ClassVar[tuple[Output, ...]]
-    defaults: ClassVar[tuple[str, ...]]
+    outputs: ClassVar[tuple[Output, ...]] = ()
+    defaults: ClassVar[tuple[str, ...] | None] = None
     supplies: ClassVar[tuple[str, ...]] = ()
     fewest: ClassVar[int] = 1
     most: ClassVar[int] = 64
@@ -51,22 +50,9 @@ class SolveKind(ABC):
         """Parameters of the law that a point of this plan need not have."""
         return self.supplies
 
-    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
-        """Outputs of a plan with this record, by name."""
+    def known_outputs(self, laws: Sequence[str], settings: Mapping[str, Any]) -> dict[str, Output]:
+        """Outputs of a plan with these laws and `settings`, by name."""
         return {output.name: output for output in self.outputs}
-
-    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
-        """Names of the outputs that the plan keeps.
-
-        Raises
-        ------
-        InputError
-            If the plan names an unknown output.
-        """
-        if plan.outputs is None:
-            return self.defaults
-        known = [output.name for output in self.outputs]
-        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
     def settings(self, plan: Sweep) -> dict[str, Any]:
         """Settings of this kind of solve in a plan, as JSON values."""

@@ -30,7 +30,6 @@ class ThresholdSolve(SolveKind):
         Output("mode_frequency", "Hz", "frequency of the mode that starts to grow, modulo f"),
         Output("bifurcation", "1", "0: fold, 1: period doubling, 2: Neimark-Sacker"),
     )
-    defaults = tuple(output.name for output in outputs)
     supplies = ("K",)
     # Enough to share the fixed costs of a search.
     fewest, most = 24, 480
@@ -57,23 +56,17 @@ class ThresholdSolve(SolveKind):
         # A point has no stiffness; the softest one of the search is checked in its place.
         values["K"] = record["settings"]["between"][0] * critical
         sound = solvable(law, values, answers)
-        if len(sound):
-            values = {n: v[sound] for n, v in values.items()}
-            answers.put(sound, _search(law, values, critical[sound], record))
+        if not len(sound):
+            return answers
+        values, critical = {n: v[sound] for n, v in values.items()}, critical[sound]
+        low, high = (end * critical for end in record["settings"]["between"])
+        searched = search_thresholds(law, values, low, high, record["settings"]["scan"])
+        numbers = {
+            "K_threshold": searched["K"],
+            "threshold_ratio": searched["K"] / critical,
+            "mode_frequency": searched["turn"] * values["frequency"],
+            "bifurcation": searched["bifurcation"],
+        }
+        kept = {name: numbers[name] for name in record["outputs"]}
+        answers.put(sound, Answers(kept, searched.outcome, searched.detail / critical))
         return answers
-
-
-def _search(
-    law: type[Law], values: dict[str, np.ndarray], critical: np.ndarray, record: Mapping[str, Any]
-) -> Answers:
-    settings = record["settings"]
-    low, high = settings["between"]
-    searched = search_thresholds(law, values, low * critical, high * critical, settings["scan"])
-    numbers = {
-        "K_threshold": searched["K"],
-        "threshold_ratio": searched["K"] / critical,
-        "mode_frequency": searched["turn"] * values["frequency"],
-        "bifurcation": searched["bifurcation"],
-    }
-    kept = {name: numbers[name] for name in record["outputs"]}
-    return Answers(kept, searched.outcome, searched.detail / critical)

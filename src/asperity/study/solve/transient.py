@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +47,6 @@ class TransientSolve(SolveKind):
     """`asperity.transient` at every point, from steady sliding at V under W0."""
 
     name = "transient"
-    outputs = ()
-    defaults = ()
     # A load programme need not have a modulation.
     supplies = ("epsilon", "frequency")
 
@@ -58,6 +56,9 @@ class TransientSolve(SolveKind):
         assert table is not None  # a plan has the settings of its solve
         advice = "write it like numbers.peak = { of = 'friction', take = 'max' }"
         require(table.numbers, "transient.numbers", "have at least one number", "none", advice)
+        if plan.outputs is not None:
+            rule = "be left out where solve is 'transient'"
+            raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
         numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
         _check_steps(plan, table)
         return {
@@ -68,67 +69,40 @@ class TransientSolve(SolveKind):
             "numbers": numbers,
         }
 
-    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
+    def known_outputs(self, laws: Sequence[str], settings: Mapping[str, Any]) -> dict[str, Output]:
         """The numbers that the plan names."""
-        if plan.outputs is not None:
-            rule = "be left out where solve is 'transient'"
-            raise InputError("outputs", rule, len(plan.outputs), "transient.numbers names them")
-        return tuple(plan.transient.numbers) if plan.transient is not None else ()
-
-    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
-        """As in `SolveKind`."""
         return {
             name: Output(name, CHANNELS[entry["of"]], f"{entry['take']} of {entry['of']}")
-            for name, entry in record["settings"]["numbers"].items()
+            for name, entry in settings["numbers"].items()
         }
 
     def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        values = _values(points, law.name)
+        values = points.of_law(law.name)
+        for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):  # without a modulation
+            values[name] = np.where(np.isnan(values[name]), absent, values[name])
+        settings = record["settings"]
         for k in solvable(law, values, answers):
             point = {n: float(v[k]) for n, v in values.items()}
             named = {n: float(v[k]) for n, v in points.values.items()} | point
-            _integrate(law, point, named, int(k), record["settings"], answers)
+            steps = _planned(settings["steps"], named, Path())
+            trajectory = transient(
+                slider_from(law, point),
+                Programme(*steps, load=point["W0"], velocity=point["V"]),
+                sampling=settings["sampling"],
+                inertia=bool(point["inertia"]),
+                radiation_damping=point["eta"] if point["eta"] > 0 else None,
+                rtol=settings["rtol"],
+                most_steps=settings["most_steps"],
+            )
+            if trajectory.termination is not None:
+                answers.fail(k, SweepOutcome.STOPPED, trajectory.termination.time)
+                continue
+            for name, entry in settings["numbers"].items():
+                answers.numbers[name][k] = _statistic(trajectory, entry)
+            answers.outcome[k] = SweepOutcome.CONVERGED
         return answers
-
-
-def _values(points: Points, law: str) -> dict[str, np.ndarray]:
-    """Values of the points, with an amplitude of 0 for points without a modulation."""
-    values = points.of_law(law)
-    for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):
-        values[name] = np.where(np.isnan(values[name]), absent, values[name])
-    return values
-
-
-def _integrate(
-    law: type[Law],
-    values: dict[str, float],
-    named: Mapping[str, float],
-    row: int,
-    settings: Mapping[str, Any],
-    answers: Answers,
-) -> None:
-    lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
-    steps, mistakes = planned_steps(lines, Path())
-    if mistakes:
-        raise InputError("; ".join(map(str, mistakes)))
-    programme = Programme(*(s.step for s in steps), load=values["W0"], velocity=values["V"])
-    trajectory = transient(
-        slider_from(law, values),
-        programme,
-        sampling=settings["sampling"],
-        inertia=bool(values["inertia"]),
-        radiation_damping=values["eta"] if values["eta"] > 0 else None,
-        rtol=settings["rtol"],
-        most_steps=settings["most_steps"],
-    )
-    if trajectory.termination is not None:
-        answers.fail(row, SweepOutcome.STOPPED, trajectory.termination.time)
-        return
-    for name, entry in settings["numbers"].items():
-        answers.numbers[name][row] = _statistic(trajectory, entry)
-    answers.outcome[row] = SweepOutcome.CONVERGED
 
 
 def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
@@ -142,13 +116,14 @@ def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
     return TAKEN[entry["take"]](channel[inside]) if inside.any() else float("nan")
 
 
-class _WithUnits(dict[str, Any]):
-    """Values with their SI units as texts, by name, as a protocol writes them."""
-
-    def __init__(self, values: Mapping[str, float]) -> None:
-        known = all_parameters([])
-        units = {n: known[n].unit if n in known else "" for n in values}
-        super().__init__({n: f"{v!r} {units[n]}".strip() for n, v in values.items()})
+def _planned(lines: Iterable[str], values: Mapping[str, float], folder: Path) -> list[Any]:
+    """Steps of a protocol's lines, with values in SI in place of the names in braces."""
+    known = all_parameters([])
+    texts = {n: f"{v!r} {known[n].unit if n in known else ''}".strip() for n, v in values.items()}
+    steps, mistakes = planned_steps([line.format_map(texts) for line in lines], folder)
+    if mistakes:
+        raise InputError("; ".join(map(str, mistakes)))
+    return [planned.step for planned in steps]
 
 
 def _number(name: str, entry: NumberTable) -> dict[str, Any]:
@@ -173,7 +148,4 @@ def _check_steps(plan: Sweep, table: TransientTable) -> None:
             if name is not None and name not in known:
                 rule = "name parameters in braces"
                 raise InputError("transient.steps", rule, f"'{{{name}}}'", closest(name, known))
-    examples = _WithUnits(dict.fromkeys(known, 0.5))
-    _, mistakes = planned_steps([line.format_map(examples) for line in table.steps], plan.folder)
-    if mistakes:
-        raise InputError("; ".join(map(str, mistakes)))
+    _planned(table.steps, dict.fromkeys(known, 0.5), plan.folder)

@@ -184,8 +184,9 @@ def _skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
     """
     arrays = _Arrays()
     dims = [axis.name for axis in grid.axes]
-    known = SOLVES[grid.record["solve"]].known_outputs(grid.record)
-    for name in grid.record["outputs"]:
+    record = grid.record
+    known = SOLVES[record["solve"]].known_outputs(record["laws"], record.get("settings", {}))
+    for name in record["outputs"]:
         arrays.add(name, grid.shape, grid.chunks, dims, "float64", known[name].attributes)
     arrays.add("outcome", grid.shape, grid.chunks, dims, "int16", flag_attributes(),
                fill=int(SweepOutcome.NOT_COMPUTED))  # fmt: skip

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.ledger import check
-from asperity_papers.marone1998.laboratory import AGEING, LAWS, PRZ, SLIP, Laboratory, scans
-
-Numbers = dict[str, float]
-Float = NDArray[np.float64]
+from asperity_papers.marone1998.laboratory import (
+    AGEING,
+    LAWS,
+    PRZ,
+    SLIP,
+    Float,
+    Laboratory,
+    Numbers,
+    by_law,
+    by_time,
+    scans,
+)
 
 #: Hold times (s) of the claims that name none, and stiffnesses (1/m) of those on stiffness.
 TIMES = np.array([1.0, 10.0, 100.0, 1e3, 1e4])
@@ -29,42 +36,27 @@ def relative(new: Float, old: Float) -> float:
 
 @check("maximum-at-load-velocity")
 def maximum_at_load_velocity(laboratory: Laboratory) -> Numbers:
-    off = {}
-    for name, letter in LAWS.items():
-        held = laboratory.holds(name, *laboratory.stiff, TIMES)
-        law = laboratory.granite(name)
+    def off(name: str) -> Float:
+        held, law = laboratory.holds(name, *laboratory.stiff, TIMES), laboratory.granite(name)
         rate_term = law.A * np.log(held.velocity_at_maximum / held.velocity)
-        off[letter] = float(np.max(np.abs(rate_term)) / law.A)
-    return off
+        return np.max(np.abs(rate_term)) / law.A
+
+    return by_law(off)
 
 
 @check("ageing-soft")
 def ageing_soft(laboratory: Laboratory) -> Numbers:
     times = np.array([2.0, 10.0, 100.0, 1e3, 1e4, 1e5])
-    healing = laboratory.healing(AGEING, *laboratory.soft, times)
-    return {f"{t:g} s": float(h) for t, h in zip(times, healing, strict=True)}
+    return by_time(times, laboratory.healing(AGEING, *laboratory.soft, times))
 
 
-def _off(laboratory: Laboratory, name: str, reading: str) -> Numbers:
+@check("ageing-stiff", AGEING, "ageing")
+@check("slip-curves", SLIP, "slip")
+@check("prz-curves", PRZ, "perrin_rice_zheng")
+def off_the_curve(laboratory: Laboratory, name: str, reading: str) -> Numbers:
     times, read = pairs(reading)
     healing = laboratory.healing(name, *laboratory.stiff, times)
-    off = {f"off at {t:g} s": float(h - r) for t, h, r in zip(times, healing, read, strict=True)}
-    return off | {f"{t:g} s": float(h) for t, h in zip(times, healing, strict=True)}
-
-
-@check("ageing-stiff")
-def ageing_stiff(laboratory: Laboratory) -> Numbers:
-    return _off(laboratory, AGEING, "ageing")
-
-
-@check("slip-curves")
-def slip_curves(laboratory: Laboratory) -> Numbers:
-    return _off(laboratory, SLIP, "slip")
-
-
-@check("prz-curves")
-def prz_curves(laboratory: Laboratory) -> Numbers:
-    return _off(laboratory, PRZ, "perrin_rice_zheng")
+    return by_time(times, healing - read, "off at ") | by_time(times, healing)
 
 
 @check("legend-velocity")
@@ -84,7 +76,7 @@ def ageing_same_values(laboratory: Laboratory) -> Numbers:
     soft, stiff = (
         laboratory.healing(AGEING, *spring, times) for spring in (laboratory.soft, laboratory.stiff)
     )
-    return {f"{t:g} s": float(b / a - 1) for t, a, b in zip(times, soft, stiff, strict=True)}
+    return by_time(times, stiff / soft - 1)
 
 
 @check("ageing-same-rate")
@@ -116,8 +108,8 @@ def ageing_rises(laboratory: Laboratory) -> Numbers:
 @check("slip-falls-with-stiffness")
 def slip_falls(laboratory: Laboratory) -> Numbers:
     change = _over_stiffness(laboratory, SLIP)
-    by_time = {f"largest at {t:g} s": float(c) for t, c in zip(TIMES, change.max(0), strict=True)}
-    return {"largest": float(change.max()), "rising": float(np.mean(change > 0)), **by_time}
+    extremes = {"largest": float(change.max()), "rising": float(np.mean(change > 0))}
+    return extremes | by_time(TIMES, change.max(0), "largest at ")
 
 
 @check("slip-rate-falls-with-stiffness")
@@ -135,8 +127,7 @@ def slip_difference_widens(laboratory: Laboratory) -> Numbers:
     reference = laboratory.healing(SLIP, soft, V, times)
     equal, actual = (reference - laboratory.healing(SLIP, stiff, v, times) for v in (V, slow))
     more = actual - equal
-    by_time = {f"{t:g} s": float(m) for t, m in zip(times, more, strict=True)}
-    return {"smallest": float(more.min()), **by_time}
+    return {"smallest": float(more.min())} | by_time(times, more)
 
 
 @check("prz-less-sensitive")
@@ -151,8 +142,7 @@ def prz_less_sensitive(laboratory: Laboratory) -> Numbers:
         for name in (SLIP, PRZ)
     }
     less = change[SLIP] - change[PRZ]
-    by_time = {f"{t:g} s": float(v) for t, v in zip(times, less, strict=True)}
-    return {"smallest": float(less.min()), **by_time}
+    return {"smallest": float(less.min())} | by_time(times, less)
 
 
 @check("prz-below-data")
@@ -227,22 +217,23 @@ def long_hold_limit(laboratory: Laboratory) -> Numbers:
 
 @check("rises-with-velocity")
 def rises_with_velocity(laboratory: Laboratory) -> Numbers:
-    p, more = laboratory.numbers, {}
+    p = laboratory.numbers
     V = p.V_soft * np.array([[1.0], [10.0]])
-    for name, letter in LAWS.items():
-        slow, fast = laboratory.healing(name, p.k_stiff, V, TIMES)
-        more[letter] = float(np.min(fast - slow))
-    return more
+    return by_law(
+        lambda name: np.min(np.diff(laboratory.healing(name, p.k_stiff, V, TIMES), axis=0))
+    )
 
 
 @check("product-of-velocity-and-time")
 def product(laboratory: Laboratory) -> Numbers:
-    p, off = laboratory.numbers, {}
+    p = laboratory.numbers
     V, time = p.V_soft * np.array([1.0, 10.0]), np.array([1e3, 1e2])
-    for name, letter in LAWS.items():
+
+    def off(name: str) -> Float:
         one, other = laboratory.healing(name, p.k_stiff, V, time)
-        off[letter] = float(other / one - 1)
-    return off
+        return other / one - 1
+
+    return by_law(off)
 
 
 @check("faster-falls-faster")
@@ -253,7 +244,7 @@ def faster_falls_faster(laboratory: Laboratory) -> Numbers:
     times = np.array([1.0, 10.0, 100.0, 1e3])
     for name, letter in LAWS.items():
         slow, fast = laboratory.holds(name, p.k_stiff, V, times).end_velocity
-        lower |= {f"{letter}, {t:g} s": float(v) for t, v in zip(times, fast / slow, strict=True)}
+        lower |= by_time(times, fast / slow, f"{letter}, ")
     return lower
 
 
@@ -265,26 +256,29 @@ def higher_state(laboratory: Laboratory) -> Numbers:
     times = np.array([10.0, 100.0, 1e3, 1e4])
     for name, letter in LAWS.items():
         slow, fast = laboratory.holds(name, p.k_stiff, V, times).states[..., 1]
-        more |= {f"{letter}, {t:g} s": float(d) for t, d in zip(times, fast - slow, strict=True)}
+        more |= by_time(times, fast - slow, f"{letter}, ")
     return more
 
 
 @check("not-the-direct-effect")
 def not_the_direct_effect(laboratory: Laboratory) -> Numbers:
-    p, change = laboratory.numbers, {}
-    for name, letter in LAWS.items():
+    p = laboratory.numbers
+
+    def change(name: str) -> Float:
         base, more = (
             laboratory.healing(name, *laboratory.stiff, 1e3, A=A) for A in (p.A, 1.5 * p.A)
         )
-        change[letter] = abs(float(more / base - 1))
-    return change
+        return abs(more / base - 1)
+
+    return by_law(change)
 
 
 @check("stress-falls-by-slip")
 def stress_falls_by_slip(laboratory: Laboratory) -> Numbers:
-    off = {}
-    for name, letter in LAWS.items():
-        k, V = laboratory.stiff
+    k, V = laboratory.stiff
+
+    def off(name: str) -> float:
         held = laboratory.holds(name, k, V, TIMES)
-        off[letter] = relative(held.relaxation, k * held.hold_slip)
-    return off
+        return relative(held.relaxation, k * held.hold_slip)
+
+    return by_law(off)

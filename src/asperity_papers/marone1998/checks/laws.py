@@ -7,9 +7,16 @@ import numpy as np
 from asperity.experiment import step_response
 from asperity.ledger import check
 from asperity.theory import memory
-from asperity_papers.marone1998.laboratory import AGEING, DECADE, LAWS, PRZ, SLIP, Laboratory
-
-Numbers = dict[str, float]
+from asperity_papers.marone1998.laboratory import (
+    AGEING,
+    DECADE,
+    LAWS,
+    PRZ,
+    SLIP,
+    Laboratory,
+    Numbers,
+    by_law,
+)
 
 
 def _rate(law: object, v: float, log_age: float) -> float:
@@ -20,12 +27,14 @@ def _rate(law: object, v: float, log_age: float) -> float:
 
 @check("steady-state-slope")
 def steady_state_slope(laboratory: Laboratory) -> Numbers:
-    p, off = laboratory.numbers, {}
+    p = laboratory.numbers
     V = p.V0 * np.array([0.1, 10.0])
-    for name, letter in LAWS.items():
+
+    def off(name: str) -> float:
         mu = np.asarray(laboratory.illustration(name).mu_ss(V))
-        off[letter] = float(np.diff(mu)[0] / np.log(100) / (p.A_2 - p.B_2) - 1)
-    return off
+        return float(np.diff(mu)[0] / np.log(100) / (p.A_2 - p.B_2) - 1)
+
+    return by_law(off)
 
 
 @check("dynamic-slope-per-decade")
@@ -103,28 +112,23 @@ def slip_scales_with_velocity(laboratory: Laboratory) -> Numbers:
     }
 
 
+@check("prz-symmetric", PRZ)
+def symmetric(laboratory: Laboratory, name: str) -> Numbers:
+    u = laboratory.numbers.D0_2 * np.array([0.1, 1.0, 3.0])
+    law = laboratory.illustration(name)
+    up, down = (np.asarray(memory.state_after_step(law, r, u)) for r in (10.0, 0.1))
+    return {"off": float(np.max(np.abs(up + down)))}
+
+
 @check("slip-law-symmetric")
 def slip_law_symmetric(laboratory: Laboratory) -> Numbers:
     p, law = laboratory.numbers, laboratory.illustration(SLIP)
-    u = p.D0_2 * np.array([0.1, 1.0, 3.0])
-    up, down = (np.asarray(memory.state_after_step(law, r, u)) for r in (10.0, 0.1))
     step = step_response(
         law, velocity_before=[p.V0, 10 * p.V0], velocity=[10 * p.V0, p.V0], stiffness=p.k_2
     )
     sizes = np.abs(step.direct)
-    return {
-        "off": float(np.max(np.abs(up + down))),
-        "up on the spring": float(sizes[0]),
-        "down on the spring": float(sizes[1]),
-    }
-
-
-@check("prz-symmetric")
-def prz_symmetric(laboratory: Laboratory) -> Numbers:
-    p, law = laboratory.numbers, laboratory.illustration(PRZ)
-    u = p.D0_2 * np.array([0.1, 1.0, 3.0])
-    up, down = (np.asarray(memory.state_after_step(law, r, u)) for r in (10.0, 0.1))
-    return {"off": float(np.max(np.abs(up + down)))}
+    springs = {"up on the spring": float(sizes[0]), "down on the spring": float(sizes[1])}
+    return symmetric(laboratory, SLIP) | springs
 
 
 @check("healing-law-as-rate")

@@ -9,9 +9,15 @@ from asperity.experiment import VelocityStepResponse, step_response
 from asperity.ledger import check
 from asperity.loads import Programme, Slide
 from asperity.theory import memory
-from asperity_papers.marone1998.laboratory import AGEING, LAWS, PRZ, SLIP, Laboratory
-
-Numbers = dict[str, float]
+from asperity_papers.marone1998.laboratory import (
+    AGEING,
+    LAWS,
+    PRZ,
+    SLIP,
+    Laboratory,
+    Numbers,
+    by_law,
+)
 
 #: Over the paper's: a spring that hardly yields.
 _STIFF = 1e4
@@ -53,8 +59,8 @@ def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
     def change(law: str, *stiffness: float) -> float:
         return float(getattr(up_and_down(laboratory, law, *stiffness), name)[0])
 
-    printed = {letter: change(law) for law, letter in LAWS.items()}
-    return printed | {f"{letter}, stiff": change(law, _STIFF) for law, letter in LAWS.items()}
+    stiff = {f"{letter}, stiff": change(law, _STIFF) for law, letter in LAWS.items()}
+    return by_law(change) | stiff
 
 
 @check("end-level")
@@ -62,15 +68,14 @@ def end_level(laboratory: Laboratory) -> Numbers:
     """At 7 Dc, by an integration of that length, and in the end."""
     p = laboratory.numbers
     slow, fast = laboratory.pair("V_2")
-    found = {}
-    for name, letter in LAWS.items():
-        slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
-        run = transient(
-            slider, Programme(Slide(7 * p.D0_2 / fast, velocity=fast), load=1.0, velocity=slow)
-        )
-        found[letter] = float(run.force[0] - run.force[-1])
+    steps = Programme(Slide(7 * p.D0_2 / fast, velocity=fast), load=1.0, velocity=slow)
+
+    def drop(name: str) -> float:
+        run = transient(Slider(laboratory.illustration(name), spring=p.k_2, load=1.0), steps)
+        return float(run.force[0] - run.force[-1])
+
     step = up_and_down(laboratory, AGEING)
-    return found | {"in the end": float(step.before[0] - step.after[0])}
+    return by_law(drop) | {"in the end": float(step.before[0] - step.after[0])}
 
 
 @check("direct-effect")

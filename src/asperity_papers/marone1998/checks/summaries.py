@@ -7,9 +7,7 @@ from scipy.optimize import least_squares
 
 from asperity.experiment import hold_response
 from asperity.ledger import check
-from asperity_papers.marone1998.laboratory import AGEING, DECADE, Laboratory, scans
-
-Numbers = dict[str, float]
+from asperity_papers.marone1998.laboratory import AGEING, DECADE, Laboratory, Numbers, scans
 
 _DAY = 86400.0
 
