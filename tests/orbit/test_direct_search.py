@@ -146,6 +146,32 @@ def test_a_point_takes_the_orbit_of_another_call_only_where_it_has_none():
     np.testing.assert_array_equal(second.orbit.nodes, other)
 
 
+def test_an_orbit_that_no_motion_settles_on_is_kept_by_the_whole_search_for_the_direct_one():
+    """A multiplier of -3.6: the motion takes two periods to repeat."""
+    unstable = {
+        "mu0": 0.525226,
+        "A": 0.00466741,
+        "B": 0.00852362,
+        "D0": 2.21355e-6,
+        "V0": 1e-6,
+        "K": 25217.6,
+        "W0": 10.2798,
+        "V": 9.55845e-6,
+        "frequency": 0.764565,
+        "epsilon": np.array([0.0885314]),
+    }
+    known, points = KnownOrbits(2), {**unstable, "epsilon": np.repeat(unstable["epsilon"], 2)}
+    assert DIRECT(points, known).outcome.tolist() == [Outcome.NO_ORBIT] * 2
+    second = KnownOrbits(1)
+    whole = WHOLE(unstable, second)
+    known.complete(second, np.array([1]))
+    assert known.known.tolist() == [False, True]
+    values = DIRECT(points, known)
+    assert values.outcome.tolist() == [Outcome.NO_ORBIT, Outcome.CONVERGED]
+    assert values.mean_friction[1] == pytest.approx(whole.mean_friction[0], rel=1e-9)
+    np.testing.assert_allclose(values.harmonics[1], whole.harmonics[0], rtol=1e-8)
+
+
 def test_points_out_of_range_are_named_so():
     values = DIRECT(at(epsilon=np.array([0.2, 0.9995])), KnownOrbits(2))
     assert values.outcome.tolist() == [Outcome.CONVERGED, Outcome.OUT_OF_RANGE]
@@ -155,7 +181,7 @@ def test_points_out_of_range_are_named_so():
 @pytest.mark.parametrize(
     ("model", "known", "message"),
     [
-        (WHOLE, KnownOrbits(5), "must go with search"),
+        (response_function("rice-ruina", search=False), KnownOrbits(5), "must go with a search"),
         (DIRECT, KnownOrbits(4), "as many points as the parameters, 5, got 4"),
     ],
 )

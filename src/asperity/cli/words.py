@@ -68,6 +68,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
         option = name
         if whole in _PAIRS and whole in (options or {}):
             option, key = known[whole], part
+    if name in _PAIRS and key and value:
+        return f"{option} {_quoted(f'{key}={value}', also='=')}"
     # A switch says yes or no by itself.
     value = "" if value in ("True", "False") else value
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])

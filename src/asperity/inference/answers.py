@@ -131,23 +131,21 @@ def read_data(
         elif table:
             result.append(read_table(data.file, at, name=data.name))
         else:
-            trace = read(data)
-            cycle = _stick_slip(data, trace, question.fixed)
-            result.append(
-                recorded_run(trace, window=data.window, **_reading(data))
-                if cycle is None
-                else cycle
-            )
+            trace, reading = read(data), _reading(data)
+            cycle = None
+            if data.steps is None and data.velocities is None:
+                cycle = _stick_slip(trace, reading["name"], question.fixed, data.window)
+            result.append(cycle or recorded_run(trace, window=data.window, **reading))
     return result
 
 
 def _stick_slip(
-    data: questions.Data, trace: Trace, fixed: Mapping[str, Any]
+    trace: Trace,
+    name: str,
+    fixed: Mapping[str, Any],
+    window: tuple[float, float] | None = None,
 ) -> AveragedCycle | None:
     """The averaged cycle of a recording of stick-slip; None of any other."""
-    if data.steps is not None or data.velocities is not None:
-        return None
-    name = Path(data.name or data.file).stem
     drive = trace.has("displacement") or trace.has("velocity")
     if not drive and (hertz := modulation_of(trace)) is not None:
         raise InputError(
@@ -167,7 +165,7 @@ def _stick_slip(
             # The reader of runs takes K over the load.
             K, over_load = None, True
         machine = Machine(K, V, given.get("M"), given.get("W0"))
-        measurement = measure_stick_slip(trace, window=data.window, machine=machine)
+        measurement = measure_stick_slip(trace, window=window, machine=machine)
     except InputError:
         # The reader of runs checks the numbers again.
         return None
@@ -176,8 +174,9 @@ def _stick_slip(
     if over_load:
         raise InputError(
             f"K must be in N/m for a fit of the cycles of {name}, got '{fixed['K']}'; multiply it "
-            "by the load, as --fix 'K=300 N/m', with --fix 'W0=0.3 N'; of a force over the weight "
-            "the load is that of the mass, as --fix 'M=30 g'"
+            f"by the load, as {Argument('fixed', 'K', '300 N/m')}, with "
+            f"{Argument('fixed', 'W0', '0.3 N')}; of a force over the weight the load is that of "
+            f"the mass, as {Argument('fixed', 'M', '30 g')}"
         )
     return averaged_cycle(measurement, name)
 
@@ -299,7 +298,7 @@ def answer_comparison(
 
 
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
-    """Sets of data as they are, files as what they hold."""
+    """Sets of data as they are, files and recordings as what they hold."""
     several = data if isinstance(data, list | tuple) else [data]
     loaded: list[Any] = []
     for one in several:
@@ -307,6 +306,8 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
             file = questions.Data(file=Path(one))
             question = questions.Fit(data=(file,), fixed=dict(fixed or {}))
             loaded += read_data(question)
+        elif isinstance(one, Trace):
+            loaded.append(_stick_slip(one, "run", fixed or {}) or one)
         else:
             loaded.append(one)
     return loaded
@@ -339,7 +340,8 @@ def fit(
     Parameters
     ----------
     data : path, Trace, RecordedRun, LockInTable or HealingTable, or a list of them
-        A file is read as what it is: a table of readings, one of holds, or a recording.
+        A file is read as what it is: a table of readings, one of holds, or a recording. Of
+        stick-slip the averaged cycle is fitted, with the velocity of the drive in ``fixed``.
     law : str or type of Law, optional
         By default ``rice-ruina`` for recordings and holds, ``elasto-plastic`` for readings.
     free : sequence of str, optional

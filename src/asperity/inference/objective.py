@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from asperity.arrays import Bool, Float, Index
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
@@ -171,7 +171,7 @@ class DataTerm(ABC):
             For data whose prediction has no derivatives within compiled programs.
         """
         rule = "be of lock-in readings or recordings of sliding"
-        advice = "take intervals by profile likelihood (profile=True, --profile)"
+        advice = f"take intervals by profile likelihood ({Argument('profile', value='True')})"
         raise InputError("a posterior", rule, self.name, advice)
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
@@ -218,6 +218,9 @@ class DataTerm(ABC):
 
     def use_search(self, always: bool) -> None:  # noqa: B027
         """Try the slower method at every call, or no more; of data that have one."""
+
+    def search_wholly(self, values: Mapping[str, float]) -> None:  # noqa: B027
+        """Search by every method for solutions there, for later calls to begin with."""
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
@@ -369,6 +372,12 @@ class Objective:
             term.use_search(always)
         self.forget()
 
+    def search_wholly(self, u: Float) -> None:
+        """Let every term search by every method for solutions at u, to begin with from then on."""
+        for term in self.terms:
+            term.search_wholly(self.named(u))
+        self.forget()
+
     def minimise(
         self,
         u: Float,
@@ -399,9 +408,8 @@ class Objective:
         # So far inside that SciPy does not move the first point.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
-        terms = tuple(term.coarser() for term in self.terms)
-        if any(a is not b for a, b in zip(terms, self.terms, strict=True)):
-            ahead = replace(self, terms=terms)
+        ahead = self.coarser()
+        if ahead is not self:
             near = ahead.minimise(point, kept, tolerance=tolerance, evaluations=evaluations)
             self.unsolved += ahead.unsolved
             if self.chi2(near.u) <= self.chi2(point):
@@ -446,6 +454,12 @@ class Objective:
         )
         found = whole(result.x)
         return Minimum(found, self.chi2(found))
+
+    def coarser(self) -> Objective:
+        """The objective of `DataTerm.coarser` data; itself where that has no coarser model."""
+        terms = tuple(term.coarser() for term in self.terms)
+        same = all(a is b for a, b in zip(terms, self.terms, strict=True))
+        return self if same else replace(self, terms=terms)
 
     def expected_decrease(self, u: Float) -> float:
         """Decrease of chi-squared that residuals linear in the coordinates would allow.

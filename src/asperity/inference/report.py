@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from asperity.inference.comparison.compare import Comparison, laws_table
-from asperity.inference.fitting.result import NOT_DETERMINED, Estimate, Fit, Shown
+from asperity.inference.fitting.result import (
+    MISFIT,
+    NOT_DETERMINED,
+    Estimate,
+    Fit,
+    Shown,
+    with_error,
+)
 from asperity.inference.fitting.windows import WindowedFit
 from asperity.inference.holds.table import HoldTerm
 from asperity.inference.posterior import Posterior
@@ -16,11 +23,6 @@ from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.tables import Section, two_digits
 from asperity.units import quantity_text
-
-#: Probability of chi-squared below which law or uncertainties are wrong.
-_MISFIT = 0.01
-#: Standard errors from which the sign of A - B is known.
-_KNOWN_SIGN = 2.0
 
 
 def fit_report(fit: Fit) -> list[Section]:
@@ -42,41 +44,20 @@ def fit_report(fit: Fit) -> list[Section]:
     ]
 
 
-def _with_error(value: float, error: float) -> str:
-    """Both with as many decimals as the error bears: two uncertain digits."""
-    places = max(0, 1 - math.floor(math.log10(error))) if error else 6
-    return f"{value:.{places}f} +- {error:.{places}f}"
-
-
 def fit_in_words(fit: Fit) -> tuple[str, ...]:
     """What a fit says of the friction, before its numbers."""
     if not fit.converged:
         return ()
-    doubts = [doubt for term in fit.objective.terms_of(RunTerm) for doubt in term.doubts]
-    if fit.judged_by_chi2 and fit.dof > 0 and fit.p_value < _MISFIT:
-        doubts.append(
-            f"the law does not describe the data within their uncertainties (p = {fit.p_value:.2g})"
-        )
-    sentences = [f"These numbers are doubtful: {'; '.join(doubts)}."] if doubts else []
-    difference = rate_dependence(fit)
+    sentences = [f"These numbers are doubtful: {'; '.join(fit.doubts)}."] if fit.doubts else []
+    difference = fit.rate_dependence
     if difference is not None:
-        value, error = difference
-        kind = "velocity weakening" if value < 0 else "velocity strengthening"
-        # A minimum that the data allow as well may have the other sign.
-        others = [
-            other.values["A"] - other.values["B"]
-            for other in fit.optima
-            if other.chi2 - fit.chi2 < _KNOWN_SIGN**2
-        ]
-        known = abs(value) > _KNOWN_SIGN * error and all(value * other > 0 for other in others)
-        sign = kind if known else "its sign is not determined"
-        sentences.append(f"A - B = {_with_error(value, error)}: {sign}")
+        sentences.append(f"A - B = {difference.shown}: {difference.meaning}")
     if fit.level_change is not None:
         value, error, steps = fit.level_change
         which = "its step" if steps == 1 else f"its {steps} steps"
         sentences.append(
             f"steady friction alone, before and after {which}: d mu/d ln V = "
-            f"{_with_error(value, error)}, measured without a law"
+            f"{with_error(value, error)}, measured without a law"
         )
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
@@ -86,31 +67,6 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     if fit.undetermined:
         sentences.append(f"not determined by these data: {', '.join(fit.undetermined)}")
     return tuple(sentences)
-
-
-def rate_dependence(fit: Fit) -> tuple[float, float] | None:
-    """A - B with its standard error, from the errors of both and their correlation.
-
-    None where the law has no A and B, or one of them is not determined.
-    """
-    if {"A", "B"} - {*fit.parameters, *fit.objective.fixed} or {"A", "B"} & {*fit.undetermined}:
-        return None
-    value, variance = 0.0, 0.0
-    errors = {}
-    for name, sign in (("A", 1.0), ("B", -1.0)):
-        p = fit.parameters.get(name)
-        if p is None:
-            value += sign * float(fit.objective.fixed[name])
-            continue
-        value += sign * p.value
-        errors[name] = p.se
-        variance += p.se**2
-    if len(errors) == 2:
-        i, j = (list(fit.parameters).index(name) for name in errors)
-        variance -= 2 * float(fit.correlation[i, j]) * errors["A"] * errors["B"]
-    if not errors or not math.isfinite(variance):
-        return None
-    return value, math.sqrt(max(variance, 0.0))
 
 
 def estimates(fit: Fit) -> Section:
@@ -146,11 +102,11 @@ def quality(fit: Fit) -> Section:
     ]
     rows: tuple[tuple[str, ...], ...] = ()
     if fit.judged_by_chi2:
-        good = fit.dof <= 0 or fit.p_value >= _MISFIT
+        good = fit.dof <= 0 or fit.p_value >= MISFIT
         sentences = [
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = {fit.p_value:.3g}: "
             f"the law {'describes' if good else 'does not describe'} these data within their "
-            f"uncertainties (it does not below {_MISFIT:g})"
+            f"uncertainties (it does not below {MISFIT:g})"
         ]
         rows = tuple(
             (name, f"{chi2:.4g}", f"for {count} data")

@@ -92,7 +92,11 @@ class ResponseFunction:
         return 1 << (max(points, self._least_points, _FEWEST) - 1).bit_length()
 
     def __call__(
-        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
+        self,
+        parameters: Mapping[str, ArrayLike],
+        known: KnownOrbits | None = None,
+        *,
+        motions: bool | None = None,
     ) -> ResponseValues:
         """Response at one or many points.
 
@@ -103,8 +107,12 @@ class ResponseFunction:
             with its unit.
         known : KnownOrbits, optional
             Of as many points, from earlier calls with other parameters. Orbits that the fast
-            method does not find are begun there, and kept there for the next call. For
-            ``search="direct"`` without multipliers, and parameters that are not traced.
+            method does not find are kept there for the next call, and begun there by
+            ``search="direct"``. For a search without multipliers, and parameters that are not
+            traced.
+        motions : bool, optional
+            Whether a direct search integrates motions where it finds no orbit otherwise, 10 ms a
+            point; by default ``search="direct"`` does and ``search="coarse"`` does not.
 
         Returns
         -------
@@ -123,7 +131,7 @@ class ResponseFunction:
         if _traced(padded):
             fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
             return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
-        fast, searched = _orbits(self._program, padded, points or 1, known)
+        fast, searched = _orbits(self._program, padded, points or 1, known, motions=motions)
         part = _fast_part(self._program)
         values = _evaluate(padded, fast, None, program=part)
         return _cut(_with_searched(values, searched, part), points)
@@ -183,11 +191,10 @@ class ResponseFunction:
         """Refuse known orbits that this call cannot begin with."""
         if known is None:
             return
-        direct = self._program.search in ("direct", "coarse")
-        if traced or not direct or self._program.multipliers:
+        if traced or not self._program.search or self._program.multipliers:
             raise InputError(
-                'known must go with search="direct", no multipliers and parameters that are not '
-                "traced; leave it out"
+                "known must go with a search, no multipliers and parameters that are not traced; "
+                "leave it out"
             )
         rule = f"be of as many points as the parameters, {points}"
         require(known.points == points, "known", rule, known.points)
@@ -296,8 +303,8 @@ def response_function(
         load, from the orbit on which a motion from steady sliding settles, in some milliseconds a
         point; it leaves out what follows branches, which may take a minute for one point. Within
         `jax.jit`, and where multipliers are wanted, it is as True. "coarse" is the same on 72
-        intervals without a check of the mesh and without motions: values good to some 1e-6, to
-        look for minima with.
+        intervals without a check of the mesh, and without motions unless a call asks for them:
+        values good to some 1e-6, to look for minima with.
     least_points : int
         Calls with fewer points are padded to this number, so that calls with different numbers of
         points share one compiled program.
@@ -373,6 +380,7 @@ def _orbits(
     known: KnownOrbits | None,
     *,
     every: bool = False,
+    motions: bool | None = None,
 ) -> tuple[FastOrbits | None, SearchedOrbits | None]:
     """Orbits of the first `points` points by the fast method and, of the others, by the search."""
     spare_mappings()
@@ -391,6 +399,7 @@ def _orbits(
         rows,
         direct=direct,
         coarse=program.search == "coarse",
+        motions=motions,
         known=known,
         every=every,
     )

@@ -18,6 +18,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from asperity.algebra.mirrored_grid import antiderivative
 from asperity.algebra.small_systems import Matrix, add, inverse_points, multiply, product, subtract
 
 #: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
@@ -126,9 +127,9 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
     Parameters
     ----------
     J : matrix of arrays, shape (nodes, points)
-        Derivatives of the rates to the states, per unit of tau, on an even grid.
+        Derivatives of the rates to the states, per unit of tau, on that grid.
     integral : array, shape (nodes, nodes)
-        Zero-mean antiderivative in tau.
+        Of `asperity.algebra.mirrored_grid.grid`.
     factor : bool
         Whether P is wanted, which takes about twice as many steps.
 
@@ -148,7 +149,7 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
 
     def step(carry: tuple) -> tuple:
         R, L, P, last, _, steps = carry
-        q = [[integral @ a for a in row] for row in subtract(R, L)]
+        q = [[antiderivative(integral, a) for a in row] for row in subtract(R, L)]
         inverse = inverse_points([[q[i][j] + float(i == j) for j in n] for i in n])
         R = multiply(inverse, add(L, multiply(R, q)))
         new = _means(R)

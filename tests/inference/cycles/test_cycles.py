@@ -31,7 +31,7 @@ def made():
     return limit_cycle(slider, V)
 
 
-def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
+def recorded(seed, noise=0.02, spread=0.0, rate=RATE):
     """The cycle over and over, its level and size normal from slip to slip, with white noise."""
     cycle, rng = made(), np.random.default_rng(seed)
     t = np.arange(0, CYCLES * cycle.period, 1 / rate)
@@ -40,7 +40,11 @@ def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
     size = 1 + spread * rng.standard_normal(CYCLES + 2)
     force = cycle.lowest + (force - cycle.lowest) * size[(place // cycle.period).astype(int)]
     force = force + noise * cycle.drop * rng.standard_normal(t.size)
-    trace = Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+    return Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+
+
+def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
+    trace = recorded(seed, noise, spread, rate)
     return measure_stick_slip(trace, machine=Machine(**{"velocity": V, "load": W0} | machine))
 
 
@@ -61,6 +65,17 @@ def test_a_level_and_an_instant_do_not_count():
     residuals = CycleTerm(cycle, RiceRuina, FIXED).residuals(TRUTH).values
     moved = CycleTerm(cycle, RiceRuina, FIXED | {"mu0": 0.53}).residuals(TRUTH).values
     np.testing.assert_allclose(moved, residuals, atol=1e-2)
+
+
+def test_a_recording_in_memory_is_fitted_as_its_file_is():
+    fixed = {**FIXED, **LAW, "V": V}
+    with pytest.raises(InputError, match=r"have W0 .* as fixed=\{'W0': '0\.3 N'\}"):
+        asp.fit(recorded(1), free=["K"], fixed=fixed)
+    fixed |= {"W0": W0, "M": MACHINE["M"]}
+    fitted = asp.fit(recorded(1), free=["K"], fixed=fixed).parameters["K"]
+    assert fitted.value == pytest.approx(MACHINE["K"], abs=4 * fitted.se)
+    with pytest.raises(InputError, match="a load that is modulated at 120 Hz"):
+        asp.fit(asp.samples.modulated())
 
 
 def test_files_with_the_drive_bring_their_velocities(tmp_path):

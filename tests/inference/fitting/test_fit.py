@@ -299,7 +299,8 @@ def test_a_stiffness_over_the_load_of_a_table_is_one_of_the_table(readings, pmma
     text = f"{over * 1e-6!r}/um"
     one = fit(table, "elasto-plastic", free, fixed={"K": text, "W0": "7 N"}, **given)
     other = fit(table, "elasto-plastic", free, fixed={"K": "0.2 N/um", "W0": "7 N"}, **given)
-    assert one.values == pytest.approx(other.values, rel=1e-9)
+    # Their stiffnesses differ in the last digit, and so does where the minimisations end.
+    assert one.values == pytest.approx(other.values, rel=1e-7)
     priors = [Prior(over, 0.01 * over, "", "1/m"), Prior(2e5, 2e3, "", "N/m")]
     with_prior = [
         fit(table, "elasto-plastic", (*free, "K"), prior={"K": p}, start={"K": s}, **given)

@@ -426,6 +426,17 @@ def test_the_steady_friction_alone_stands_next_to_the_law(found):
     assert f"{level_change(rates).value:.4f}"[:6] in said
 
 
+def test_a_fit_shows_its_sign_and_no_chi_squared_of_noise_that_it_estimates(found):
+    lines = {line.name: line for line in found.summary()[1]}
+    assert lines["A - B"].meaning == "velocity weakening"
+    value, _, error = lines["A - B"].value.partition(" +- ")
+    assert float(value) == pytest.approx(TRUE["A"] - TRUE["B"], abs=4 * float(error))
+    assert not {"chi2", "p_value"} & lines.keys()
+    fixed = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0, "D0": TRUE["D0"]}
+    table = fit(readings(), "rice-ruina", ["A", "B"], fixed=fixed)
+    assert {"A - B", "chi2", "p_value"} <= {line.name for line in table.summary()[1]}
+
+
 def test_steps_that_disagree_widen_their_mean():
     assert level_change([]) is None
     # By hand: weights 100 and 25; (0.2/0.1)^2 and (0.8/0.2)^2 for one degree of freedom.

@@ -286,6 +286,21 @@ def test_quoted_numbers_under_quoted_units(tmp_path, planted):
     assert np.array_equal(trace.channel("F").values, planted.F * 1000)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "time,normal load,shear load\ns,N,kN\nclock,cell of the piston,cell of the arm\n",
+        "time,normal load,shear load\nclock,cell of the piston,cell of the arm\ns,N,kN\n",
+        "AI 0,AI 1,AI 2\ns,N,kN\ntime,normal load,shear load\n",
+    ],
+)
+def test_descriptions_next_to_names_and_units(tmp_path, planted, head):
+    trace = read(written(tmp_path, head + table(planted)))
+    assert trace.findings == ()
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    assert np.array_equal(trace.channel("F").values, planted.F * 1000)
+
+
 @pytest.mark.parametrize("number", ["{:.6f}", "{!r}", "{:.5e}", "{:.0f}"])
 def test_no_cut_anywhere_gives_a_wrong_number(tmp_path, number):
     """At every byte: what is read is the beginning of the truth, or the file is refused."""

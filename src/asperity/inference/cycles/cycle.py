@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.slider.named import slider_from
@@ -105,11 +105,12 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
     """
     machine, events = measurement.machine, measurement.events
     for field, value, example in (
-        ("V", machine.velocity, "--fix 'V=42 um/s'"),
+        ("V", machine.velocity, f"{Argument('fixed', 'V', '42 um/s')}"),
         (
             "W0",
             machine.load,
-            "--fix 'W0=0.3 N', or of a force over the weight --fix 'M=30 g', whose weight it is",
+            f"{Argument('fixed', 'W0', '0.3 N')}, or of a force over the weight "
+            f"{Argument('fixed', 'M', '30 g')}, whose weight it is",
         ),
     ):
         if value is None:

@@ -23,7 +23,7 @@ from asperity.inference.fitting.intervals import (
     parabola_of,
 )
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
-from asperity.inference.fitting.result import Estimate, Fit, Optimum
+from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.residuals import outlying_rows
 from asperity.inference.tables.term import LockInTerm
@@ -46,8 +46,6 @@ _LOWER = 0.01
 _MOST_UNSOLVED = 80
 #: Minima this near, in standard errors of everything but nuisances, give the same answer.
 _NEAR = 0.5
-#: Below this probability chi-squared says that the law or the uncertainties are wrong.
-_MISFIT = 0.01
 #: Standard deviations between data and a prior from which a warning says so.
 _CONTRADICTED = 3.0
 #: Relative change of the coordinates that ends a fit with rows left out, and its evaluations.
@@ -448,7 +446,7 @@ def _hull(
 
 def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     """The fit with its warnings, those in `said` first."""
-    if fit.dof > 0 and fit.p_value < _MISFIT:
+    if fit.dof > 0 and fit.p_value < MISFIT:
         sums = fit.observables.items()
         worst, _ = max(sums, key=lambda pair: (pair[1][0] - pair[1][1]) / math.sqrt(2 * pair[1][1]))
         said.append(
@@ -466,7 +464,7 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
             "minimum may lie where the search, which is a short one, found none at some row: fit "
             "again from other start values, and without the slowest modulations"
         )
-    if fit.dof > 5 and fit.p_value > 1 - _MISFIT / 10:
+    if fit.dof > 5 and fit.p_value > 1 - MISFIT / 10:
         said.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.inference.cycles.cycle import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.inputs import (
@@ -291,7 +291,7 @@ def _cycle_objective(
         constants["K"] = float(MACHINE["K"].check(fixed["K"]))
     missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
     if missing:
-        advice = "name it in --free, or give it with --fix"
+        advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
         raise InputError(f"{missing[0]}", "be free or fixed for a fit of cycles", "neither", advice)
     priors = given.priors(names)
     require_free(law, names, priors, bare=False)

@@ -195,13 +195,16 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
     """Minima of all rows from those of the coarse objective that may be as good as the best."""
     ends = distinct(ends, _SAME_COARSE)
     minima: list[Minimum] = []
+    coarser = objective.coarser()
     for end in ends:
         if minima and end.chi2 > ends[0].chi2 + _WORTH:
             break
-        near = objective.minimise(end.u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
-        if math.isfinite(near.chi2) and not _far_off(objective, near):
-            near = objective.minimise(near.u)
-        minima.append(near)
+        near = coarser.minimise(end.u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
+        tolerance = _NEARBY if _far_off(coarser, near) else None
+        if not math.isfinite(objective.chi2(near.u)):
+            # Motions do not settle on orbits that are hardly stable; branches lead to them.
+            objective.search_wholly(near.u)
+        minima.append(objective.minimise(near.u, tolerance=tolerance))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
 

@@ -126,8 +126,8 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
             said.append(
                 f"{name} of {value:.3g} {unit}".rstrip()
                 + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
-                "units and signs of displacement, force and load, and look at the recording with "
-                "the motion (--report)"
+                "units and signs of displacement, force and load, and look at a picture of the "
+                "recording with the motion"
             )
     return said
 

@@ -28,6 +28,10 @@ T = TypeVar("T")
 NOT_DETERMINED = "not determined"
 #: Loads of recordings that differ by less, as a share, are one.
 _ONE_LOAD = 1e-3
+#: Probability of chi-squared below which law or uncertainties are wrong.
+MISFIT = 0.01
+#: Standard errors from which the sign of A - B is known.
+_KNOWN_SIGN = 2.0
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,33 @@ class Optimum:
     values: Mapping[str, float]
 
 
+class RateDependence(NamedTuple):
+    """A - B of a fit.
+
+    Attributes
+    ----------
+    value, error : float
+        With its standard error, from the errors of A and B and their correlation.
+    meaning : str
+        Velocity weakening or strengthening, or that the data do not tell.
+    """
+
+    value: float
+    error: float
+    meaning: str
+
+    @property
+    def shown(self) -> str:
+        """Value and error as text."""
+        return with_error(self.value, self.error)
+
+
+def with_error(value: float, error: float) -> str:
+    """Both with as many decimals as the error bears: two uncertain digits."""
+    places = max(0, 1 - math.floor(math.log10(error))) if error else 6
+    return f"{value:.{places}f} +- {error:.{places}f}"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit(Drawn):
     """A law fitted to data.
@@ -181,6 +212,46 @@ class Fit(Drawn):
         return level_change([rate for run in runs for rate in run.level_rates])
 
     @property
+    def rate_dependence(self) -> RateDependence | None:
+        """A - B; None where the law has no A and B, or one of them is not determined."""
+        known = {*self.parameters, *self.objective.fixed} - {*self.undetermined}
+        if not {"A", "B"} <= known:
+            return None
+        signs = {"A": 1.0, "B": -1.0}
+        value = sum(
+            sign * (self.values[n] if n in self.parameters else float(self.objective.fixed[n]))
+            for n, sign in signs.items()
+        )
+        free = [i for i, name in enumerate(self.parameters) if name in signs]
+        if not free:
+            return None
+        errors = np.array([signs[n] * p.se for n, p in self.parameters.items() if n in signs])
+        variance = float(errors @ self.correlation[np.ix_(free, free)] @ errors)
+        if not math.isfinite(variance):
+            return None
+        error = math.sqrt(max(variance, 0.0))
+        # A minimum that the data allow as well may have the other sign.
+        others = [
+            other.values["A"] - other.values["B"]
+            for other in self.optima
+            if other.chi2 - self.chi2 < _KNOWN_SIGN**2
+        ]
+        known_sign = abs(value) > _KNOWN_SIGN * error and all(value * o > 0 for o in others)
+        kind = "velocity weakening" if value < 0 else "velocity strengthening"
+        return RateDependence(value, error, kind if known_sign else "its sign is not determined")
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the estimates are doubtful."""
+        doubts = [doubt for term in self.objective.terms_of(RunTerm) for doubt in term.doubts]
+        if self.judged_by_chi2 and self.dof > 0 and self.p_value < MISFIT:
+            doubts.append(
+                "the law does not describe the data within their uncertainties "
+                f"(p = {self.p_value:.2g})"
+            )
+        return tuple(doubts)
+
+    @property
     def judged_by_chi2(self) -> bool:
         """Whether chi-squared judges the law.
 
@@ -228,7 +299,10 @@ class Fit(Drawn):
         title = f"Fit of {self.law}"
         if not self.converged:
             return title, [SummaryLine("result", self.message)]
-        lines = []
+        lines = [SummaryLine("doubtful", "; ".join(self.doubts))] if self.doubts else []
+        if self.rate_dependence is not None:
+            difference = self.rate_dependence
+            lines.append(SummaryLine("A - B", difference.shown, difference.meaning))
         for name, p in {**self.parameters, **self.over_load}.items():
             if name in self.undetermined:
                 lines.append(SummaryLine(name, NOT_DETERMINED, "by these data"))
@@ -242,8 +316,11 @@ class Fit(Drawn):
                     f"95 %: {shown.interval(p.interval_95)}{bound}",
                 )
             )
-        lines.append(SummaryLine("chi2", f"{self.chi2:.6g}", f"{self.dof} degrees of freedom"))
-        lines.append(SummaryLine("p_value", f"{self.p_value:.3g}", "probability of a larger chi2"))
+        if self.judged_by_chi2:
+            lines += [
+                SummaryLine("chi2", f"{self.chi2:.6g}", f"{self.dof} degrees of freedom"),
+                SummaryLine("p_value", f"{self.p_value:.3g}", "probability of a larger chi2"),
+            ]
         return title, lines + [SummaryLine("warning", text) for text in self.warnings]
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
@@ -364,7 +364,9 @@ def require_calibrated(
     for name in free:
         holds = name.partition("[")[0] != GAIN or name in given or GAIN in given
         got = "none: A, B, mu0 and K scale with it, so that a recording cannot tell it"
-        advice = f'give one by a calibration of the gauge, like --prior "{name}=1+-0.02"'
+        advice = (
+            f"give one by a calibration of the gauge, like {Argument('prior', name, '1+-0.02')}"
+        )
         require(holds, name, "have a prior", got, advice)
     known = [GAIN, *((f"{GAIN}[{run.name}]" for run in runs) if several else ())]
     for name in [*given, *(n for n in free if n.partition("[")[0] == GAIN)]:

@@ -33,7 +33,6 @@ from asperity.orbit import (
     KnownOrbits,
     Outcome,
     ResponseFunction,
-    ResponseValues,
     response_function,
 )
 from asperity.parameters import law_parameters
@@ -98,7 +97,7 @@ class LockInTerm(DataTerm):
         # Whatever rows are asked for, the programs are those of the whole table.
         function = partial(response_function, law, **self.motion, least_points=table.rows)
         self._functions: dict[bool | str, ResponseFunction] = {
-            way: function(search=way) for way in (False, "direct", "coarse")
+            way: function(search=way) for way in (False, "direct", "coarse", True)
         }
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.coarse, self.least = False, 1.0
@@ -204,6 +203,17 @@ class LockInTerm(DataTerm):
     def use_search(self, always: bool) -> None:
         """Search for the orbits that the fast method does not find at every call, or no more."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
+
+    def search_wholly(self, values: Mapping[str, float]) -> None:
+        """As in `DataTerm`."""
+        direct, known = self._functions["direct"], self._nearest(values)
+        given = parameters_at(self.fixed, values, direct)
+        left = np.flatnonzero(np.asarray(direct(given, known).outcome) != Outcome.CONVERGED)
+        if 0 < left.size <= _LEAST * self.table.rows:
+            missed = known.picked(left)
+            self._functions[True]({n: v[left] for n, v in given.items()}, missed)
+            known.complete(missed, left)
+        self._visited.append((dict(values), known))
 
     def coarser(self) -> LockInTerm:
         """As in `DataTerm`; both go on from the orbits of each other."""
@@ -326,7 +336,7 @@ class LockInTerm(DataTerm):
             Number of sets.
         near : bool
             Whether orbits are like those of the last call with derivatives, and begun there. They
-            are of the coarse model then, except where it has none.
+            are of the coarse model then.
         """
         function = self._function(search=self.searches, coarse=self.coarse or near)
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
@@ -337,15 +347,8 @@ class LockInTerm(DataTerm):
             part = {n: v[start : start + together] for n, v in given.items()}
             rows = np.arange(start, start + len(part["V"])) % self.table.rows
             known = last.picked(rows) if near and self.searches else None
-            values, mu_ss = function(part, known), _steady(self.law, part, together)[0]
-            left = np.flatnonzero(np.asarray(values.outcome) != Outcome.CONVERGED)
-            if known is not None and not self.coarse and left.size:
-                beyond = {n: v[left] for n, v in part.items()}
-                more = self._functions["direct"](beyond, last.picked(rows[left]))
-                columns: list[Any] = [np.array(column) for column in values]
-                for column, searched in zip(columns, more, strict=True):
-                    column[left] = searched
-                values = ResponseValues(*columns)
+            values = function(part, known, motions=True if near and self.searches else None)
+            mu_ss = _steady(self.law, part, together)[0]
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)

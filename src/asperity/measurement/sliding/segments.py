@@ -211,21 +211,28 @@ def _motion(time: Float, displacement: Float) -> _Motion:
 
 
 def _pieces(motion: _Motion) -> list[Piece]:
-    """Lines and parabolas: cut at coarse blocks first, then at fine ones next to the changes."""
+    """Lines and parabolas: cut at coarse blocks first, then at finer ones next to the changes.
+
+    Down to single samples: the mean of a block in which the velocity changes lies off the lines on
+    both sides. A coarse recorder stands still between its steps, and is cut at the first finer
+    blocks.
+    """
     edges = _blocks(motion)
-    bounds = edges[_change_points(motion, edges)]
-    near = np.unique(np.clip(np.searchsorted(edges, bounds[1:-1])[:, None] + [-1, 0, 1], 0, None))
-    fine = [
-        np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp)
-        for k in near
-        if k + 1 < edges.size
-    ]
     # Elsewhere four blocks are one.
-    edges = np.unique(np.concatenate([edges[::4], edges[-1:], bounds, *fine]))
-    bounds = edges[_change_points(motion, edges)].tolist()
+    kept = np.append(edges[::4], edges[-1])
+    finest = False
+    while True:
+        bounds = edges[_change_points(motion, edges)]
+        near = np.searchsorted(edges, bounds[1:-1])[:, None] + [-1, 0, 1]
+        near = np.unique(np.clip(near, 0, edges.size - 2))
+        if finest or (np.diff(edges)[near] == 1).all():
+            break
+        fine = [np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp) for k in near]
+        edges = kept = np.unique(np.concatenate([kept, bounds, *fine]))
+        finest = motion.step > 0
     # A spike or a jump of the gauge is no motion.
-    kept = [(a, b) for a, b in pairwise(bounds) if b - a >= _FEWEST]
-    return kept or [(0, motion.time.size)]
+    pieces = [(a, b) for a, b in pairwise(bounds.tolist()) if b - a >= _FEWEST]
+    return pieces or [(0, motion.time.size)]
 
 
 def _blocks(motion: _Motion) -> Index:

@@ -17,6 +17,7 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations, contracted, implicit_solution
+from asperity.algebra.mirrored_grid import grid
 from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
@@ -28,7 +29,6 @@ from asperity.orbit.methods.fourier import (
     advance,
     force_spectrum,
     fourier_orbit,
-    grid,
     jacobian,
     load_cycle,
     orbit_error,

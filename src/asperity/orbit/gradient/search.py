@@ -149,16 +149,17 @@ class KnownOrbits:
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
-    def complete(self, other: KnownOrbits) -> None:
-        """Take the orbits of points of which only another call knows one."""
-        index = np.flatnonzero(other.known & ~self.known)
-        if other.orbit is None or not len(index):
+    def complete(self, other: KnownOrbits, index: Indices | None = None) -> None:
+        """Take the orbits that only another call knows, of all points or of the points `index`."""
+        rows = np.arange(self.points) if index is None else index
+        new = np.flatnonzero(other.known & ~self.known[rows])
+        if other.orbit is None or not len(new):
             return
         if self.orbit is None:
-            self.orbit = jax.tree.map(np.copy, other.orbit)
-        else:
-            put(self.orbit, index, take(other.orbit, index))
-        self.known[index] = True
+            size, intervals, _ = other.orbit.nodes.shape
+            self.orbit = Orbit.empty(other.orbit.scheme, size, intervals, self.points)
+        put(self.orbit, rows[new], take(other.orbit, new))
+        self.known[rows[new]] = True
 
     def picked(self, index: Indices) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
@@ -175,6 +176,8 @@ def followed_orbits(
     harmonics: int,
     meshes: tuple[int, ...],
     numbers: Complex | None = None,
+    *,
+    patient: bool = True,
 ) -> Iterator[tuple[Indices, MeshOrbits]]:
     """Orbits that Newton's method reaches from a guess, on the first mesh that is accurate.
 
@@ -190,6 +193,8 @@ def followed_orbits(
     numbers : complex array, shape (1 + harmonics, points), optional
         Mean and harmonics, where they are known. Otherwise each mesh is compared with the one
         before, the first with `FIRST_MESH`, and a point that Newton's method fails on is left out.
+    patient : bool
+        Whether each orbit gets all attempts, to their end.
 
     Yields
     ------
@@ -200,7 +205,7 @@ def followed_orbits(
     known, agreements = numbers is not None, _MESH_AGREEMENT if numbers is None else _AGREEMENT
     before = np.full((1 + harmonics, points), np.nan + 0j) if numbers is None else numbers
     read = partial(_numbers, harmonics=harmonics)
-    rounds, patience = (_ROUNDS, math.inf) if meshes else (1, _PATIENCE)
+    rounds, patience = (_ROUNDS, math.inf) if patient else (1, _PATIENCE)
     for intervals in meshes if known else (FIRST_MESH, *meshes):
         agreement = agreements[(intervals,) == meshes[-1:]]
         solve = partial(
@@ -234,6 +239,7 @@ def search_orbits(
     *,
     direct: bool = False,
     coarse: bool = False,
+    motions: bool | None = None,
     known: KnownOrbits | None = None,
     every: bool = False,
 ) -> SearchedOrbits:
@@ -249,9 +255,12 @@ def search_orbits(
         Whether only to solve each point independently, without following branches: by series under
         slow modulation, from the known orbits, from the averaged limit, and from motions.
     coarse : bool
-        Whether a direct search takes orbits on the coarsest mesh, unchecked, and no motions.
+        Whether a direct search takes orbits on the coarsest mesh, unchecked.
+    motions : bool, optional
+        Whether a direct search integrates motions for the orbits that it does not find otherwise;
+        by default one that is not coarse does.
     known : KnownOrbits, optional
-        Of the first points, for a direct search, which begins there and keeps what it finds.
+        Of the first points: the search keeps there what it finds, and a direct one begins there.
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
@@ -265,6 +274,11 @@ def search_orbits(
             take(problem, rows), len(rows), harmonics=counted, phases=0, progress=_idle, **options
         )
 
+    def keep(some: Indices, orbits: MeshOrbits) -> None:
+        result.add(some, orbits)
+        if known is not None:
+            known.keep(problem, some, orbits.orbit)
+
     if not direct:
         solution = searched(index, intervals=MESHES[0])
         solved = solution.converged
@@ -274,7 +288,7 @@ def search_orbits(
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
             logs = np.asarray(sorted_logs(logs)) if len(logs) > 2 else logs
-            result.add(index[some], orbits._replace(log_multipliers=logs))
+            keep(index[some], orbits._replace(log_multipliers=logs))
         return result
 
     def left() -> Indices:
@@ -284,14 +298,12 @@ def search_orbits(
     # No method at all still marks the points out of range.
     result.outcome[index] = searched(index, methods=()).outcome
     meshes = () if coarse else MESHES
-
-    def keep(some: Indices, orbits: MeshOrbits) -> None:
-        result.add(some, orbits)
-        if known is not None:
-            known.keep(problem, some, orbits.orbit)
+    motions = not coarse if motions is None else motions
 
     def follow(guess: Orbit, rows: Indices) -> None:
-        for some, orbits in followed_orbits(problem, guess, rows, harmonics, meshes):
+        for some, orbits in followed_orbits(
+            problem, guess, rows, harmonics, meshes, patient=motions
+        ):
             keep(some, orbits)
 
     rows = left()
@@ -309,10 +321,10 @@ def search_orbits(
         follow(*orbits_from_averaged_limit(problem, rows, _PATIENCE if coarse else math.inf))
     rows = left()
     hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
-    if len(rows) and not coarse and not hopeless:
-        motions, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
+    if len(rows) and motions and not hopeless:
+        settled, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
         if len(periodic) >= (len(rows) if every else 1):
-            follow(motions, periodic)
+            follow(settled, periodic)
     return result
 
 

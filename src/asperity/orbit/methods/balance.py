@@ -25,13 +25,13 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.algebra.contraction import Equations
+from asperity.algebra.mirrored_grid import antiderivative, grid
 from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
     error_of,
-    grid,
     load_cycle,
     spectrum,
     together,
@@ -171,7 +171,7 @@ class BalanceEquations(Equations):
         )
         integral = cycle.integral * cycle.stretch
         zero_mean = tuple(
-            integral @ (r + sum(a * x for a, x in zip(row, change, strict=True)))
+            antiderivative(integral, r + sum(a * x for a, x in zip(row, change, strict=True)))
             for r, row in zip(rates, at.rates, strict=True)
         )
         g = g + sum(a * x for a, x in zip(at.friction, change, strict=True))

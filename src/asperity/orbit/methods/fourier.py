@@ -23,7 +23,7 @@ Mean, harmonics and the logarithm of the monodromy matrix are read on the same g
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -33,6 +33,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.algebra.mirrored_grid import antiderivative, grid
 from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
@@ -113,15 +114,6 @@ class LoadCycle(NamedTuple):
         return self.stretch / len(self.stretch)
 
 
-@lru_cache
-def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes tau, the positive ones before their mirror images, and the integrating matrix."""
-    positive = 2 * np.pi * (np.arange(nodes // 2) + 0.5) / nodes
-    tau = np.concatenate([positive, -positive])
-    k = np.arange(1, nodes // 2)[:, None, None]
-    return tau, (2 / nodes) * (np.sin(k * (tau[:, None] - tau)) / k).sum(0)
-
-
 def load_cycle(load: Modulation, nodes: int, grading: float) -> LoadCycle:
     """The load cycle on a grid of `nodes` per period."""
     tau, integral = grid(nodes)
@@ -174,7 +166,7 @@ def advance(
     change = tuple(-sum(a * r for a, r in zip(row, residual, strict=True)) for row in inverse)
     follow = push(*(c + jnp.zeros_like(r) for c, r in zip(change, rates, strict=True)))
     integral = cycle.integral * cycle.stretch
-    zero_mean = tuple(integral @ (r + f) for r, f in zip(rates, follow, strict=True))
+    zero_mean = tuple(antiderivative(integral, r + f) for r, f in zip(rates, follow, strict=True))
     return together(mean, change), zero_mean, change
 
 
@@ -361,18 +353,19 @@ def truncation(waves: Array, harmonics: int) -> Array:
     return power[2:].max(0) / (scale + 1e-300)
 
 
-@partial(jit_large, static_argnames=("nodes", "grading", "harmonics"))
+@partial(jit_large, static_argnames=("nodes", "grading", "harmonics", "orbits"))
 def fast_solve(
-    problem: Problem, *, nodes: int, grading: float, harmonics: int
-) -> tuple[Observables, Array, FourierOrbit]:
-    """Fourier collocation: the observables, their estimated error and the orbits.
+    problem: Problem, *, nodes: int, grading: float, harmonics: int, orbits: bool
+) -> tuple[Observables, Array, Array, FourierOrbit | None]:
+    """Fourier collocation: the observables, their estimated error, steps, and orbits if wanted.
 
     Works on blocks of points that fit into a core's cache, each until its slowest point is done.
     """
     points = points_of(problem)
 
-    def solve(block: Problem) -> tuple[Observables, Array, FourierOrbit]:
-        return _fast_block(block, nodes, grading, harmonics)
+    def solve(block: Problem) -> tuple[Observables, Array, Array, FourierOrbit | None]:
+        observables, error, orbit = _fast_block(block, nodes, grading, harmonics)
+        return observables, error, orbit.steps, orbit if orbits else None
 
     blocks = jax.tree.map(lambda a: a.reshape(-1, min(points, FAST_BLOCK)), problem)
     results = jax.lax.map(solve, blocks)
@@ -429,14 +422,17 @@ class Fourier(Method):
                 nodes=nodes,
                 grading=grading,
                 harmonics=options.harmonics,
+                orbits=options.phases > 0,
             )
             chosen = left[sharpness[left] <= sharpest]
             size = chunk_of(chosen, _CHUNK)
-            for part, (observables, error, orbit) in run_chunks(solve, (problem,), chosen, size):
+            for part, (observables, error, steps, orbit) in run_chunks(
+                solve, (problem,), chosen, size
+            ):
                 good = np.flatnonzero(error < _ERROR)
                 every = len(good) == len(part)
                 solution.store(part[good], observables if every else take(observables, good))
-                solution.iterations[part] += orbit.steps
+                solution.iterations[part] += steps
                 if options.phases:
                     sample = partial(_sample, grading=grading, phases=options.phases)
                     inputs = (take(problem, part), orbit)

@@ -188,7 +188,7 @@ def _headings(
     """Headings among the lines above the first row of numbers.
 
     The last lines with as many cells as the table are taken; commented ones only where no other
-    fits.
+    fits. Next to a row of names and one of units there may be one of descriptions.
 
     Parameters
     ----------
@@ -208,13 +208,17 @@ def _headings(
     rows = [row for row in rows if not _names_nothing(row)]
     if not rows:
         return Headings([""] * width, None)
-    if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
-        return Headings(
-            _bare(rows[-2]), [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[-1]]
-        )
     # LabVIEW's text has the units above the names, and time in seconds.
     labview = next((row[1:] for row in rows[:-1] if row[0] == "Y_Unit_Label"), None)
-    return Headings(_bare(rows[-1]), ["s", *labview] if labview else None, step)
+    if labview:
+        return Headings(_bare(rows[-1]), ["s", *labview], step)
+    for k in reversed(range(1, len(rows))):
+        if _are_units(rows[k], rows[k - 1]):
+            # Names stand right above their units, unless another row names more quantities.
+            names = max([rows[k - 1], *rows[k - 2 : k - 1], *rows[k + 1 :]], key=_quantities)
+            units = [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[k]]
+            return Headings(_bare(names), units)
+    return Headings(_bare(rows[-1]), None, step)
 
 
 def _names_of_another_width(
@@ -239,8 +243,7 @@ def _names_of_another_width(
     if not rows or len(rows[-1]) < 2 or _names_nothing(rows[-1]):
         return Headings([""] * width, None)
     names = _bare(rows[-1])
-    known = sum(_names_a_quantity(name) for name in names)
-    if known < 2 or len(names) == width:
+    if _quantities(names) < 2 or len(names) == width:
         return Headings([""] * width, None)
     missing = [""] * max(0, width - len(names))
     return Headings(
@@ -249,6 +252,11 @@ def _names_of_another_width(
         None,
         len(names),
     )
+
+
+def _quantities(row: Sequence[str]) -> int:
+    """How many cells name a quantity."""
+    return sum(map(_names_a_quantity, row))
 
 
 def _names_a_quantity(cell: str) -> bool:

@@ -1,0 +1,40 @@
+"""A grid over a period that is its own mirror image, and integration on it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+
+@lru_cache
+def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes tau, the positive ones before their mirror images, and the integrating matrix.
+
+    The matrix, (nodes, nodes), gives the zero-mean antiderivative in tau of the trigonometric
+    polynomial through values at the nodes.
+    """
+    positive = 2 * np.pi * (np.arange(nodes // 2) + 0.5) / nodes
+    tau = np.concatenate([positive, -positive])
+    k = np.arange(1, nodes // 2)[:, None, None]
+    return tau, (2 / nodes) * (np.sin(k * (tau[:, None] - tau)) / k).sum(0)
+
+
+def antiderivative(integral: Any, rate: Any) -> Any:
+    """``integral @ rate`` by half of the products.
+
+    The antiderivative of an even function is odd, and that of an odd one even.
+
+    Parameters
+    ----------
+    integral : array, shape (nodes, nodes)
+        That of `grid`, or with columns multiplied by an even function.
+    rate : array, shape (nodes, points)
+    """
+    half = len(rate) // 2
+    matrix = 0.5 * integral[:half]
+    one, other = rate[:half], rate[half:]
+    odd = (matrix[:, :half] + matrix[:, half:]) @ (one + other)
+    even = (matrix[:, :half] - matrix[:, half:]) @ (one - other)
+    return rate.__array_namespace__().concatenate([even + odd, even - odd])
