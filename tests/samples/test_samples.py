@@ -69,3 +69,10 @@ def test_no_check_doubts_what_the_virtual_tribometer_has_recorded(name: str, see
     """Once, a hold was cut off in the middle of a block: seven of twelve slide-hold-slides."""
     checks = asp.measure(asp.samples.record(name, seed)).checks
     assert [check for check in checks if check.verdict != "ok"] == []
+
+
+def test_steps_of_the_load_are_said_to_be_none_of_the_velocity() -> None:
+    checks = asp.measure(asp.samples.load_steps()).checks
+    (load,) = (check for check in checks if check.verdict != "ok")
+    assert load.name == "load"
+    assert "or fit a law, whose motion follows it" in load.sentence

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
 from asperity.measurement.series import (
@@ -360,7 +360,12 @@ def _checks(
     if borne is not None and borne.size:
         spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
         text = f"the load's standard deviation is {100 * spread:.2g} % of its mean"
-        ask("load", spread, text + _exchanged(signals, spread))
+        limit, _ = SLIDING["load"]
+        advice = (
+            f"; read a part under one load ({Argument('measure.window')}), or fit a law, whose "
+            "motion follows it"
+        )
+        ask("load", spread, text + (_exchanged(signals, spread) or advice * (spread > limit)))
     sliding = [s for s in segments if not s.hold] or list(segments)
     drift = max(abs(p.slope * (p.end - p.steady.start)) for p in sliding) / mean
     text = f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean"
