@@ -226,18 +226,18 @@ def _pieces(motion: _Motion) -> list[Piece]:
     blocks.
     """
     edges = _blocks(motion)
+    largest = float(np.diff(edges).max())
+    # As often as it takes to divide the largest block: in noise the changes move from time to time.
+    finer = 1 if motion.step else int(np.ceil(np.log(largest) / np.log(_PARTS)))
     # Elsewhere four blocks are one.
     kept = np.append(edges[::4], edges[-1])
-    finest = False
-    while True:
+    for _ in range(finer):
         bounds = edges[_change_points(motion, edges)]
         near = np.searchsorted(edges, bounds[1:-1])[:, None] + [-1, 0, 1]
         near = np.unique(np.clip(near, 0, edges.size - 2))
-        if finest or (np.diff(edges)[near] == 1).all():
-            break
         fine = [np.linspace(edges[k], edges[k + 1], _PARTS + 1).astype(np.intp) for k in near]
         edges = kept = np.unique(np.concatenate([kept, bounds, *fine]))
-        finest = motion.step > 0
+    bounds = edges[_change_points(motion, edges)]
     # A spike or a jump of the gauge is no motion.
     pieces = [(a, b) for a, b in pairwise(bounds.tolist()) if b - a >= _FEWEST]
     return pieces or [(0, motion.time.size)]
