@@ -120,20 +120,20 @@ def wrong_samples(
     left = squares - np.sum(_at_samples(basis, noise, stretches) ** 2, axis=1)
     limit = largest_departure(white.size) ** 2
     free = white.size - basis.shape[1] - 1
-    found: list[int] = []
-    while free > 0 and len(found) <= most:
+    wrong: list[int] = []
+    while free > 0 and len(wrong) <= most:
         unknown = left <= _EXPLAINED * squares
         decrease = _at_samples(white, noise, stretches) ** 2 / np.where(unknown, np.inf, left)
         k = int(np.argmax(decrease))
         if decrease[k] * free <= limit * (white @ white - decrease[k]):
             break
-        found.append(k)
+        wrong.append(k)
         impulse = innovations(np.eye(1, white.size, k)[0], noise, stretches, basis)
         impulse /= np.sqrt(impulse @ impulse)
         basis, free = np.column_stack([basis, impulse]), free - 1
         white = white - impulse * (impulse @ white)
         left -= _at_samples(impulse, noise, stretches) ** 2
-    rows = np.sort(np.array(found, np.intp))
+    rows = np.sort(np.array(wrong, np.intp))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     longest = _IN_A_ROW if rows.size <= most else rows.size
     return [int(k) for group in groups if group.size <= longest for k in group]
