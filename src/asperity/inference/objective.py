@@ -32,6 +32,9 @@ CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
 #: A coordinate nearer to its bound is there.
 _AT_BOUND = 1e-6
+#: Relative change of the coordinates that ends the way by the coarse model, from where that by the
+#: exact one goes on.
+_COARSE = 1e-4
 #: Distance from bounds at which a minimisation begins.
 _INSIDE = 2e-10
 
@@ -410,7 +413,8 @@ class Objective:
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
         ahead = self.coarser()
         if ahead is not self:
-            near = ahead.minimise(point, kept, tolerance=tolerance, evaluations=evaluations)
+            ending = max(tolerance, _COARSE)
+            near = ahead.minimise(point, kept, tolerance=ending, evaluations=evaluations)
             self.unsolved += ahead.unsolved
             if self.chi2(near.u) <= self.chi2(point):
                 point = near.u

@@ -126,14 +126,18 @@ class KnownOrbits:
         Points along the last axis; None where no orbit is known.
     known : bool array, shape (points,)
         Of which points an orbit is known.
+    near : bool array, shape (points,)
+        Of which points it is one of so similar parameters that a coarse search tries no other guess
+        where Newton's method fails from it: the orbit has ended.
     """
 
     points: int
     orbit: Orbit | None = None
     known: NDArray[np.bool_] = field(init=False)
+    near: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.known = np.zeros(self.points, bool)
+        self.known, self.near = np.zeros((2, self.points), bool)
 
     def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
         """Keep the orbits of the points `index` of a problem, on `FIRST_MESH` intervals."""
@@ -149,7 +153,9 @@ class KnownOrbits:
         for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
-    def complete(self, other: KnownOrbits, index: Indices | None = None) -> None:
+    def complete(
+        self, other: KnownOrbits, index: Indices | None = None, *, near: bool = False
+    ) -> None:
         """Take the orbits that only another call knows, of all points or of the points `index`."""
         rows = np.arange(self.points) if index is None else index
         new = np.flatnonzero(other.known & ~self.known[rows])
@@ -159,13 +165,13 @@ class KnownOrbits:
             size, intervals, _ = other.orbit.nodes.shape
             self.orbit = Orbit.empty(other.orbit.scheme, size, intervals, self.points)
         put(self.orbit, rows[new], take(other.orbit, new))
-        self.known[rows[new]] = True
+        self.known[rows[new]], self.near[rows[new]] = True, near
 
     def picked(self, index: Indices) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
         others = KnownOrbits(len(index), orbit)
-        others.known[:] = self.known[index]
+        others.known[:], others.near[:] = self.known[index], self.near[index]
         return others
 
 
@@ -291,9 +297,11 @@ def search_orbits(
             keep(index[some], orbits._replace(log_multipliers=logs))
         return result
 
+    ended = np.zeros(points, bool)
+
     def left() -> Indices:
         done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
-        return index[~done]
+        return index[~(done | ended[index])]
 
     # No method at all still marks the points out of range.
     result.outcome[index] = searched(index, methods=()).outcome
@@ -309,6 +317,7 @@ def search_orbits(
     rows = left()
     if known is not None and known.orbit is not None:
         follow(known.orbit, rows[known.known[rows]])
+        ended[: known.points] = known.near & (not motions)
     slow = follows_steady_sliding(problem, left())
     series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0], _FEW_NODES)
     read = partial(_numbers, harmonics=harmonics)
