@@ -37,7 +37,7 @@ class SlideHoldSlide(ProgrammeStep):
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """The segments of all holds."""
         advice = "give some, like 10 s, 100 s"
-        require(len(self.holds), f"{name}.holds", "hold a time", "none", advice)
+        require(len(self.holds), f"{name}.holds", "contain a time", "none", advice)
         steps: list[ProgrammeStep] = [Slide(self.sliding)]
         for hold in self.holds:
             steps += [Hold(hold), Slide(self.sliding)]
@@ -53,7 +53,7 @@ class VelocitySteps(ProgrammeStep):
     velocities : sequence of float or str
         Pulling velocities (m/s), in the order of the experiment.
     slip : float or str
-        Load-point displacement at each (m).
+        Load-point displacement at each velocity (m).
     """
 
     velocities: Sequence[Given]
