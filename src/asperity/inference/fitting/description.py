@@ -130,19 +130,19 @@ def described_fit(
         estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
         if described is not None:
             described(i + 1)
-    earlier = _contradicted(objective, at)
+    warnings = _contradicted(objective, at)
     if at.stopped:
-        earlier.append(
+        warnings.append(
             "chi-squared still falls where the law has no periodic orbit at some operating point: "
             "the estimate is the last before, and intervals are by profile likelihood or the whole "
             "range; leave those rows out or doubt the law"
         )
     if at_edge:
-        earlier.append(_not_profiled(at_edge, odd))
+        warnings.append(_not_profiled(at_edge, odd))
     if bent:
         names = [objective.names[i] for i in sorted(profiled)]
         also = [n for n in names if n not in (*bent, *at_edge)]
-        earlier.append(
+        warnings.append(
             f"chi-squared is no parabola in {enumerated(bent)}: "
             + (
                 f"intervals of {enumerated([*bent, *also])} are by profile likelihood"
@@ -153,7 +153,7 @@ def described_fit(
                 f"likelihood ({Argument('profile')}) take minutes for a recording"
             )
         )
-    return _with_warnings(_fit_with(objective, at, estimates, rivals), earlier)
+    return _with_warnings(_fit_with(objective, at, estimates, rivals), warnings)
 
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
@@ -306,19 +306,19 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     """
     values, slopes = objective.prior_residuals(at.u)
     with_prior = [k for k in objective.unknowns if k.prior is not None]
-    earlier = []
+    warnings = []
     for unknown, r, j in zip(with_prior, values, slopes, strict=True):
         prior = unknown.prior
         assert prior is not None  # by the choice of unknowns
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
-            earlier.append(
+            warnings.append(
                 f"the prior of {unknown.name}, {prior.mean:.4g} +- {prior.sd:.2g} "
                 f"{unknown.parameter.unit}".rstrip()
                 + f", is contradicted by the data by {apart:.3g} standard deviations: one of them "
                 "is wrong, and the other parameters follow it; fit without it and compare"
             )
-    return earlier
+    return warnings
 
 
 def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
@@ -445,12 +445,12 @@ def _widened_by_minima(
     return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
 
-def _with_warnings(fit: Fit, earlier: list[str]) -> Fit:
-    """The fit with its warnings, those in `earlier` first."""
+def _with_warnings(fit: Fit, warnings: list[str]) -> Fit:
+    """The fit with its warnings, added to those in `warnings`."""
     if fit.dof > 0 and fit.p_value < MISFIT:
         sums = fit.observables.items()
         worst, _ = max(sums, key=lambda pair: (pair[1][0] - pair[1][1]) / math.sqrt(2 * pair[1][1]))
-        earlier.append(
+        warnings.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom (p = "
             f"{fit.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
@@ -460,13 +460,13 @@ def _with_warnings(fit: Fit, earlier: list[str]) -> Fit:
         and FAR_OFF < fit.p_value < DOUBTFUL
         and any(term.searches for term in fit.objective.terms)
     ):
-        earlier.append(
+        warnings.append(
             f"orbits of this table are searched for, and with p = {fit.p_value:.2g} a better "
             "minimum may lie where the search, which is a short one, found none at some row: fit "
             "again from other start values, and without the slowest modulations"
         )
     if fit.dof > 5 and fit.p_value > 1 - MISFIT / 10:
-        earlier.append(
+        warnings.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
@@ -475,22 +475,24 @@ def _with_warnings(fit: Fit, earlier: list[str]) -> Fit:
     information = np.sum([J.T @ J for J in slopes], axis=0)
     outliers = _outliers(fit)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
-        earlier += term.warnings(residuals, information, outliers)
+        warnings += term.warnings(residuals, information, outliers)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
-    earlier += because.values()
+    warnings += because.values()
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
-            earlier.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
+            warnings.append(
+                f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}"
+            )
     for other in fit.optima:
         at = ", ".join(
             f"{n} {quantity_text(other.values[n], p.unit)}" for n, p in fit.parameters.items()
         )
-        earlier.append(
+        warnings.append(
             f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(fit, warnings=tuple(earlier), because=because, outliers=outliers)
+    return replace(fit, warnings=tuple(warnings), because=because, outliers=outliers)
 
 
 def _outliers(fit: Fit) -> tuple[int, ...]:
