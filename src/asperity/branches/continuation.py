@@ -282,7 +282,7 @@ def doubled_branch(
     Parameters
     ----------
     branch : Branch
-        Of simple period.
+        Branch of simple period.
     bifurcation : Bifurcation
         A period doubling of the branch.
     most_steps : int

@@ -105,9 +105,9 @@ def slide_hold_slide(
     sliding : float or str
         Duration of sliding before, between and after the holds (s).
     seed : int
-        Of the tribometer's noise.
+        Seed of the tribometer's noise.
     **options
-        Of `asperity.transients.transient`.
+        Options of `asperity.transients.transient`.
 
     Raises
     ------
@@ -132,9 +132,9 @@ def velocity_steps(
     Parameters
     ----------
     slider, tribometer, seed, **options
-        As of `slide_hold_slide`.
+        As in `slide_hold_slide`.
     velocities : sequence of float or str
-        Of the drive (m/s); the series begins with steady sliding at the first.
+        Velocities of the drive (m/s); the series begins with steady sliding at the first.
     slip : float or str
         Load-point displacement at each velocity (m).
 

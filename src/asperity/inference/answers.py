@@ -12,12 +12,12 @@ from typing import Any
 from asperity import materials
 from asperity.errors import Argument, InputError, require
 from asperity.inference.comparison.compare import Comparison, compare as compare_loaded
-from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
+from asperity.inference.cycles import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit as fit_loaded
 from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
-from asperity.inference.holds.table import HEALING, HealingTable, read_healing
+from asperity.inference.holds import HEALING, HealingTable, read_healing
 from asperity.inference.runs.assembly import Linear, RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
@@ -274,7 +274,7 @@ def answer_fit(
     Raises
     ------
     InputError
-        As of `asperity.inference.fit`, or if a file cannot be read.
+        As in `asperity.inference.fit`, or if a file cannot be read.
     """
     options = _options(question, read, progress)
     law = None if question.law is None else known_law(question.law)
@@ -361,7 +361,7 @@ def fit(
     Raises
     ------
     InputError
-        As of `asperity.inference.fit`, or if a file cannot be read.
+        As in `asperity.inference.fit`, or if a file cannot be read.
 
     Examples
     --------
@@ -398,7 +398,7 @@ def compare(
     Raises
     ------
     InputError
-        As of `asperity.inference.compare`, or if a file cannot be read.
+        As in `asperity.inference.compare`, or if a file cannot be read.
 
     Examples
     --------

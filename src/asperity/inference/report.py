@@ -16,7 +16,7 @@ from asperity.inference.fitting.result import (
     with_error,
 )
 from asperity.inference.fitting.windows import WindowedFit
-from asperity.inference.holds.table import HoldTerm
+from asperity.inference.holds import HoldTerm
 from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable

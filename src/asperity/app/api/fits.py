@@ -56,7 +56,7 @@ class Run(Question):
         Key of an uploaded file.
     source : Source
     window, steps, velocities
-        As of `asperity.questions.fit.Data`.
+        As in `asperity.questions.fit.Data`.
     """
 
     recording: str

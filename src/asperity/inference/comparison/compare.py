@@ -183,7 +183,7 @@ def compare(
         Called with the work done so far and all work: a hundred for the fit of each law, and a
         hundred for its evidence and cross-validation.
     **options
-        As of `fit`.
+        As in `fit`.
 
     Returns
     -------

@@ -15,8 +15,9 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
-from asperity.inference.cycles.cycle import AveragedCycle, CycleTerm
+from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
+from asperity.inference.fitting.estimated_noise import under_drift, with_noise
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
@@ -28,7 +29,6 @@ from asperity.inference.fitting.inputs import (
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
-from asperity.inference.fitting.own_noise import under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -36,7 +36,7 @@ from asperity.inference.fitting.plausibility import (
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
-from asperity.inference.holds.table import HealingTable, HoldTerm, joined_holds
+from asperity.inference.holds import HealingTable, HoldTerm, joined_holds
 from asperity.inference.objective import DataTerm, Minimum, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import Argument, InputError, MistakesError, require
-from asperity.inference.cycles.cycle import AveragedCycle
-from asperity.inference.holds.table import HealingTable
+from asperity.inference.cycles import AveragedCycle
+from asperity.inference.holds import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun

@@ -112,7 +112,7 @@ def fit_windows(
     recording : Trace or path
     law : str or type of Law
     free : sequence of str, optional
-        As of `fit`. By default the parameters that the first window can determine, for all windows.
+        As in `fit`. By default the parameters that the first window can determine, for all windows.
     windows : sequence of (float, float), optional
         First and last times (s) of two or more windows; the first is the main window. By default
         the whole recording, and the recording without a third of its first segment, without a third
@@ -131,7 +131,7 @@ def fit_windows(
     Raises
     ------
     InputError
-        As of `recorded_run` and `fit`; if there are fewer than two windows.
+        As in `recorded_run` and `fit`; if there are fewer than two windows.
 
     Notes
     -----

@@ -172,7 +172,7 @@ class Whitened:
     objective : Objective
     coordinates : Coordinates
     mode, root : array
-        As of `DensityData`.
+        As in `DensityData`.
     """
 
     objective: Objective

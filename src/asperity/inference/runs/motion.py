@@ -279,7 +279,7 @@ class RunArrays(NamedTuple):
     reading : Reading
     recorded : array, shape (n,)
     noise : tuple of Whitening
-        Of each stretch.
+        Noise of each stretch.
     basis : array, shape (n, columns)
         Whitened linear nuisances, orthonormal.
     """

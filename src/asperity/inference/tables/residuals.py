@@ -186,7 +186,7 @@ def residuals_of(
     Parameters
     ----------
     weights : Weights
-        Of the table.
+        Weights of the table.
     predicted : Prediction
     derivatives : mapping of str to Prediction
         Derivatives of the prediction at each row, by free parameter.

@@ -125,7 +125,7 @@ class KnownOrbits:
     orbit : Orbit or None
         Points along the last axis; None where no orbit is known.
     known : bool array, shape (points,)
-        Of which points an orbit is known.
+        Whether an orbit of each point is known.
     """
 
     points: int
@@ -185,7 +185,7 @@ def followed_orbits(
     ----------
     problem : Problem
     guess : Orbit
-        Of the points of the problem, of meaning for those of `index`.
+        Orbits of the points of the problem; only those of `index` are used.
     index : array of int
     harmonics : int
     meshes : tuple of int
@@ -369,7 +369,7 @@ def settled_orbits(
     equations : ParametrisedProblem
     parameters : mapping of str to array, shape (points,)
     problem : Problem
-        Of these parameters.
+        Problem of these parameters.
     index : array of int
     every : bool
         Whether to stop at the first motion that does not settle.
@@ -377,7 +377,7 @@ def settled_orbits(
     Returns
     -------
     orbit : Orbit
-        Of all points, on meshes that are finest where the integrator's steps were shortest.
+        Orbits of all points, on meshes that are finest where the integrator's steps were shortest.
     index : array of int
         Points whose transient becomes periodic.
     """

@@ -105,9 +105,9 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
     ----------
     values, time : array, (n,)
     name : str
-        Of the channel.
+        Name of the channel.
     crowded : float
-        As of `saturated`.
+        As in `saturated`.
     """
     finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
     if finite.size < 2:

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 import asperity as asp
 from asperity.errors import InputError
 from asperity.inference.answers import read_data
-from asperity.inference.cycles.cycle import CycleTerm, averaged_cycle
+from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.laws import RiceRuina
 from asperity.questions.fit import Fit

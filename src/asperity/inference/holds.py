@@ -103,7 +103,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
     Parameters
     ----------
     columns : mapping of str to array, shape (rows,), number or text
-        As of `read_healing`; numbers are SI and hold for all rows, texts carry their unit.
+        As in `read_healing`; numbers are SI and hold for all rows, texts carry their unit.
     name : str
         What messages call the table.
 
