@@ -247,8 +247,8 @@ def _train(
 ) -> Regime:
     number = stop - first
     if number < _FEWEST:
-        events = f"{number} event{'s' if number > 1 else ''}"
-        text = f"{events} cannot tell stick-slip from a single slip"
+        count = f"{number} event{'s' if number > 1 else ''}"
+        text = f"{count} cannot tell stick-slip from a single slip"
         return Regime("cannot tell", *span, first, stop, f"{text}; {_FEWEST} can")
     cut, inner = slice(first, stop), slice(first + 1, stop)
     drop, recurrence = events.drop[cut], events.recurrence[inner]
