@@ -37,7 +37,7 @@ from asperity.inference.answers import (
     fit as fit,
 )
 from asperity.measurement.from_file import measure_recording
-from asperity.measurement.written import write as write
+from asperity.measurement.write import write as write
 from asperity.orbit import (
     averaged_response as averaged_response,
     periodic_response as periodic_response,

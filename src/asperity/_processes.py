@@ -24,7 +24,7 @@ ENVIRONMENT = {
 
 #: Time (s) that idle processes stay: to start one and load its programs takes seconds.
 _IDLE = 600
-#: Seconds between checks of a process whether the one that started it still runs.
+#: Seconds between checks of a process whether its parent process still runs.
 _DRIVER_CHECK = 1.0
 
 
@@ -57,7 +57,7 @@ def process_pool(count: int, name: str) -> Iterator[Any]:
     ----------
     count : int
     name : str
-        What chose the number, for messages.
+        Source of the number, for messages.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class Argument(NamedTuple):
     ----------
     name : str
     key : str
-        Of an argument that is a mapping.
+        Key of an argument that is a mapping.
     value : str
         To be given; empty where the argument alone is named.
     """
@@ -89,13 +89,13 @@ class InputError(ValueError):
     Parameters
     ----------
     field : str or Argument
-        What is wrong; the whole sentence where nothing follows.
+        Name of the field, or the whole sentence if no rule follows.
     rule : str
-        What follows "must".
+        Text after "must".
     got : str
         The value in words.
     advice : str
-        What to do.
+        Advice.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class InputError(ValueError):
         return f"{self.field} must {self.rule}{got}{advice}"
 
     def about(self, field: str | Argument) -> InputError:
-        """The same mistake of another field; a whole sentence stays as it is."""
+        """The same mistake of another field; a whole sentence is unchanged."""
         if not self.rule:
             return self
         return type(self)(field, self.rule, self.got, self.advice)
@@ -134,7 +134,7 @@ def require(
     ----------
     holds : bool, or an object that is true
     field, rule, got, advice
-        As of `InputError`.
+        As in `InputError`.
     """
     if not holds:
         raise InputError(field, rule, got, advice)
@@ -199,7 +199,7 @@ def code_of_others(
     Parameters
     ----------
     field, rule, advice : str
-        As of `InputError`.
+        As in `InputError`.
     where : str
         Place of the code, where `field` does not name it.
 
@@ -243,7 +243,7 @@ def listed(names: Iterable[str], joint: str = ", ", most: int = 40) -> str:
     ----------
     names : iterable of str
     joint : str
-        What stands between two names.
+        Text between two names.
     most : int
     """
     every = list(names)
@@ -262,7 +262,7 @@ def printable(text: str, most: int = 600) -> str:
     Parameters
     ----------
     text : str
-        It may come from a damaged file.
+        The text may come from a damaged file.
     most : int
         Characters.
     """

@@ -16,7 +16,7 @@ import numpy as np
 from asperity.arrays import Bool, Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, get_law, registered
-from asperity.loads.modulated import lowest_load, modulated
+from asperity.loads.modulation import lowest_load, modulated
 from asperity.materials import load_from
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import (
@@ -62,7 +62,7 @@ def sourced_numbers(
     law: str | None = None,
     place: str = "",
 ) -> dict[str, SourcedNumber]:
-    """Numbers by name: the given ones, and those of the material for the rest.
+    """Numbers by name: the given numbers, completed by those of the material.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def sourced_numbers(
     offered = {
         n: SourcedNumber(material[n].si, material.name)
         for n in known
-        # A material says nothing about the modulation, even where a number of it has such a name.
+        # A material has no modulation, even if one of its numbers has such a name.
         if n not in MODULATION
         and n in material
         and material[n].value is not None
@@ -186,9 +186,9 @@ def point_numbers(
     origin : str
         Name of the source of `point.parameters`.
     among, needed
-        As of `numbers_for`.
+        As in `numbers_for`.
     place : str
-        As of `sourced_numbers`; with one, other parameters than those of `among` are refused.
+        As in `sourced_numbers`; with one, other parameters than those of `among` are refused.
 
     Raises
     ------

@@ -177,7 +177,7 @@ def test_a_campaign_is_drawn_with_the_cycles_of_a_law(asperity, campaign, tmp_pa
     assert picture.read_bytes().startswith(b"\x89PNG")
     (series,) = json.loads(result.stdout)["healing"]
     assert series["K"] == pytest.approx(RATIOS[0] * CRITICAL, rel=1e-5)
-    assert series["reason"] == "2 recordings are too few; 3 can tell"
+    assert series["reason"] == "2 recordings are too few; at least 3 are needed"
 
 
 @pytest.mark.parametrize(

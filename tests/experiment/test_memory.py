@@ -222,5 +222,5 @@ def test_longer_holds_heal_more(slider, rig) -> None:
 def test_what_is_no_series_is_one_sentence() -> None:
     with pytest.raises(InputError, match="must have positive velocities"):
         Programme(VelocitySteps(["1 um/s", 0.0], "1 um"), load=7.0, velocity=1e-6)
-    with pytest.raises(InputError, match="must hold a time"):
+    with pytest.raises(InputError, match="must contain a time"):
         Programme(SlideHoldSlide([], "1 s"), load=7.0, velocity=1e-6)

@@ -312,8 +312,8 @@ def test_a_gauge_that_rings_as_slowly_as_the_slider_slips_is_said(amplitude) -> 
     ("sign", "zero", "said"),
     [
         (1, 0.0, None),
-        (-1, 0.0, "with the other sign"),
-        (-1, 1.0, "with the other sign"),
+        (-1, 0.0, "with the opposite sign"),
+        (-1, 1.0, "with the opposite sign"),
         (1, -1.0, "zero of the gauge"),
     ],
 )

@@ -1,7 +1,7 @@
 """The normal direction: elastic contacts and the squeezed air layer that work in parallel.
 
 `effective_modulation` answers the question the friction laws ask: which fraction of the load
-modulation do the micro-contacts bear? No module of this room depends on friction.
+modulation do the micro-contacts carry? No module of this room depends on friction.
 """
 
 from asperity._lazy import public_names

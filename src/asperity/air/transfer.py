@@ -94,7 +94,7 @@ def effective_modulation(
     lambda_z: ArrayLike,
     layer: AirLayer | None = None,
 ) -> Real:
-    """eps_eff/eps = |T|, Eq. (40): the fraction of the modulation that the contacts bear.
+    """eps_eff/eps = |T|, Eq. (40): the fraction of the modulation that the contacts carry.
 
     Independent of eps as long as eps_eff << 1. Parameters, shapes and errors as in
     `transfer_function`; in a vacuum it is 1/|1 - w^2/w0z^2|.

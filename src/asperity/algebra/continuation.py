@@ -64,7 +64,7 @@ class Attempt(NamedTuple):
         The new points, for `Curves.accept`.
     converged : bool array, shape (curves,)
     iterations : array, shape (curves,)
-        Of the corrector.
+        Iterations of the corrector.
     turn : array, shape (curves,)
         Cosine of the angle between the tangents before and after.
     miss : array, shape (curves,)
@@ -96,7 +96,7 @@ class Attempt(NamedTuple):
 
 
 class Curves(ABC):
-    """Curves that are followed together, each with its own step length.
+    """Curves that are followed together, each with its step length.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ def follow(
     curves : Curves
         At the beginnings of the curves; `accept` moves them.
     length : array, shape (curves,)
-        Of the first steps.
+        Length of the first steps.
     rows : array of int, optional
         Curves that are followed; all by default.
     most : int, optional

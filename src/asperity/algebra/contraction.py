@@ -40,7 +40,7 @@ def contracted(
     contract : callable
         Linear.
     right : pytree of arrays
-        Of shape (points,), (..., points) or, with `points_first`, (points, ...).
+        Arrays of shape (points,), (..., points) or, with `points_first`, (points, ...).
     steps : int
         That are enough, as a rule.
     """

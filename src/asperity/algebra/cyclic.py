@@ -127,7 +127,7 @@ def _eliminated(maps: Array, rhs: Array) -> tuple[Array, Array, Array]:
     Returns
     -------
     columns : array, shape (intervals, n, sides + n, points)
-        Of each side, and of d_0.
+        Columns of each side, and of d_0.
     ends, right : array, shape (n, n, points) and (n, sides, points)
         ends d_0 = right.
     """

@@ -1,4 +1,4 @@
-"""A grid over a period that is its own mirror image, and integration on it."""
+"""A grid over a period that is symmetric about zero, and integration on this grid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @lru_cache
 def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes tau, the positive ones before their mirror images, and the integrating matrix.
+    """Nodes tau, the positive nodes before their mirror images, and the integrating matrix.
 
     The matrix, (nodes, nodes), gives the zero-mean antiderivative in tau of the trigonometric
     polynomial through values at the nodes.

@@ -204,7 +204,7 @@ def scaled_product(maps: Float) -> tuple[Float, Float]:
     Parameters
     ----------
     maps : array, shape (n, n, intervals, points)
-        Of NumPy.
+        NumPy arrays.
 
     Returns
     -------

@@ -45,16 +45,16 @@ def build(
     Parameters
     ----------
     port : int
-        On which it will be served: part of the names that requests must carry.
+        Port of the server, which is part of the host name that requests must have.
     in_notebook : bool
-        Whether pages of this machine may show it in a frame.
+        Whether other pages of this machine may show the page in a frame.
     prepare : bool
-        Whether to compile what the first tab needs as soon as the server starts.
+        Whether to compile the functions of the first tab as soon as the server starts.
     laws : sequence of str
-        Places of laws outside the package, which worker processes import too.
+        Locations of laws outside the package, which worker processes import too.
     """
     modules = [importlib.import_module(f"asperity.app.api.{tab}") for tab in TABS]
-    # For short computations; the page asks for one at a time.
+    # Threads for short computations; the page requests one computation at a time.
     threads = ThreadPoolExecutor(min(2, os.cpu_count() or 1), "asperity-answers")
     lanes: dict[str, Jobs] = {}
     uploads = Uploads()

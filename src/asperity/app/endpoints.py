@@ -19,7 +19,7 @@ from asperity.questions import record as questions
 
 
 class Question(questions.Question):
-    """What a request holds; other fields are refused."""
+    """The fields of a request; other fields are refused."""
 
     subject = "request"
 

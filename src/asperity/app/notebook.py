@@ -25,7 +25,7 @@ class Page:
     address : str
         Which any browser of this machine can open.
     height : int
-        Of the frame (px).
+        Height of the frame (px).
     """
 
     def __init__(self, address: str, height: int) -> None:
@@ -63,7 +63,7 @@ def explore(
     velocity, epsilon, frequency : float or str, optional
         As for `asperity.periodic_response`.
     height : int
-        Of the frame (px).
+        Height of the frame (px).
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 The folder is removed when the server ends, or by the next server after one that was killed.
 
-A file is known by a random name that only who sent it knows. What the sender calls it is a text for
+A file has a random key that only its sender knows. The sender's name of the file is a text for
 messages and never becomes part of a path; of its ending, one of a list is kept, since some formats
 are recognised by it.
 """
@@ -25,7 +25,7 @@ from asperity.outputs.written import held_folder
 
 #: Largest file (bytes), and all files together.
 LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3
-#: Files that are kept; the one that was used longest ago goes first.
+#: Number of files that are kept; the least recently used file is deleted first.
 _MOST_FILES = 200
 #: Room (bytes) that is left on the disk.
 _SPARE = 256 * 1024**2
@@ -40,10 +40,10 @@ class Upload:
     Attributes
     ----------
     key : str
-        What the page knows it by.
+        Key of the file on the page.
     path : Path
     name : str
-        What its sender calls it: for people only.
+        The sender's name of the file, for people only.
     """
 
     key: str
@@ -103,7 +103,7 @@ class Uploads:
         Raises
         ------
         InputError
-            If there is none.
+            If there is no such file.
         """
         upload = self._files.get(key)
         if upload is None or not upload.path.is_file():
@@ -113,7 +113,7 @@ class Uploads:
         return upload
 
     def remove(self, key: str) -> None:
-        """Delete a file, if it is there."""
+        """Delete a file, if it exists."""
         upload = self._files.pop(key, None)
         if upload is not None:
             upload.path.unlink(missing_ok=True)

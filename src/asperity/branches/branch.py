@@ -34,7 +34,7 @@ class Bifurcation:
         "fold", "period doubling" or "Neimark-Sacker"; "branch point" where a multiplier passes
         +1 and the branch does not turn.
     value : float
-        The parameter there, SI.
+        Value of the parameter, SI.
     error : float
         Relative change of `value` between two meshes; inf where the finer one failed.
     mean_friction : float

@@ -1,9 +1,9 @@
 """Pseudo-arclength continuation of the periodic response in any one parameter.
 
-At a period doubling a branch of doubled period begins. An orbit of two periods of the modulation is
-an orbit of one period of a modulation repeated twice in it, at half the frequency. Where a
-multiplier of the simple orbit is -1 its eigenvector v changes sign from one period to the next:
-(v, -v) is the direction in which the doubled orbits leave.
+At a period doubling a branch of doubled period begins. Its orbits have two periods of the
+modulation, and are computed as orbits of one period of a modulation that repeats twice, at half the
+frequency. Where a multiplier of the simple orbit is -1, its eigenvector v changes sign from one
+period to the next: the doubled orbits leave the simple branch in the direction (v, -v).
 
 Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
 """
@@ -46,8 +46,7 @@ from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import Slider
 from asperity.slider.problem import Problem
 
-#: Intervals of the mesh of a branch of simple period; a bifurcation is solved on three times as
-#: many.
+#: Mesh intervals of a branch of simple period; a bifurcation is solved on three times as many.
 INTERVALS = 216
 
 _RESULTS = {
@@ -75,19 +74,19 @@ class BranchRecorder:
         report: Callable[[int], None],
         periods: int = 1,
     ) -> None:
-        """Begin at `start`."""
+        """Begin a branch at `start`."""
         self.follower, self.moving, self.report, self.periods = follower, moving, report, periods
         self.branch_orbits = [start]
         self.located: list[tuple[LocatedBifurcation, int]] = []
 
     def follow_branch(self, most_steps: int) -> str:
-        """Follow the branch until it leaves the span; returns a key of the results."""
+        """Follow the branch until it leaves the span; return a key of `_RESULTS`."""
         return ParameterBranch(
             self.follower, self.branch_orbits[0], self.visit, most_steps
         ).follow()
 
     def visit(self, here: BranchOrbit, length: float, there: BranchOrbit) -> None:
-        """Record a step of the branch, the last one cut at the end of the span."""
+        """Record a step of the branch; the last step is cut at the end of the span."""
         if not 0 <= there.t <= 1:
             edge = 1.0 if there.t > 1 else 0.0
             reached = self.follower.crossing(here, length, lambda orbit: orbit.t - edge)
@@ -170,11 +169,11 @@ def continuation(
         "epsilon", "frequency", "V", "K", "W0", "M", "eta", or a parameter of the law, such as
         "alpha" or "lambda"; as in `asperity.parameters`.
     span : pair of float or str
-        Start of the branch, and its end if the branch reaches it. Positive parameters whose ends
-        differ by more than a factor of 2 are continued by equal factors.
+        Values at which the branch starts and ends. A positive parameter whose ends differ by more
+        than a factor of 2 is continued by equal factors.
     velocity : float or str
-        Pulling velocity V (m/s). This, epsilon and frequency may be left out where they are the
-        parameter; `span` replaces the value of the parameter in the slider or in these arguments.
+        Pulling velocity V (m/s). The velocity, epsilon or frequency may be left out if it is the
+        continued parameter: `span` replaces the parameter's value in slider and arguments.
     epsilon : float or str
         Relative amplitude of the load.
     frequency : float or str
@@ -194,14 +193,14 @@ def continuation(
     Returns
     -------
     Branch
-        With `result` saying why it ends. Bifurcations are located to 1e-8 relative; what was
-        reached on two meshes is in their `error`.
+        Its `result` says why the branch ends. Bifurcations are located to 1e-8 relative; their
+        `error` is the difference between two meshes.
 
     Raises
     ------
     InputError
         If a value breaks its rule, the parameter does not exist, the slider has arrays, or no
-        periodic orbit is found at the start of the span.
+        periodic orbit exists at the start of the span.
 
     Examples
     --------
@@ -236,7 +235,7 @@ def _no_orbit(moving: ContinuedParameter) -> InputError:
     )
 
 
-#: Distances from the bifurcation at which a doubled orbit is searched (exponent of the slip rate).
+#: Distances from the bifurcation at which a doubled orbit is tried (change of the log slip rate).
 _DISTANCES = (0.05, 0.02, 0.1, 0.2)
 
 
@@ -283,7 +282,7 @@ def doubled_branch(
     Parameters
     ----------
     branch : Branch
-        Of simple period.
+        Branch of simple period.
     bifurcation : Bifurcation
         A period doubling of the branch.
     most_steps : int
@@ -293,9 +292,10 @@ def doubled_branch(
     Returns
     -------
     Branch
-        With `periods` 2: its harmonics c_n belong to n f / 2, its multipliers to two periods. It
-        starts next to the period doubling and is followed within the same span. The two halves of a
-        doubled branch are one orbit, begun a period later: one of them is followed.
+        Its `periods` is 2, its harmonics c_n belong to n f / 2, and its multipliers to two periods.
+        It starts next to the period doubling and is followed within the same span. A doubled branch
+        leaves in two directions, but both have the same orbits, shifted by one period: one
+        direction is followed.
 
     Raises
     ------
@@ -334,7 +334,7 @@ def _doubled_line(line: ParameterLine) -> ParameterLine:
         system = eqx.tree_at(lambda q: q.omega, problem.system, omega)
         return Problem(system, Repeated(problem.load))
 
-    # Rates of growth are relative: half the frequency grows by the same factor.
+    # The growth is relative: the halved frequency grows by the same factor.
     return ParameterLine(
         doubled(line.origin, 0.5), doubled(line.added, 0.5), doubled(line.growth, 1.0)
     )
@@ -343,9 +343,9 @@ def _doubled_line(line: ParameterLine) -> ParameterLine:
 def _doubled_orbit_near(
     follower: BranchFollower, twice: BranchFollower, simple: BranchOrbit
 ) -> BranchOrbit | None:
-    """A doubled orbit near the critical simple one."""
+    """A doubled orbit near the critical simple orbit."""
     point = simple.point
-    start = _alternating(follower.line, point.orbit, point.t)
+    start = _doubling_direction(follower.line, point.orbit, point.t)
     for distance in _DISTANCES:
         branch_orbit, _ = twice.step(start, distance)
         if branch_orbit is not None:
@@ -353,8 +353,8 @@ def _doubled_orbit_near(
     return None
 
 
-def _alternating(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
-    """The simple orbit twice, and the unit direction (v, -v), which changes sign in between."""
+def _doubling_direction(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
+    """The simple orbit repeated twice, with the unit direction (v, -v)."""
     problem = line.at(t)
     equations = condensed(problem, orbit)
     maps = np.asarray(transfer_maps(equations.response, orbit.widths, orbit.scheme.b))

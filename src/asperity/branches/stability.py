@@ -1,9 +1,9 @@
 """Stability boundaries in the plane of two parameters: continuation of the bifurcation condition.
 
-A point of a boundary is the zero of a test function on a line through the plane of the two
-parameters. From a known point the next is searched on the line across the boundary's direction a
-step ahead, so that boundaries may turn back in either parameter. On that line folds, period
-doublings and Neimark-Sacker points are located like those of any branch.
+A point of a boundary is the zero of a test function on a line in the plane of the two parameters.
+The line for the next point lies one step ahead, perpendicular to the direction of the boundary, so
+that a boundary may turn back in either parameter. On that line folds, period doublings and
+Neimark-Sacker points are located as on any branch.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class ParameterPlane(NamedTuple):
     harmonics: int
 
     def follower(self, at: Any, direction: Any) -> BranchFollower:
-        """Along a line through the plane."""
+        """A follower of branches along a line through the plane."""
         return BranchFollower(
             line_through(self.problem, self.parameters, at, direction), self.harmonics
         )
@@ -142,7 +142,7 @@ class BoundaryHalf(Curves):
     Attributes
     ----------
     points : list of BoundaryPoint
-        After the first.
+        Points after `first`.
     """
 
     control = StepControl(
@@ -170,7 +170,7 @@ class BoundaryHalf(Curves):
         self._other_kind = False
 
     def follow(self, sense: float) -> str:
-        """Follow the boundary forwards or backwards; a key of the ends."""
+        """Follow the boundary forwards or backwards; return a key of `_ENDS`."""
         direction = _first_direction(self.plane, self.kind, self.first)
         if direction is None:
             return STUCK
@@ -181,17 +181,17 @@ class BoundaryHalf(Curves):
     def attempts(
         self, rows: Index, length: Float, failures: NDArray[np.int_]
     ) -> Iterator[tuple[Index, Attempt]]:
-        """The point of the boundary across its direction, a step ahead."""
+        """The next point: on the line perpendicular to the boundary, one step ahead."""
         step = float(length[0])
         guess = self.here.at + step * self.direction
-        across = _across(self.direction)
+        across = _perpendicular(self.direction)
         neighbour = critical_point(self.plane, self.kind, self.here.branch_orbit, guess, across)
         turn, miss, self._other_kind = 1.0, 0.0, False
         if neighbour is not None:
             moved = neighbour.at - self.here.at
             turn = float(moved @ self.direction / np.linalg.norm(moved))
             miss = float(np.linalg.norm(neighbour.at - guess) / step)
-            self._other_kind = not _critical_kind(self.kind, neighbour.branch_orbit)
+            self._other_kind = not _is_critical(self.kind, neighbour.branch_orbit)
         good = None if self._other_kind else neighbour
         yield rows, Attempt.of_one(good, step, turn=turn, miss=miss)
 
@@ -222,8 +222,8 @@ def critical_point(
     """The point of a boundary on the line through `guess`, from the orbit of a point nearby."""
     guess, direction = np.asarray(guess, float), np.asarray(direction, float)
     follower = plane.follower(guess, direction)
-    # At a fold the orbit is no regular function of the parameters. There the orbit is fixed by the
-    # plane across the branch, and the parameters are unknowns.
+    # At a fold the orbit is no regular function of the parameters: the parameters become unknowns,
+    # and the plane perpendicular to the branch fixes the orbit.
     start = follower.at(known.point, 0.0) if kind != "fold" else follower.across(known.point, 0.0)
     if start is None:
         return None
@@ -240,7 +240,7 @@ def _critical_index(kind: Kind, branch_orbit: BranchOrbit) -> int:
     return int(np.argmin(np.where(same, distance, distance + 1e3)))
 
 
-def _critical_kind(kind: Kind, branch_orbit: BranchOrbit) -> bool:
+def _is_critical(kind: Kind, branch_orbit: BranchOrbit) -> bool:
     if kind == "fold":
         return True
     return kind_of(branch_orbit.logs[_critical_index(kind, branch_orbit)]) == kind
@@ -250,7 +250,7 @@ def _first_direction(plane: ParameterPlane, kind: Kind, first: BoundaryPoint) ->
     """Direction of a boundary at a point, from a neighbour on either side of it."""
     for across in (np.array([1.0, 0.0]), np.array([0.0, 1.0])):
         for sense in (1.0, -1.0):
-            guess = first.at + sense * 1e-4 * _across(across)
+            guess = first.at + sense * 1e-4 * _perpendicular(across)
             if np.any(guess < 0) or np.any(guess > 1):
                 continue
             other = critical_point(plane, kind, first.branch_orbit, guess, across)
@@ -260,7 +260,7 @@ def _first_direction(plane: ParameterPlane, kind: Kind, first: BoundaryPoint) ->
     return None
 
 
-def _across(direction: Float) -> Float:
+def _perpendicular(direction: Float) -> Float:
     return np.array([-direction[1], direction[0]])
 
 
@@ -395,8 +395,9 @@ def stability_boundary(
 ) -> StabilityBoundary:
     """Curves on which the periodic response changes its stability, in two parameters.
 
-    Branches are followed along `lines` lines in each parameter, edges of the rectangle
-    included; every bifurcation found there that lies on no curve yet is continued in both.
+    Branches are followed along `lines` lines in each parameter, including the edges of the
+    rectangle. Every bifurcation on these lines that lies on no curve yet is continued in both
+    parameters.
 
     Parameters
     ----------
@@ -409,10 +410,10 @@ def stability_boundary(
     velocity, epsilon, frequency, modulation, inertia, radiation_damping
         As in `continuation`.
     lines : int
-        Number of lines in each direction, at least 2: a closed curve between them is missed.
+        Number of lines in each direction, at least 2. A closed curve between two lines is missed.
     progress : callable, optional
-        Called with the number of lines searched so far and of all lines, and again with the same
-        numbers after each point of a boundary.
+        Called with the number of lines searched so far and the number of all lines, and again with
+        the same numbers after each point of a boundary.
 
     Returns
     -------
@@ -456,7 +457,7 @@ def stability_boundary(
     return StabilityBoundary(
         (parameters[0].name, parameters[1].name),
         (parameters[0].unit, parameters[1].unit),
-        tuple(_in_units(plane, curve) for curve in curves),
+        tuple(_boundary_curve(plane, curve) for curve in curves),
         problem.system,
         held_parameters(problem, *(p.name for p in parameters)),
     )
@@ -474,7 +475,7 @@ def _scan_lines(lines: int) -> list[tuple[Float, Float]]:
 def _crossings(
     plane: ParameterPlane, at: Float, direction: Float
 ) -> list[tuple[Any, BoundaryPoint]]:
-    """Bifurcations on a line; none where there is no orbit at its start."""
+    """Bifurcations on a line; an empty list if there is no orbit at its start."""
     follower = plane.follower(at, direction)
     orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)
     start = None if orbit is None else follower.begin(orbit, 0.0, INTERVALS)
@@ -495,7 +496,7 @@ def _crossings(
 
 
 def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:
-    """Whether a bifurcation is one of a curve already traced, by its distance from the chords."""
+    """Whether a bifurcation lies on a curve already traced, by its distance from the chords."""
     if curve.kind != kind:
         return False
     points = np.array([p.at for p in curve.points])
@@ -508,7 +509,8 @@ def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:
     return bool(np.linalg.norm(foot - crossing.at, axis=1).min() < _SAME)
 
 
-def _in_units(plane: ParameterPlane, curve: TracedBoundary) -> BoundaryCurve:
+def _boundary_curve(plane: ParameterPlane, curve: TracedBoundary) -> BoundaryCurve:
+    """The public result of a traced boundary, in SI."""
     at = np.array([p.at for p in curve.points])
     x, y = (p.value(at[:, i]) for i, p in enumerate(plane.parameters))
     logs = np.stack([p.branch_orbit.logs for p in curve.points])

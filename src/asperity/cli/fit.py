@@ -131,7 +131,7 @@ def _question_options(*further: Decorator) -> Decorator:
     Parameters
     ----------
     *further : click options
-        Of this command alone, which follow those that are needed first.
+        Options of this command alone, after the options that are needed first.
     """
 
     def with_options(command: Command) -> Command:

@@ -339,7 +339,7 @@ def _one(
 def _file_rows(
     recordings: tuple[Path, ...], source: Source, question: Question, conditions: str | None
 ) -> FileRows:
-    """What measures each file, its conditions checked before anything is read."""
+    """The function that measures each file; its arguments are checked before files are read."""
     from asperity.measurement.campaign import MACHINE_FIELDS, conditions_of
 
     if conditions is None:
@@ -360,7 +360,7 @@ def _file_rows(
 def _cycles(
     law: str | None, material: str | None, given: dict[str, str], conditions: str | None
 ) -> Cycles:
-    """What adds the cycles of the law to a campaign; its numbers are checked at once."""
+    """The function that adds cycles of the law to a campaign; its numbers are checked at once."""
     if law is None and material is None:
         return lambda campaign: campaign
     from asperity.laws import get_law
@@ -477,7 +477,7 @@ def _campaign(
 
 
 def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
-    """What ``--set`` says of the machine, by the fields of the question."""
+    """Numbers of the machine from ``--set``, by the fields of the question."""
     from asperity.measurement.campaign import MACHINE_FIELDS
 
     rule, like = f"name one of {', '.join(MACHINE_FIELDS)}", 'write it like --set "K=168 N/m"'

@@ -88,7 +88,7 @@ def option(names: str, metavar: str | None, about: str, kind: Any = None, **more
         For the help.
     kind : type, optional
     **more
-        As of `click.option`.
+        As in `click.option`.
     """
     return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
 

@@ -71,7 +71,7 @@ def recipe(
 
 
 def _section(result: RecipeResult) -> Section:
-    """The numbers next to the published ones."""
+    """Computed and published numbers in a table."""
     from asperity.outputs.tables import Section
 
     rows = []
@@ -105,7 +105,7 @@ def _section(result: RecipeResult) -> Section:
     Path,
 )
 def reproduce(paper: str | None, out: Path, data: Path | None) -> int:
-    """Reproduce a PAPER, the first one in alphabetical order if none is named.
+    """Reproduce a PAPER; without a name, the first paper in alphabetical order.
 
     Writes the figures (PNG, PDF and CSV), claims.json, claims.csv and index.html, which is the
     place to start reading; with --data also agreement.json and data/points.csv. Papers are found

@@ -27,7 +27,7 @@ def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callabl
     Parameters
     ----------
     unit : str
-        Of the work.
+        Unit of the work.
     doing : str
         What is done, where calls do not say it.
     """
@@ -56,7 +56,7 @@ def _on_terminal(unit: str) -> Iterator[Callable[[int, int, str], None]]:
 
         def show(done: int, total: int, label: str) -> None:
             if shown.total is None:
-                # What an earlier run had done is no speed of this one.
+                # The work of an earlier run does not count for the speed.
                 shown.initial = shown.n = done
             shown.total = total
             if label:

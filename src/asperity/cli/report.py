@@ -107,7 +107,7 @@ def save_figure(
     draw : callable
     path : Path
     names : {"friction", "geophysics"}
-        Of its labels.
+        Names of parameters in its labels.
     option : str
         That names the path, for messages.
     """

@@ -78,8 +78,8 @@ def response(
 ) -> int:
     """Periodic response to a modulated normal load.
 
-    Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
-    stable or not; without inertia by default.
+    Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, stable or
+    unstable; without inertia by default.
     """
     if stick_slip:
         alone, others = not (table or out or resume), "--table, --out or --resume"
@@ -124,7 +124,7 @@ def _point(point: Point, output: Output) -> int:
 
 
 def _record(response: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> dict[str, Any]:
-    """Everything about the response at one point; numbers are None without a converged response."""
+    """The response of one point for JSON; numbers are None without a converged response."""
     import numpy as np
 
     from asperity.materials import cited_works

@@ -108,7 +108,7 @@ class Shell(click.Group):
 
 
 def _in_our_words(error: click.ClickException) -> InputError:
-    """What click says of options and arguments, as a sentence like all others."""
+    """Click's message about options and arguments as one of our sentences."""
     command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else ""
     if isinstance(error, click.MissingParameter) and error.param is not None:
         name, metavar = error.param.opts[-1], error.param.metavar or ""

@@ -1,4 +1,4 @@
-"""``asperity sweep``: a plan into a store, and what can be done with one."""
+"""``asperity sweep``: run a plan into a store; status, summary, export and plot of a store."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ Examples:
   asperity sweep plot results.zarr --show delta_mu --x epsilon --y stiffness_ratio --out drop.png
 
 \b
-The same command goes on after an interruption of any kind: chunks that are done
-and sound are kept, and the numbers are the same to the last bit.
+After an interruption of any kind the same command continues: finished, undamaged
+chunks are kept, and the numbers are the same to the last bit.
 """
 
 
@@ -57,7 +57,7 @@ class SweepGroup(click.Group):
     """A group whose first argument may also be a plan, for the command that runs it."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put the name of the command that runs a plan in front of one."""
+        """Insert the command ``run`` if the first argument is a plan."""
         if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
             args = ["run", *args]
         return super().parse_args(ctx, args)
@@ -77,8 +77,8 @@ class SweepGroup(click.Group):
 def sweep(context: click.Context) -> None:
     """Solve ten points or a billion: one plan, one command, one labelled store.
 
-    A plan says what varies (products, lists, draws), what stays and what is solved; the store is
-    Zarr, which xarray opens. asperity sweep run --help lists the options of a run.
+    A plan says what varies (products, lists, draws), what stays fixed and what is solved. The store
+    is a Zarr folder, which xarray opens. asperity sweep run --help lists the options of a run.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -181,7 +181,7 @@ def _estimate(plan: Path, output: Output) -> int:
 @click.argument("store", type=Path)
 @output_options()
 def status(store: Path, output: Output) -> None:
-    """How far a store is, what failed and why, and who has run it."""
+    """Progress of a store, failed points with reasons, and its runs."""
     from asperity.outputs import size_text
     from asperity.study import store_status
 

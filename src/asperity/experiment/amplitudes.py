@@ -111,8 +111,8 @@ class AmplitudePoint:
     epsilon : float
         Commanded.
     begin, end : float
-        Of the part of the recording that is read (s), unmodulated sliding before and after it
-        included.
+        Begin and end of the part of the recording that is read (s), unmodulated sliding before and
+        after it included.
     measurement : Measurement
     """
 
@@ -142,7 +142,7 @@ class AmplitudeSeries:
     velocity, frequency : float
         SI.
     transfer : complex
-        Of the exciter.
+        Transfer function of the exciter.
     """
 
     trace: Trace
@@ -199,16 +199,16 @@ class AmplitudeMotion:
     time : array, shape (n,)
         Evenly spaced (s).
     force : array, shape (n,)
-        Of the spring (N).
+        Force of the spring (N).
     load : array, shape (n,)
         As applied (N), air layer included.
     epsilons : tuple of float
         Commanded.
     velocity, sliding, modulated : float
-        Of the drive (m/s); seconds without and with modulation.
+        Velocity of the drive (m/s); durations (s) without and with modulation.
     exciter : Exciter
     provenance : mapping
-        Of the integration.
+        Provenance of the integration.
     """
 
     time: Float
@@ -232,7 +232,7 @@ class AmplitudeMotion:
             With the channels ``"shear force"`` and ``"normal force"``; the latter measures the
             load as applied, not the part of it that an air layer bears.
         seed : int
-            Of the tribometer's noise: another seed, another recording.
+            Seed of the tribometer's noise: another seed makes another recording.
         harmonics : int
             To read.
         """
@@ -335,9 +335,9 @@ def amplitude_series(
     harmonics : int
         To read.
     seed : int
-        Of the tribometer's noise.
+        Seed of the tribometer's noise.
     **options
-        Of `asperity.transients.transient`, such as ``inertia=True``.
+        Options of `asperity.transients.transient`, such as ``inertia=True``.
 
     Raises
     ------

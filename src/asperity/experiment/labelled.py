@@ -28,7 +28,7 @@ def shaped(array: Any, shape: tuple[int, ...]) -> Any:
 
 
 def measured(unit: str, meaning: str = "") -> Any:
-    """A field of a `Labelled` record, with unit and meaning; the drive has none."""
+    """A field of a `Labelled` record, with unit and meaning; a drive quantity has no meaning."""
     return field(metadata={"unit": unit, "meaning": meaning})
 
 
@@ -38,7 +38,7 @@ class Labelled(Displayed):
     Class attributes
     ----------------
     shown : tuple of str
-        What the summary has.
+        Names of the fields that the summary shows.
     """
 
     shown: ClassVar[tuple[str, ...]]
@@ -53,7 +53,7 @@ class Labelled(Displayed):
         return {n: (a["unit"], a["meaning"]) for n, a in about.items() if a.get("meaning")}
 
     def outcomes(self) -> str:
-        """How many points there are, and what became of them."""
+        """Numbers of points by outcome, as text."""
         raise NotImplementedError
 
     def values(self) -> list[tuple[str, float, str, str]]:
@@ -71,7 +71,8 @@ class Labelled(Displayed):
         Parameters
         ----------
         dims : tuple of str, optional
-            Names of the axes; by default of what varies along each alone.
+            Names of the axes. By default an axis has the name of the only quantity that varies
+            along it.
         """
         import xarray
 

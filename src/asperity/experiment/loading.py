@@ -71,15 +71,15 @@ def loading_recording(
         With the channels ``"shear force"`` and ``"normal force"``, and ``"displacement"`` of the
         slider or ``"drive position"`` or both.
     velocity : float or str
-        Of the drive (m/s), to and fro.
+        Velocity of the drive (m/s), to and fro.
     low, high : float
         Turning points of the force, over that of steady sliding.
     cycles : int
         Pairs of loading and unloading.
     seed : int
-        Of the tribometer's noise.
+        Seed of the tribometer's noise.
     **options
-        Of `asperity.transients.transient`.
+        Options of `asperity.transients.transient`.
 
     Raises
     ------

@@ -104,7 +104,8 @@ class Holds(_Memory):
     velocity_at_maximum : array
         m/s; that of the drive.
     states, states_at_maximum : array, shape (..., size)
-        Of the quasi-static motion: spring force (with that of the asperities), then the law's.
+        States of the quasi-static motion: spring force (with that of the asperities), then the
+        law's.
     distance, slip : array
         Displacement of the drive and of the slider from the end of the hold to the maximum (m).
     settling_distance, settling_slip : array
@@ -193,7 +194,7 @@ def hold_response(
     hold_time : array or str
         Seconds, positive.
     velocity : array or str
-        Of the drive before and after the hold (m/s), positive.
+        Velocity of the drive before and after the hold (m/s), positive.
     stiffness : array or str, optional
         K/W0 (1/m), of a law alone: ``"0.002 1/um"``.
     settling : bool
@@ -263,9 +264,9 @@ def step_response(
     Parameters
     ----------
     slider, stiffness, settling
-        As of `hold_response`.
+        As in `hold_response`.
     velocity_before, velocity : array or str
-        Of the drive (m/s), positive and different.
+        Velocities of the drive (m/s), positive and different.
 
     Returns
     -------

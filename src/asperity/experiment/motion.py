@@ -43,7 +43,7 @@ def signals(
     names : tuple of str
         Attributes of `Trajectory`.
     **options
-        Of `asperity.transients.transient`.
+        Options of `asperity.transients.transient`.
 
     Returns
     -------
@@ -74,9 +74,9 @@ def recorded_motion(
     rule : str
         Beginning of the message where the motion ends early: field and rule.
     seed : int
-        Of the tribometer's noise.
+        Seed of the tribometer's noise.
     options : mapping
-        Of `asperity.transients.transient`.
+        Options of `asperity.transients.transient`.
 
     Raises
     ------

@@ -37,7 +37,7 @@ class SlideHoldSlide(ProgrammeStep):
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """The segments of all holds."""
         advice = "give some, like 10 s, 100 s"
-        require(len(self.holds), f"{name}.holds", "hold a time", "none", advice)
+        require(len(self.holds), f"{name}.holds", "contain a time", "none", advice)
         steps: list[ProgrammeStep] = [Slide(self.sliding)]
         for hold in self.holds:
             steps += [Hold(hold), Slide(self.sliding)]
@@ -53,7 +53,7 @@ class VelocitySteps(ProgrammeStep):
     velocities : sequence of float or str
         Pulling velocities (m/s), in the order of the experiment.
     slip : float or str
-        Load-point displacement at each (m).
+        Load-point displacement at each velocity (m).
     """
 
     velocities: Sequence[Given]
@@ -105,9 +105,9 @@ def slide_hold_slide(
     sliding : float or str
         Duration of sliding before, between and after the holds (s).
     seed : int
-        Of the tribometer's noise.
+        Seed of the tribometer's noise.
     **options
-        Of `asperity.transients.transient`.
+        Options of `asperity.transients.transient`.
 
     Raises
     ------
@@ -132,9 +132,9 @@ def velocity_steps(
     Parameters
     ----------
     slider, tribometer, seed, **options
-        As of `slide_hold_slide`.
+        As in `slide_hold_slide`.
     velocities : sequence of float or str
-        Of the drive (m/s); the series begins with steady sliding at the first.
+        Velocities of the drive (m/s); the series begins with steady sliding at the first.
     slip : float or str
         Load-point displacement at each velocity (m).
 

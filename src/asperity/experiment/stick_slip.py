@@ -30,14 +30,14 @@ class StickSlip(Labelled, Drawn):
     Attributes
     ----------
     velocity : array
-        Of the drive (m/s).
+        Velocity of the drive (m/s).
     period, stick_duration, slip_duration : array
         Seconds. In a slip the force falls from its peak to its lowest value: the slider is faster
         than the drive. Sums over the slips of a period.
     drop, peak, lowest : array
         F/W0; the drop is the peak less the lowest.
     peak_velocity : array
-        Of the slider (m/s).
+        Largest velocity of the slider (m/s).
     slips : int array
         In a period; 0 where no cycle repeats itself.
     steady : bool array
@@ -49,7 +49,7 @@ class StickSlip(Labelled, Drawn):
         Sentence on how the motion ends: stick-slip, steady sliding, or why neither.
     slider : Slider
     cycle : LimitCycle or None
-        Of a single point: the force at any time of a period.
+        Cycle of a single point: the force at any time of a period.
     """
 
     shown = ("period", "drop", "slip_duration", "peak_velocity")
@@ -92,7 +92,7 @@ def stick_slip_response(
     slider : Slider
         Its parameters may be arrays, which broadcast with the velocity.
     velocity : array or str
-        Of the drive (m/s), positive.
+        Velocity of the drive (m/s), positive.
     spring : array or str, optional
         Stiffness (N/m) in the place of that of the slider.
     inertia : bool

@@ -67,15 +67,15 @@ class Panel(_Part):
     title : str
         A remark in the colour of the points.
     set : mapping
-        Of Matplotlib's `Axes.set`.
+        Arguments of Matplotlib's `Axes.set`.
     ticks : tuple of (float, str)
-        Of the abscissa.
+        Ticks of the abscissa.
     margin, step : float
         Free space above and below, over the height of the panel; distance of the major ticks.
     plain : bool
         Whether the ordinate is written without offset and power of ten.
     legend : mapping
-        Of Matplotlib's `Axes.legend`.
+        Arguments of Matplotlib's `Axes.legend`.
     """
 
     x: str
@@ -127,7 +127,7 @@ class Item(_Part):
         Panel that has the entry: by default each of `panels` that has a legend; -1 is the legend of
         the figure.
     look : mapping
-        Of Matplotlib; colours and dashes may be names of `asperity.figures.style`.
+        Arguments of Matplotlib; colours and dashes may be names of `asperity.figures.style`.
     """
 
     kind: Literal[

@@ -72,7 +72,7 @@ def draw_amplitudes(rows: Sequence[Mapping[str, Any]]) -> Figure:
         values = [row[name] for row in kept]
         bars = [NORMAL * row[f"{name}_uncertainty"] for row in kept]
         axis.errorbar(epsilon, values, bars, fmt="o", capsize=2.5, color=colour, label=label)
-    # Friction without modulation, by the rests beside a stretch.
+    # Friction without modulation, from the pauses next to a stretch.
     still = [row["static_friction"] for row in kept if "static_friction" in row]
     mean.plot(np.zeros(len(still)), still, "o", mfc="none", color=_MEASURED)
     mean.set_ylabel(r"mean friction $\bar{\mu}$")

@@ -41,8 +41,8 @@ def draw_response(response: PeriodicResponse) -> Figure:
     Parameters
     ----------
     response : PeriodicResponse
-        Of one point, or with one or two axes. A point that failed leaves a gap, an unstable orbit
-        has an open mark.
+        Response of one point, or with one or two axes. A point that failed leaves a gap, an
+        unstable orbit has an open mark.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def draw_stick_slip_response(response: StickSlip) -> Figure:
     Parameters
     ----------
     response : StickSlip
-        Of one point, or with one or two axes. A point without stick-slip leaves a gap.
+        Response of one point, or with one or two axes. A point without stick-slip leaves a gap.
 
     Raises
     ------

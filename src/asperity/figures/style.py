@@ -118,7 +118,7 @@ def style() -> Iterator[None]:
 
 
 class Picture(Figure):
-    """A figure that a notebook shows without pyplot, whose backend may not be loaded there."""
+    """A figure that a notebook shows without pyplot, whose backend may not be installed."""
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """The picture, and its size (px) on a screen: half of that for sharp lines on any."""

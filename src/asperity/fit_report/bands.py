@@ -40,7 +40,7 @@ class Series(NamedTuple):
         Operating numbers that differ from those of other series, at least the velocity.
     rows : bool array, shape (rows of the table,)
     bands : dict of str to Band
-        Of mean_friction, delta_mu, mu1 and mu2.
+        Bands of mean_friction, delta_mu, mu1 and mu2.
     """
 
     label: str
@@ -60,7 +60,7 @@ def bands_of(
     posterior : Posterior or None
         Without one, parameters are drawn from the normal approximation.
     seed : int
-        Of the choice of draws.
+        Seed of the choice of draws.
     """
     values = _drawn(fit, posterior, np.random.default_rng(seed))
     count = len(next(iter(values.values())))

@@ -73,7 +73,7 @@ def write_report(
         Converged.
     posterior : Posterior, optional
     names : {"friction", "geophysics"}
-        Of the page; files keep the names of friction.
+        Names of parameters on the page; files keep the names of friction.
 
     Raises
     ------
@@ -224,7 +224,7 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     comparison : Comparison
         With one converged fit at least.
     names : {"friction", "geophysics"}
-        Of the page; files keep the names of friction.
+        Names of parameters on the page; files keep the names of friction.
 
     Raises
     ------

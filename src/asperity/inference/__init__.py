@@ -6,7 +6,7 @@ from asperity.inference.comparison.compare import (
     Judged as Judged,
     compare as compare,
 )
-from asperity.inference.cycles.cycle import (
+from asperity.inference.cycles import (
     AveragedCycle as AveragedCycle,
     averaged_cycle as averaged_cycle,
 )
@@ -26,7 +26,7 @@ from asperity.inference.fitting.windows import (
     WindowEstimate as WindowEstimate,
     fit_windows as fit_windows,
 )
-from asperity.inference.holds.table import (
+from asperity.inference.holds import (
     HealingTable as HealingTable,
     healing_table as healing_table,
     read_healing as read_healing,

@@ -1,4 +1,4 @@
-"""From a question to its answer: files of data read, a law fitted or several compared."""
+"""Answers to questions: read the files of data, fit a law or compare several laws."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 from asperity import materials
 from asperity.errors import Argument, InputError, require
 from asperity.inference.comparison.compare import Comparison, compare as compare_loaded
-from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
+from asperity.inference.cycles import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit as fit_loaded
 from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
-from asperity.inference.holds.table import HEALING, HealingTable, read_healing
+from asperity.inference.holds import HEALING, HealingTable, read_healing
 from asperity.inference.runs.assembly import Linear, RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
@@ -38,7 +38,7 @@ Progress = Callable[[int, int], None]
 #: Reads the file of a recording.
 Reader = Callable[[questions.Data], Trace]
 
-#: Columns of the recording that a trend of the friction over slip takes.
+#: Linear nuisances of a recording, by the trend of friction in the question.
 _TRENDS: Mapping[str, tuple[Linear, ...]] = {
     "none": (),
     "linear": ("trend",),
@@ -46,31 +46,31 @@ _TRENDS: Mapping[str, tuple[Linear, ...]] = {
 }
 
 
-#: Sets of data of any kind.
+#: Data of any kind, ready for a fit.
 AnyData = LockInTable | HealingTable | AveragedCycle | RecordedRun
-#: These, and what is read as one of them.
+#: Data of a fit, or a recording or file from which they are read.
 Data = AnyData | Trace | FilePath
 
 
 def default_law(data: Sequence[AnyData]) -> str:
-    """The law that is fitted where none is named: of recordings, the law of ageing contacts.
+    """The law that is fitted by default: Rice-Ruina for recordings, elasto-plastic for tables.
 
-    A table of harmonics is compared with the law whose asperities are elastic, which alone has
-    the phases of a modulated load; a recording of velocity steps does not show their elasticity.
+    Only a law with elastic asperities has the phases that a modulated load causes; a recording of
+    velocity steps does not show this elasticity.
     """
     tables = any(isinstance(d, LockInTable) for d in data)
     return "elasto-plastic" if tables else "rice-ruina"
 
 
 def is_table(data: questions.Data) -> bool:
-    """Whether a file holds readings rather than a recording: it has a column of an observable."""
+    """Whether a file is a table of readings, with a column of an observable, and no recording."""
     path = data.file
     require_rereadable(path, "data")
     if path.suffix.lower() == ".json":
         return True
     cells = _heading(path)
-    # The reader of tables says what is wrong with a file that cannot be opened.
-    # A table by `measure` of which no file could be measured has no observable.
+    # If a file cannot be opened, the reader of tables raises the error.
+    # A table written by `measure` has no observable if no file could be measured.
     return (
         cells is None
         or HEALING in cells
@@ -80,7 +80,7 @@ def is_table(data: questions.Data) -> bool:
 
 
 def _heading(path: Path) -> list[str] | None:
-    """Words of the first line that is no comment; None where the file cannot be opened."""
+    """Words of the first line that is no comment; None if the file cannot be opened."""
     try:
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             for line in file:
@@ -109,11 +109,11 @@ def read_data(
     Raises
     ------
     InputError
-        If a file cannot be read, or an argument for one recording meets several.
+        If a file cannot be read, or an argument for a single recording is given with several.
     """
     tables = [is_table(data) for data in question.data]
     recordings = tables.count(False)
-    # Velocities, for one, have no number where there is no recording.
+    # Arguments of recordings, such as velocities, need a recording.
     for name in ("steps", "velocities"):
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
             rule = "go with one recording"
@@ -146,7 +146,7 @@ def _stick_slip(
     fixed: Mapping[str, Any],
     window: tuple[float, float] | None = None,
 ) -> AveragedCycle | None:
-    """The averaged cycle of a recording of stick-slip; None of any other."""
+    """The averaged cycle of a recording of stick-slip; None for any other recording."""
     drive = trace.has("displacement") or trace.has("velocity")
     if not drive and (hertz := modulation_of(trace)) is not None:
         raise InputError(
@@ -189,7 +189,7 @@ def _stick_slip(
 
 
 def _reading(data: questions.Data) -> dict[str, Any]:
-    """How a trace becomes a run, but for its window."""
+    """Arguments with which a trace becomes a run, without the window."""
     return {
         "name": Path(data.name or data.file).stem,
         "steps": data.steps,
@@ -198,7 +198,7 @@ def _reading(data: questions.Data) -> dict[str, Any]:
 
 
 def run_options(question: questions.Fit | questions.Comparison) -> RunOptions:
-    """How recordings are compared with the motion."""
+    """Options of the comparison of recordings with the motion."""
     drift: tuple[Linear, ...] = ("drift",) if question.drift else ()
     return RunOptions(
         linear=("offset", *_TRENDS[question.trend], *drift),
@@ -228,7 +228,7 @@ def _options(
 def _prior_of_unloading(
     question: questions.Fit | questions.Comparison, priors: Mapping[str, Any], read: Reader
 ) -> Any:
-    """The prior of K by the slope of a stretch of unloading and reloading."""
+    """The prior of K from the slope of the force during unloading and reloading."""
     label = "stiffness_from"
     other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
     if other is not None:
@@ -269,12 +269,12 @@ def answer_fit(
     Returns
     -------
     Fit or WindowedFit
-        The latter where there are several windows.
+        A `WindowedFit` if the question has several windows.
 
     Raises
     ------
     InputError
-        As of `asperity.inference.fit`, or if a file cannot be read.
+        As in `asperity.inference.fit`, or if a file cannot be read.
     """
     options = _options(question, read, progress)
     law = None if question.law is None else known_law(question.law)
@@ -305,7 +305,7 @@ def answer_comparison(
 
 
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
-    """Sets of data as they are, files and recordings as what they hold."""
+    """Data of a fit; files and recordings are read or converted."""
     several = data if isinstance(data, list | tuple) else [data]
     loaded: list[Any] = []
     for one in several:
@@ -321,7 +321,7 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
 
 
 def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, Any]:
-    """Options in which texts stand for materials and priors, as they do on the command line."""
+    """Options of a fit, with materials and priors that are written as on the command line."""
     if isinstance(options.get("material"), str):
         options["material"] = materials.load(options["material"])
     prior = options.get("prior")
@@ -342,26 +342,26 @@ def fit(
     free: Sequence[str] | None = None,
     **options: Any,
 ) -> Fit:
-    """Fit a law to files or to data at hand, as ``asperity fit`` does.
+    """Fit a law to files or to data in memory, as ``asperity fit`` does.
 
     Parameters
     ----------
     data : path, Trace, RecordedRun, LockInTable or HealingTable, or a list of them
-        A file is read as what it is: a table of readings, one of holds, or a recording. Of
+        A file may be a table of readings, a table of holds, or a recording. For a recording of
         stick-slip the averaged cycle is fitted, with the velocity of the drive in ``fixed``.
     law : str or type of Law, optional
         By default ``rice-ruina`` for recordings and holds, ``elasto-plastic`` for readings.
     free : sequence of str, optional
-        Free parameters; by default all that the data may show.
+        Free parameters; by default all that the data may determine.
     **options
-        Of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``start``, ``inertia`` and
-        ``profile``; a ``material`` by its name, ``prior`` also as on the command line:
-        ``"bureau2000"``, ``["K=0.2+-0.01 N/um"]``.
+        Options of `asperity.inference.fit`, such as ``fixed={"D0": "5 um"}``, ``start``,
+        ``inertia`` and ``profile``. A ``material`` may be a name, and a ``prior`` may be written as
+        on the command line: ``"bureau2000"``, ``["K=0.2+-0.01 N/um"]``.
 
     Raises
     ------
     InputError
-        As of `asperity.inference.fit`, or if a file cannot be read.
+        As in `asperity.inference.fit`, or if a file cannot be read.
 
     Examples
     --------
@@ -383,22 +383,22 @@ def compare(
     free: Sequence[str] | None = None,
     **options: Any,
 ) -> Comparison:
-    """Compare laws on files or on data at hand, as ``asperity compare`` does.
+    """Compare laws on files or on data in memory, as ``asperity compare`` does.
 
     Parameters
     ----------
     data : path, Trace, RecordedRun, LockInTable or HealingTable, or a list of them
     laws : sequence of str or "all"
-        "all" are those that depend on the velocity.
+        "all" means all laws that depend on the velocity.
     free : sequence of str, optional
         Free parameters of all laws.
     **options
-        Of `asperity.inference.compare`, materials and priors as of `fit`.
+        Options of `asperity.inference.compare`; materials and priors as in `fit`.
 
     Raises
     ------
     InputError
-        As of `asperity.inference.compare`, or if a file cannot be read.
+        As in `asperity.inference.compare`, or if a file cannot be read.
 
     Examples
     --------
@@ -413,12 +413,12 @@ def compare(
 
 
 def compared_laws(names: Sequence[str]) -> list[str]:
-    """Names of laws; "all" stands for those that depend on the velocity.
+    """Names of laws; "all" stands for all laws that depend on the velocity.
 
     Raises
     ------
     InputError
-        If a name is unknown, or there is none.
+        If a name is unknown, or the list is empty.
     """
     if "all" in names:
         return [name for name, law in registered().items() if law.rate_dependent]

@@ -1,13 +1,13 @@
 """Levenberg-Marquardt along narrow curved valleys of chi-squared.
 
-A datum that is known far better than the others confines the parameters to a surface. A straight
-step soon leaves it, so that steps must be a small share of the way. Here the damped step d is the
-predictor, and steps
+A datum with a much smaller uncertainty than the others confines the parameters to a curved surface.
+A straight step leaves this surface, so that only short steps reduce chi-squared. Here the damped
+step d is a predictor, and corrections
 
     c = -J^+ (r(u + d) - r(u) - J d)
 
-lead back to the surface, r the residuals and J^+ the damped inverse of their Jacobian at the end of
-the last step: the first one is the geodesic acceleration of Transtrum and Sethna.
+lead back to the surface, with the residuals r and the damped inverse J^+ of their Jacobian at the
+end of the last step. The first correction is the geodesic acceleration of Transtrum and Sethna.
 
 Source: M. K. Transtrum, J. P. Sethna, arXiv:1201.5885 (2012).
 """
@@ -20,13 +20,15 @@ import numpy as np
 
 from asperity.arrays import Float
 
-#: Damping at the beginning, factors after a step that was taken and one that was not, and the
-#: damping from which no step is left.
+#: First damping, its factors after an accepted and after a rejected step, and the damping at which
+#: the minimisation ends.
 _FIRST, _LESS, _MORE, _LAST = 1e-2, 0.1, 10.0, 1e8
-#: Corrections of a step, at most; the longest over the step; and the share of the decrease of the
-#: linear model that needs none (Transtrum and Sethna, section 3).
+#: Largest number of corrections of a step; largest length of a correction over that of the step;
+#: and the share of the predicted decrease at which no correction is needed (Transtrum and Sethna,
+#: section 3).
 _CORRECTIONS, _LONGEST, _SHARE = 3, 0.75, 0.25
-#: Decrease of the sum of squares that is none: a hundredth of a standard error, squared.
+#: Smaller decreases of the sum of squares are negligible: the square of a hundredth of a standard
+#: error.
 _DECREASE = 1e-4
 
 
@@ -37,16 +39,16 @@ def minimised(
     high: Float,
     evaluations: int,
 ) -> Float:
-    """Where a sum of squares in which unit residuals are standard errors has its minimum.
+    """The minimum of a sum of squares of residuals that are in units of standard errors.
 
     Parameters
     ----------
     residuals : callable
-        Residuals (m,) and their Jacobian (m, n) at coordinates; not finite where there are none.
+        Residuals (m,) and their Jacobian (m, n) at coordinates; NaN without a solution.
     u : array, shape (n,)
-        Where it begins, with finite residuals.
+        Start, with finite residuals.
     low, high : array, shape (n,)
-        Bounds, which u stays within.
+        Bounds of u.
     evaluations : int
         Number of calls of `residuals` after which no further step is begun.
     """
@@ -55,14 +57,14 @@ def minimised(
     damping, used = _FIRST, 1
 
     def damped(side: Float, slopes: Float) -> Float:
-        """Change of the coordinates that makes up for residuals."""
+        """Damped change of the coordinates that compensates residuals."""
         matrix = np.vstack([slopes, np.sqrt(damping) * np.diag(scale)])
         right = np.concatenate([-side, np.zeros(u.size)])
         return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
 
     while used < evaluations and damping < _LAST:
         scale = np.maximum(scale, np.linalg.norm(J, axis=0))
-        # Without damping, and without the coordinates that a bound holds.
+        # The undamped change, without coordinates that a bound stops.
         free = np.where(J.T @ r > 0, u > low, u < high)
         if np.sum((np.linalg.qr(J[:, free])[0].T @ r) ** 2) < _DECREASE:
             break

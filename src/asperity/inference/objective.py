@@ -1,4 +1,4 @@
-"""The function that a fit minimises: data, law and free parameters, whatever the data are.
+"""The function that a fit minimises, for data of any kind.
 
 Every set of data is a `DataTerm`. It turns values of the parameters into residuals that have unit
 variance and no correlation if the law is right, so that a sum of squares is chi-squared. The
@@ -30,17 +30,17 @@ T = TypeVar("T")
 #: Residuals of parameters by name, and of arrays.
 CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
-#: A coordinate nearer to its bound is there.
+#: A coordinate closer to its bound than this is at the bound.
 _AT_BOUND = 1e-6
-#: Relative change of the coordinates that ends the way by the coarse model, from where that by the
-#: exact one goes on.
+#: Relative change of the coordinates at which a minimisation by the coarse model ends; the exact
+#: model continues from there.
 _COARSE = 1e-4
-#: Distance from bounds at which a minimisation begins.
+#: Smallest distance of the start of a minimisation from the bounds.
 _INSIDE = 2e-10
 
 
 class Residuals(NamedTuple):
-    """Residuals with what each belongs to.
+    """Residuals, with the observable and row of each.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class Residuals(NamedTuple):
     observable : array of str, shape (n,)
     row : array of int, shape (n,)
     log_scale : float
-        Sum of the logarithms of the standard uncertainties, half the log determinant of the
-        covariance.
+        Half the log determinant of the covariance: the sum of the logarithms of the standard
+        uncertainties.
     """
 
     values: Float
@@ -62,14 +62,14 @@ class Residuals(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """Where a minimisation has ended.
+    """The end of a minimisation.
 
     Attributes
     ----------
     u : array, shape (n,)
         Coordinates.
     chi2 : float
-        Infinite without a solution.
+        Chi-squared; infinite without a solution.
     """
 
     u: Float
@@ -82,18 +82,18 @@ class DataTerm(ABC):
     Attributes
     ----------
     name : str
-        What messages call the data.
+        Name of the data in messages.
     observables : tuple of str
-        What the data report; the `observable` of each residual is one of them.
+        Names of the observables of the data; the `observable` of each residual is one of these.
     nuisances : tuple of Unknown
-        Free parameters of this set of data alone, such as the offset of a gauge.
+        Free parameters of these data alone, such as the offset of a gauge.
     failure : str
-        Why the residuals may not exist, and what to do: the message of a fit that failed.
+        Message of a failed fit: why the residuals may not exist, and what to do.
     searches : bool or None
-        Whether orbits that the fast method does not find are searched for at every call. None for
-        data that are no periodic responses.
+        Whether every call searches for orbits that the fast method does not reach. None for data
+        other than periodic responses.
     affordable : int
-        Evaluations that an integral over the parameters may take.
+        Number of evaluations for an integral over the parameters.
     """
 
     name: str
@@ -110,7 +110,7 @@ class DataTerm(ABC):
 
     @property
     def profiled(self) -> int:
-        """Parameters that the term itself fits at given values of the others.
+        """Number of parameters that the term itself fits at given values of all others.
 
         They count in AICc, BIC and degrees of freedom.
         """
@@ -125,10 +125,10 @@ class DataTerm(ABC):
         Parameters
         ----------
         values : mapping of str to float
-            All free parameters and nuisances of the fit, in SI. Columns of the Jacobian are the
-            derivatives to these, in this order; a column of zeros where the term does not depend.
+            All free parameters and nuisances of the fit, in SI. The columns of the Jacobian are the
+            derivatives with respect to these, in this order; zeros without dependence.
         search : bool, optional
-            Whether a slower method is tried where the fast one finds no solution.
+            Whether to try a slower method if the fast method has no solution.
         """
 
     def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
@@ -138,8 +138,8 @@ class DataTerm(ABC):
         ----------
         values : sequence of mapping of str to float
         near : bool
-            Whether solutions are like those of the last call of `residuals`, and begun there. The
-            sums may then be those of a coarser model: differences between them count.
+            Whether solutions are close to those of the last call of `residuals`, and start from
+            them. The sums may then be those of a coarser model; only their differences are right.
 
         Returns
         -------
@@ -154,7 +154,7 @@ class DataTerm(ABC):
         """Columns of the data, for files of draws."""
 
     def compiled(self, names: tuple[str, ...]) -> tuple[CompiledResiduals, Any]:
-        """The residuals as compiled programs evaluate and differentiate them.
+        """The residuals as a function for compiled programs, and its arrays.
 
         Parameters
         ----------
@@ -164,28 +164,29 @@ class DataTerm(ABC):
         Returns
         -------
         callable
-            Of parameters by name and of the arrays; equal ones share a program. The sum of squares
-            is that of `residuals`, and NaN without a solution.
+            Function of the parameters by name and of the arrays; equal functions share a compiled
+            program. The sum of squares is that of `residuals`, and NaN without a solution.
         pytree of arrays
 
         Raises
         ------
         InputError
-            For data whose prediction has no derivatives within compiled programs.
+            If the prediction of the data has no derivatives within compiled programs.
         """
         rule = "be of lock-in readings or recordings of sliding"
         advice = f"take intervals by profile likelihood ({Argument('profile', value='True')})"
         raise InputError("a posterior", rule, self.name, advice)
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
-        """The same data with fewer rows and a coarser model, to look for minima with.
+        """The same data with fewer rows and a coarser model, for the search for minima.
 
-        Some of these rows may have no solution: chi-squared is that of the others, scaled to all.
+        Some of these rows may have no solution: chi-squared is then that of the other rows, scaled
+        to all rows.
 
         Parameters
         ----------
         rows, data : int
-            Rows that are kept, spread over all, and readings that these hold at least.
+            Number of rows, spread over all rows, and smallest number of readings in them.
 
         Returns
         -------
@@ -195,49 +196,49 @@ class DataTerm(ABC):
         return None
 
     def coarser(self) -> DataTerm:
-        """The same data with a coarser model, to go near a minimum with; itself without one."""
+        """The same data with a coarser model, for the approach to a minimum; itself without one."""
         return self
 
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """What estimating the noise adds to a covariance, and the variance of its diagonal.
+        """The addition of estimated noise to a covariance, and the variance of its diagonal.
 
         Parameters
         ----------
         values : mapping of str to float
             Free parameters and nuisances of the fit, in SI, at the estimate.
         slopes : array, shape (parameters,)
-            Derivatives of the values to the coordinates of the covariance.
+            Derivatives of the values with respect to the coordinates of the covariance.
         covariance : array, shape (parameters, parameters)
-            Under known noise.
+            Covariance under known noise.
 
         Returns
         -------
         array, shape (parameters, parameters), and array, shape (parameters,)
-            Zeros where the uncertainties are given.
+            Addition and variance; zeros if the uncertainties are given.
         """
         return np.zeros_like(covariance), np.zeros(slopes.size)
 
     def use_search(self, always: bool) -> None:  # noqa: B027
-        """Try the slower method at every call, or no more; of data that have one."""
+        """Set whether every call tries the slower method, for data that have one."""
 
     def search_wholly(self, values: Mapping[str, float]) -> None:  # noqa: B027
-        """Search by every method for solutions there, for later calls to begin with."""
+        """Search for solutions at `values` by all methods; later calls start from them."""
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
-        """What a reader must know of these data.
+        """Warnings about these data.
 
         Parameters
         ----------
         residuals : Residuals
-            At the estimate.
+            Residuals at the estimate.
         information : array, shape (coordinates, coordinates)
-            Of all data and priors there.
+            Information matrix of all data and priors at the estimate.
         outliers : sequence of int
-            Rows of a table without which the law describes it.
+            Rows without which the law describes a table.
         """
         return ()
 
@@ -255,11 +256,11 @@ class Objective:
     fixed : mapping of str to float or array
         Parameters that are not free, in SI.
     tolerance : float
-        Relative change of the coordinates at which a minimum is reached.
+        A minimisation ends at this relative change of the coordinates.
     curved : bool
         Whether chi-squared has narrow valleys that bend (`asperity.inference.levenberg_marquardt`).
     unsolved : int
-        Evaluations so far at which a term had no solution.
+        Number of evaluations so far at which a term had no solution.
     """
 
     terms: tuple[DataTerm, ...]
@@ -269,7 +270,7 @@ class Objective:
     tolerance: float = 1e-10
     curved: bool = False
     unsolved: int = field(default=0, init=False, repr=False)
-    # Of this objective alone: `dataclasses.replace` leaves it out.
+    # State of this object: `dataclasses.replace` does not copy it.
     _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
 
     @property
@@ -286,10 +287,10 @@ class Objective:
         return np.array([float(k.to_coordinate(values[k.name])) for k in self.unknowns])
 
     def ordered(self, u: Float) -> Float:
-        """The same point with parameters that the law may exchange by rising first ones.
+        """The same point with exchangeable parameters sorted, so that the first of each group rise.
 
-        As it is where they are not all free, differ in their priors, or cannot have each other's
-        values.
+        The point is unchanged if exchangeable parameters are not all free, have different priors,
+        or cannot have each other's values.
         """
         sets = self.law.exchangeable
         known = {k.name: k for k in self.unknowns}
@@ -313,7 +314,7 @@ class Objective:
         return result if ((result >= low) & (result <= high)).all() else u
 
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
-        """Residuals of each term, with the Jacobian to the coordinates; None without a solution."""
+        """Residuals of each term, with derivatives in the coordinates; None without a solution."""
         values = self.named(u)
         slopes = np.array([k.slope(values[k.name]) for k in self.unknowns])
         result = []
@@ -356,7 +357,7 @@ class Objective:
         return values, jacobian
 
     def chi2(self, u: Float) -> float:
-        """chi-squared of data and priors; infinite without a solution."""
+        """Chi-squared of data and priors; infinite without a solution."""
         value = float(np.sum(self.residuals(u)[0] ** 2))
         return value if math.isfinite(value) else math.inf
 
@@ -370,13 +371,13 @@ class Objective:
         self._last = None
 
     def use_search(self, always: bool) -> None:
-        """Let every term try its slower method at every call, or no more."""
+        """Set whether every call tries the slower method of the terms."""
         for term in self.terms:
             term.use_search(always)
         self.forget()
 
     def search_wholly(self, u: Float) -> None:
-        """Let every term search by every method for solutions at u, to begin with from then on."""
+        """Search for solutions of all terms at u by all methods; later calls start from them."""
         for term in self.terms:
             term.search_wholly(self.named(u))
         self.forget()
@@ -389,15 +390,16 @@ class Objective:
         tolerance: float | None = None,
         evaluations: int = 100,
     ) -> Minimum:
-        """The minimum that is reached from u.
+        """Minimise chi-squared from u.
 
         Parameters
         ----------
         u : array, shape (n,)
         kept : mapping of int to float, optional
-            Coordinates that stay at the given values.
+            Values of coordinates, by index, that stay fixed.
         tolerance : float, optional
-            Relative change of the coordinates that ends it, if not that of the objective.
+            Relative change of the coordinates that ends the minimisation; by default that of the
+            objective.
         evaluations : int
             Largest number of evaluations of the residuals.
         """
@@ -408,7 +410,7 @@ class Objective:
         for i, value in kept.items():
             point[i] = value
         low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
-        # So far inside that SciPy does not move the first point.
+        # The start is so far inside the bounds that SciPy does not move it.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
         ahead = self.coarser()
@@ -436,7 +438,7 @@ class Objective:
             end = whole(levenberg_marquardt.minimised(of_moving, inside, low, high, evaluations))
             return Minimum(end, self.chi2(end))
 
-        # SciPy asks for the Jacobian where it has just asked for the residuals.
+        # SciPy evaluates the Jacobian at the point at which it has just evaluated the residuals.
         @functools.lru_cache(1)
         def triangle_of(part: bytes) -> Float:
             r, jacobian = self.residuals(whole(np.frombuffer(part)))
@@ -460,16 +462,16 @@ class Objective:
         return Minimum(found, self.chi2(found))
 
     def coarser(self) -> Objective:
-        """The objective of `DataTerm.coarser` data; itself where that has no coarser model."""
+        """The objective of `DataTerm.coarser` data; itself without a coarser model."""
         terms = tuple(term.coarser() for term in self.terms)
         same = all(a is b for a, b in zip(terms, self.terms, strict=True))
         return self if same else replace(self, terms=terms)
 
     def expected_decrease(self, u: Float) -> float:
-        """Decrease of chi-squared that residuals linear in the coordinates would allow.
+        """Possible decrease of chi-squared, by residuals that are linear in the coordinates.
 
-        Nearly 0 at a minimum, bounds included. More where a minimisation has stopped at the edge of
-        the region in which the residuals exist.
+        Nearly 0 at a minimum, also at a minimum on a bound; larger if a minimisation has stopped at
+        the edge of the region in which the residuals exist.
         """
         r, J = self.residuals(u)
         gradient = J.T @ r
@@ -478,36 +480,36 @@ class Objective:
         return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
 
     def held(self, u: Float, gradient: Float) -> Bool:
-        """Coordinates that a bound keeps from lowering chi-squared, by its gradient at u."""
+        """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
         low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
         return np.asarray(np.where(gradient > 0, u - low, high - u) < _AT_BOUND)
 
     def terms_of(self, kind: type[T]) -> list[T]:
-        """The sets of data of one kind, tables or recordings."""
+        """All terms of one kind, tables or recordings."""
         return [term for term in self.terms if isinstance(term, kind)]
 
     @property
     def has_table(self) -> bool:
-        """Whether periodic responses are among the data."""
+        """Whether the data include periodic responses."""
         return any(term.searches is not None for term in self.terms)
 
     @property
     def searches(self) -> bool:
-        """Whether every table has its slower method tried at every call."""
+        """Whether every call tries the slower method of all tables."""
         return all(term.searches is not False for term in self.terms)
 
     @property
     def noise_is_known(self) -> bool:
-        """Whether no noise is estimated: there are no recordings among the data."""
+        """Whether no noise is estimated: the data have no recordings."""
         return all(term.profiled == 0 for term in self.terms)
 
     def thinned(self, rows: int, data: int = 0) -> Objective | None:
-        """The objective of `DataTerm.thinned` data; None for other data than one table."""
+        """The objective of `DataTerm.thinned` data; None unless the data are one table."""
         term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
         return None if term is None else replace(self, terms=(term,))
 
     def chi2_of_many(self, u: Float) -> Float:
-        """chi-squared of data and priors at many coordinates, shapes (samples, n) to (samples,).
+        """Chi-squared of data and priors at many coordinates, shapes (samples, n) to (samples,).
 
         Parameters
         ----------
@@ -519,7 +521,7 @@ class Objective:
 
 
 def compressed(columns: Float) -> Float:
-    """Few rows with the same inner products of columns, for what depends on those alone.
+    """Few rows with the same inner products of the columns as many rows.
 
     Parameters
     ----------
@@ -528,12 +530,12 @@ def compressed(columns: Float) -> Float:
     Returns
     -------
     array, shape (at most n, n)
-        Triangle R of columns = Q R; the columns themselves where they are not finite.
+        Triangle R of columns = Q R; the columns themselves if they are not finite.
 
     Notes
     -----
-    By blocks of rows (Demmel et al., SIAM J. Sci. Comput. 34, A206, 2012): one factorisation of
-    thousands of rows makes threads of BLAS wait for each other.
+    Blocks of rows are factorised one by one (Demmel et al., SIAM J. Sci. Comput. 34, A206, 2012):
+    in one factorisation of thousands of rows, threads of BLAS would wait for each other.
     """
     if not np.isfinite(columns).all():
         return columns

@@ -1,4 +1,4 @@
-"""Fits and comparisons as sections of sentences and tables, which every report renders."""
+"""Fits and comparisons as sections of sentences and tables, for every kind of report."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from asperity.inference.fitting.result import (
     with_error,
 )
 from asperity.inference.fitting.windows import WindowedFit
-from asperity.inference.holds.table import HoldTerm
+from asperity.inference.holds import HoldTerm
 from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
@@ -26,7 +26,7 @@ from asperity.units import quantity_text
 
 
 def fit_report(fit: Fit) -> list[Section]:
-    """Outcome in words, estimates, correlations, quality, and warnings of a fit."""
+    """Outcome in words, estimates, correlations, quality and warnings of a fit."""
     if not fit.converged:
         return [Section(f"{fit.law}: {fit.message}")]
     names = list(fit.parameters)
@@ -45,7 +45,7 @@ def fit_report(fit: Fit) -> list[Section]:
 
 
 def fit_in_words(fit: Fit) -> tuple[str, ...]:
-    """What a fit says of the friction, before its numbers."""
+    """Conclusions of a fit in sentences: A - B, mu0, and undetermined parameters."""
     if not fit.converged:
         return ()
     sentences = [f"These numbers are doubtful: {'; '.join(fit.doubts)}."] if fit.doubts else []
@@ -61,7 +61,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
         )
     values = {**fit.objective.fixed, **fit.values}
     mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
-    # Holds are counted from the level of sliding, which is assumed.
+    # A fit of holds takes friction relative to sliding: its mu0 is assumed.
     if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not fit.parts(HoldTerm):
         sentences.append(f"mu0 = {mu0[0]:.4g} at V0 = {quantity_text(V0[0], 'm/s')}")
     if fit.undetermined:
@@ -70,7 +70,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
 
 
 def estimates(fit: Fit) -> Section:
-    """Estimates with standard errors and intervals; "not determined" stands for those without."""
+    """Estimates with standard errors and intervals, or "not determined"."""
     head = ("", "estimate", "std. error", "68 % interval", "95 % interval", "", "")
     rows = tuple(
         _estimate_row(name, p, name.removesuffix("/W0") in fit.undetermined)
@@ -112,7 +112,7 @@ def quality(fit: Fit) -> Section:
             (name, f"{chi2:.4g}", f"for {count} data")
             for name, (chi2, count) in fit.observables.items()
         )
-    sentences += [s for term, _ in fit.parts(LockInTerm) if (s := _gauges(term.table))]
+    sentences += [s for term, _ in fit.parts(LockInTerm) if (s := _needed_bandwidth(term.table))]
     for term in fit.objective.terms_of(RunTerm):
         noise = term.noise
         sentences.append(
@@ -126,10 +126,10 @@ def quality(fit: Fit) -> Section:
     return Section("", tuple(sentences), (), rows)
 
 
-def _gauges(table: LockInTable) -> str:
-    """What the uncertainties of phases ask of the gauges; empty without phases.
+def _needed_bandwidth(table: LockInTable) -> str:
+    """The bandwidth of the gauges that the uncertainties of phases need; empty without phases.
 
-    A low-pass of first order with the corner f_c turns a phase at f by f/f_c.
+    A low-pass of first order with the corner frequency f_c shifts a phase at f by f/f_c.
     """
     corners = [
         (n * frequency / error, n * frequency, error)
@@ -143,9 +143,10 @@ def _gauges(table: LockInTable) -> str:
         return ""
     corner, frequency, error = max(corners)
     return (
-        f"{table.name}: noise leaves {error:.2g} rad to the phase at "
-        f"{quantity_text(frequency, 'Hz', 3)}; a gauge or filter with a low-pass below "
-        f"{quantity_text(corner, 'Hz', 3)} turns it by more, which no uncertainty here holds"
+        f"{table.name}: the phase at {quantity_text(frequency, 'Hz', 3)} has an uncertainty of "
+        f"{error:.2g} rad by noise; a gauge or filter with a low-pass below "
+        f"{quantity_text(corner, 'Hz', 3)} shifts it by more, and the uncertainties here do not "
+        "include this"
     )
 
 
@@ -180,16 +181,16 @@ def posterior_sections(posterior: Posterior) -> list[Section]:
 
 
 def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[Section]:
-    """The verdict, the laws with what decides, and the warnings of each.
+    """The verdict, the table of the laws, and the warnings of each law.
 
-    What is not determined stands in the table, without the sentence that a fit has for each.
+    The table names parameters that are not determined; the warnings of a fit on them are left out.
     """
     head, rows = laws_table(comparison, reasons=reasons)
     warnings = {
         name: [w for w in j.fit.warnings if w not in j.fit.because.values()]
         for name, j in comparison.laws.items()
     }
-    # A warning that every law has is about the data, and is given once.
+    # A warning of every law is about the data, and is given once.
     first = next(iter(warnings.values()), [])
     of_data = [w for w in first if all(w in warned for warned in warnings.values())]
     of_laws = [f"{n}: {w}" for n, warned in warnings.items() for w in warned if w not in of_data]

@@ -14,7 +14,7 @@ from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
 
-#: Share of the applied modulation that the contacts carry; no parameter of an operating point.
+#: Share of the applied modulation that the contacts carry; only fits have this parameter.
 EPS_RATIO = Parameter(
     "eps_ratio",
     "dimensionless",
@@ -26,8 +26,8 @@ EPS_RATIO = Parameter(
     label="eps_ratio",
 )
 
-#: Where starts are looked for if nothing better is known, in SI: what contacts of rock, polymers
-#: and metals show (Marone, 1998; Baumberger and Caroli, 2006; c: Nagata et al., 2012), widened.
+#: Default ranges of start values in SI: those of contacts of rock, polymers and metals (Marone,
+#: 1998; Baumberger and Caroli, 2006; c: Nagata et al., 2012), widened.
 _USUAL = {
     "mu0": (0.2, 1.0),
     "A": (0.003, 0.05),
@@ -40,34 +40,35 @@ _USUAL = {
     "D2": (1e-7, 1e-4),
     "eps_ratio": (0.2, 1.0),
 }
-#: Share of a usual value that is the least scale of a coordinate.
+#: Smallest scale of a linear coordinate, as a share of a usual value.
 _LEAST_SCALE = 1e-3
-#: A positive parameter is looked for within this factor of its starts.
+#: A positive parameter is searched within this factor of its range of starts.
 _FARTHEST = 1e6
-#: Factor of a logarithmic range beyond the usual values, and of the highest one of others.
+#: Factor by which a logarithmic range exceeds the usual values; factor of the highest usual value
+#: for the end of other ranges.
 _LOGARITHMIC, _LINEAR = 10.0, 3.0
-#: Standard deviations about an estimate that the range reaches at least.
+#: The range includes at least this many standard deviations about an estimate.
 _REACH = 10.0
-#: Never free: only its product with others is seen.
+#: Parameters that cannot be free: a change of V0 is equivalent to changes of others.
 REFERENCES = ("V0",)
 
 
 class UnfittableLawError(InputError):
-    """A law with too few numbers or samples for it: a comparison goes on without that law."""
+    """A law that cannot be fitted for want of numbers or samples; a comparison leaves it out."""
 
 
 @dataclass(frozen=True)
 class Prior:
-    """A normal prior in the parameter itself, cut off where the parameter's rule says.
+    """A normal prior of a parameter, cut off by the parameter's rule.
 
     Attributes
     ----------
     mean, sd : float
-        In SI.
+        Mean and standard deviation in SI.
     source : str
     unit : str
-        SI unit of both where it is not that of the parameter: a stiffness of a recording may be
-        given over the load, in 1/m. Empty for that of the parameter.
+        SI unit of mean and sd if it differs from that of the parameter, else empty: the prior of a
+        stiffness may be given over the load, in 1/m.
     """
 
     mean: float
@@ -85,16 +86,16 @@ class Unknown:
     parameter : Parameter
     logarithmic : bool
     scale : float
-        Of a coordinate that is no logarithm.
+        Scale of a coordinate that is no logarithm.
     lower, upper : float
         Bounds of x, in SI.
     start : (float, float)
-        Range in which starts are drawn.
+        Range of random starts.
     given : float or None
-        A start by the user or a material.
+        Start value from the user or a material.
     prior : Prior or None
     nuisance : bool
-        Whether it belongs to one set of data alone and is no number of the law.
+        Whether the parameter belongs to one data set, and not to the law or the machine.
     """
 
     parameter: Parameter
@@ -134,19 +135,19 @@ class Unknown:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Bounds of the coordinate; of a logarithm a factor of a million off the starts."""
+        """Bounds of the coordinate; for a logarithm, a factor of a million from the starts."""
         if self.logarithmic:
             low, high = self.start[0] / _FARTHEST, min(self.start[1] * _FARTHEST, self.upper)
             return math.log(low), math.log(high)
         return self.lower / self.scale, self.upper / self.scale
 
     def range_about(self, u: float, sd: float) -> tuple[float, float]:
-        """Range of the coordinate in which it is looked for, about an estimate with its deviation.
+        """Range of the coordinate for posteriors and evidence, about an estimate with its error.
 
-        It is that of the prior of posteriors and evidence: ten standard deviations of a prior, or a
-        tenth of the lowest to ten times the highest usual value where the coordinate is the
-        logarithm, and zero to three times the highest elsewhere; ten deviations of the estimate
-        at least, of one that is determined.
+        With a prior, the range is ten standard deviations of the prior. Otherwise it is a tenth of
+        the lowest to ten times the highest usual value for a logarithmic coordinate, and zero to
+        three times the highest usual value for others. It includes ten standard deviations about
+        an estimate that is determined.
         """
         low, high = self.bounds
         if self.prior is not None:
@@ -163,7 +164,7 @@ class Unknown:
         return max(low, min(usual[0], u - reach)), min(high, max(usual[1], u + reach))
 
     def end(self, u: float) -> float:
-        """Value at the end of an interval; 0 or infinite where the search ended before."""
+        """Value at the end of an interval; 0 or infinite if the end lies beyond the bounds."""
         low, high = self.bounds
         if self.logarithmic and u <= low + _FARTHEST**-1:
             return 0.0
@@ -178,7 +179,7 @@ def require_fittable(law: type[Law], free: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        With the names that can be free.
+        If a name is not allowed; the message lists the names that can be free.
     """
     known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
     fittable = [n for n, p in known.items() if p.place != "drive" and n not in REFERENCES]
@@ -210,12 +211,12 @@ def unknowns_of(
     law : type of Law
     free : sequence of str
     largest_epsilon : float
-        Of the data; eps_ratio times it stays below 1.
+        Largest epsilon of the data; its product with eps_ratio stays below 1.
     start : mapping of str to float
-        Values known beforehand.
+        Start values.
     priors : mapping of str to Prior
     usual : mapping of str to (float, float), optional
-        Ranges of start values that the data suggest, before those of contacts in general.
+        Ranges of start values from the data; they take precedence over the default ranges.
     """
     known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
     ranges = {**_USUAL, **(usual or {})}
@@ -245,7 +246,7 @@ def unknown_of(
     Raises
     ------
     InputError
-        If nothing says where to look for it, or its prior is where it cannot be.
+        If the parameter has no range of starts, or its prior contradicts its rule.
     """
     name = parameter.name
     positive = parameter.rule == "positive"
@@ -270,7 +271,7 @@ def unknown_of(
         low, high = max(low, prior.mean - 3 * prior.sd), min(high, prior.mean + 3 * prior.sd)
         low = max(low, prior.mean / 10)
     high = min(high, upper)
-    # A start may be as good as zero, which is no scale.
+    # A start may be nearly zero, which is no scale.
     typical = math.sqrt(usual[0] * usual[1]) if usual and usual[0] > 0 else 0.0
     scale = 1.0 if positive else max(abs(middle or typical), _LEAST_SCALE * typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf

@@ -4,11 +4,11 @@
 
     check_law(MyLaw(mu0=0.5, A=0.013, B=0.026, D0="0.4 um", V0="1 um/s"))
 
-The checks use nothing but the law: steady sliding is a zero of the rates, friction there is mu_ss,
-`log_velocity` inverts `friction`, derivatives agree with finite differences, every method acts on
-each element of an array for itself, and a change of the units of length, time and force changes
-nothing. What a publication says of its law (the slope of mu_ss, a step of the load) can be given,
-and is checked too.
+The checks need only the law: steady sliding is a zero of the rates, with friction mu_ss;
+`log_velocity` inverts `friction`; derivatives agree with finite differences; every method acts
+element by element on arrays; and a change of the units of length, time and force changes nothing.
+Published properties of the law (the slope of mu_ss, the response to a step of the load) can be
+added to the checks.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from asperity.parameters import law_parameters
 from asperity.units import KINDS
 from asperity.units.scale import base_units
 
-#: Round-off, with room for the cancellation of terms some 1e3 times the result.
+#: Round-off, including the cancellation of terms about 1e3 times larger than the result.
 EXACT = 1e-12
 
 #: Velocities (m/s) at which the identities are checked.
@@ -73,8 +73,8 @@ def check_law(
     slope : callable, optional
         The published d mu_ss / d ln v as a function of the velocity (m/s).
     load_step : callable, optional
-        The published F/W after a step of the load: from F/W and W/W0 before it and the factor by
-        which the load jumps. Linker and Dieterich: ``lambda f, w, k: f - alpha * log(k)``.
+        The published F/W after a step of the load, a function of F/W and W/W0 before the step and
+        of the factor of the load. Linker and Dieterich: ``lambda f, w, k: f - alpha * log(k)``.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def check_law(
     Raises
     ------
     BrokenIdentityError
-        With every identity that it breaks.
+        If the law breaks an identity; the message names all broken identities.
     """
     checks: dict[str, Callable[[], None]] = {
         "steady sliding": lambda: steady_sliding(law),
@@ -123,7 +123,7 @@ def sample(law: Law, seed: int = 0) -> tuple[Array, tuple[Array, ...], Array]:
 
 
 def steady_sliding(law: Law) -> None:
-    """`steady_state` is a zero of the rates at every velocity, and friction there is mu_ss."""
+    """`steady_state` is a zero of the rates at every velocity, with friction mu_ss."""
     speeds = jnp.array(SPEEDS)
     one = jnp.ones_like(speeds)
     steady = law.steady_state(speeds)
@@ -149,7 +149,7 @@ def inverse(law: Law) -> None:
 
 
 def element_wise(law: Law) -> None:
-    """An array argument gives element by element the results of its elements."""
+    """The result of an array holds the results of its elements."""
     v, state, w = sample(law)
     friction, rates = law.friction(v, state, w), law.state_rate(v, v, state, w)
     for i in range(len(SPEEDS)):
@@ -192,8 +192,8 @@ def derivatives(law: Law) -> None:
 def units(law: Law) -> None:
     """The same law in other units of length, time and force has the same friction and states.
 
-    Parameters are converted by the kinds with which they are declared; a number with a hidden unit
-    in an equation shows.
+    Parameters are converted by their declared kinds. The check fails if an equation contains a
+    number with a hidden unit.
     """
 
     def converted(value: Any, kind: str) -> Any:

@@ -7,7 +7,7 @@ Nagata, Nakatani and Yoshida (2012)::
 
 The authors kept the load constant. Here the rate of the shear force is taken over the mean load
 W0: under a changing load that is their term dF_i / W to first order in the modulation, and a load
-step that leaves the shear force as it is leaves the age as it is. With::
+step that leaves the shear force unchanged leaves the age unchanged. With::
 
     s = ln(V0 Phi / D0) + (c / B) F_i / W0
 

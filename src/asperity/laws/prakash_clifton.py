@@ -8,7 +8,7 @@ W_e, which relaxes to the applied one over a slip of length L, or a time L/V_sta
     dPhi/dt  = 1 - v Phi / D0
 
 State: ``m = ln(W_e / W0)``, with dm/dt = (|v| + V_star)/L (W/W_e - 1). A step of the load leaves
-the force as it is at first. Under constant load the law is Rice-Ruina.
+the force unchanged at first. Under constant load the law is Rice-Ruina.
 """
 
 from __future__ import annotations

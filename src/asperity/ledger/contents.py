@@ -50,7 +50,7 @@ class RuleWords(Record):
         Raises
         ------
         InputError
-            If the rule is unknown or a number of it is missing or unknown.
+            If the rule is unknown, or one of its numbers is missing or unknown.
         """
         if self.accept not in rules.RULES:
             rule = "be a rule of the ledger"
@@ -79,9 +79,9 @@ class Entry(Record):
         Formulas of the paper's printed numbers and of the ``terms`` of its model, by the names of
         their results, in place of a check; see `asperity.ledger.rules.formula_value`.
     judged : tuple of str
-        Names of the numbers that the rule judges, ``*`` standing for any text: every one of them
-        has to pass. All by default. A rule on a formula judges ``printed``, ``independent`` and,
-        where a corrected formula exists, ``derived``.
+        Names of the numbers that the rule judges; ``*`` stands for any text, and every number has
+        to pass. By default all numbers. A rule on a formula judges ``printed``, ``independent``
+        and, where a corrected formula exists, ``derived``.
     """
 
     id: str
@@ -136,7 +136,7 @@ class Uncertainty(Record):
     ----------
     quantity : str
     low, high : mapping of str to float
-        The paper's numbers that differ there, in the units of the material file.
+        The paper's numbers that differ at this end, in the units of the material file.
     note : str
         Source of the ends.
     """
@@ -171,11 +171,11 @@ class SummaryWords(Record):
     ----------
     title : str
     sentences : tuple of str
-        ``{id}`` stands for what was computed for that claim.
+        ``{id}`` stands for the computed text of that claim.
     verdict : str
         Verdict whose claims are listed below the paragraph, with links; none by default.
     figures : tuple of str
-        Names of figures that are shown beside each other above it, with links; none by default.
+        Names of figures that are shown in a row above the paragraph, with links; none by default.
     """
 
     title: str
@@ -221,8 +221,8 @@ def read_contents(file: Traversable) -> Contents:
     Raises
     ------
     InputError
-        If the file is not TOML, has unknown or missing fields, two claims of one id, or refers to
-        a claim or an uncertainty that it does not have.
+        If the file is not TOML, has unknown or missing fields or two claims with the same id, or
+        refers to a claim or an uncertainty that it does not have.
     """
     contents = read_words(file, Contents)
     _check_names(contents, str(file))

@@ -42,7 +42,7 @@ class FigureTable:
     Attributes
     ----------
     name : str
-        Of the file, without its ending.
+        Name of the file, without its ending.
     data : DataFrame
     header : sequence of str
         First lines of the file.
@@ -63,7 +63,7 @@ class FigureNumbers:
     Attributes
     ----------
     name : str
-        Of its files, and of its words in figures.toml.
+        Name of its files, and of its words in figures.toml.
     data : DataFrame
         One operating point, or one instant, a row; ``curve`` names the line that it belongs to.
     scalars : mapping of str to float
@@ -111,7 +111,7 @@ class PaperFigure:
     Attributes
     ----------
     name : str
-        Of its files.
+        Name of its files.
     place : str
         The paper's number for it, such as "Figure 2".
     title, caption : str
@@ -311,7 +311,7 @@ class Section:
     Attributes
     ----------
     key : str
-        Of the section in addresses within the page.
+        Key of the section in addresses within the page.
     title : str
     figures : sequence of functions
         Each computes one figure.

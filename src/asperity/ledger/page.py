@@ -52,13 +52,13 @@ def build_page(
     ----------
     paper : Paper
     folder : Path
-        Of the report, which has the pictures already.
+        Folder of the report, which has the pictures already.
     shown : sequence of (Section, sequence of PaperFigure)
         The sections in their order on the page, and their figures.
     claims : sequence of Claim
     headlines : sequence of Headline
     agreement : sequence of CurveComparison
-        Of measured points with the curves, where points were given.
+        Agreement of measured points with the curves, where points were given.
     """
     about, known = paper.contents.paper, {claim.id: claim for claim in claims}
     pictures = {figure.name: _picture(figure, folder) for _, figures in shown for figure in figures}

@@ -149,9 +149,9 @@ def with_curves(
     table : DataFrame
         The figure's curves, with the columns ``curve`` and ``law``.
     observables : Observables
-        Of that figure.
+        Observables of that figure.
     name : str
-        Of the file, for messages.
+        Name of the file, for messages.
 
     Returns
     -------
@@ -277,7 +277,7 @@ class MeasuredPoints:
     Attributes
     ----------
     name : str
-        Of the file, for messages.
+        Name of the file, for messages.
     points : DataFrame, optional
         From `read_points`.
     compared : list of DataFrame

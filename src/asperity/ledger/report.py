@@ -51,7 +51,7 @@ class ReproductionSummary:
     exceptions : tuple of (str, str, str)
         Verdict, place and statement of each claim that is not reproduced.
     agreement : tuple of CurveComparison
-        Of measured points with the curves, where points were given.
+        Agreement of measured points with the curves, where points were given.
     seconds : float
     """
 

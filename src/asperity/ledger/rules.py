@@ -169,7 +169,7 @@ def formula_value(
     numbers : mapping of str to float
         From `asperity.ledger.claims.printed_numbers`.
     place : str
-        Of the formula, for messages.
+        Place of the formula, for messages.
     terms : mapping of str to object, optional
         Further names: functions, and what they are given.
 

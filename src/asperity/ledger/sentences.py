@@ -49,7 +49,7 @@ def fill(sentence: str, values: Mapping[str, Any], where: str) -> str:
     sentence : str
     values : mapping of str to float or str
     where : str
-        Of the sentence, for messages.
+        Place of the sentence, for messages.
 
     Raises
     ------

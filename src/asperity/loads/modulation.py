@@ -1,15 +1,25 @@
-"""Excitation of the slider at an instant, and modulations: harmonic, or by Fourier coefficients."""
+"""Excitation of the slider at an instant, and modulations over a period.
+
+A modulation is harmonic, has Fourier coefficients, or is made from amplitudes and phases or from a
+sampled period.
+"""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import NamedTuple, Self, TypeAlias
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
+
+from asperity.arrays import Float
+from asperity.errors import InputError, require
+from asperity.parameters.arguments import shown
+from asperity.units import to_radians, to_si
 
 
 class Excitation(NamedTuple):
@@ -173,3 +183,195 @@ def _written(mean: str, series: Series) -> str:
             number = f"({low!r})" if low == high else f"({low!r} to {high!r})"
             terms.append(f"{number} {function}({k} w t)")
     return " + ".join(terms) or "0"
+
+
+#: Number of phases at which the load is checked to be positive.
+_PHASES = 2 * np.pi * np.arange(720) / 720
+
+#: Fourier coefficients of a sampled period below this share of the largest are left out.
+_NEGLIGIBLE = 1e-13
+
+
+def modulated(
+    epsilon: ArrayLike | str = 0.0,
+    *,
+    load: Mapping[int, tuple[Any, Any]] | None = None,
+    pull: ArrayLike | str = 0.0,
+    pull_phase: ArrayLike | str = 0.0,
+    tilt: ArrayLike | str = 0.0,
+) -> Periodic:
+    """Modulation of load, shear force and pulling velocity from amplitudes and phases.
+
+        W/W0 = 1 + eps cos wt + sum over n of e_n cos(n wt + p_n)
+        V(t) = V [1 + pull cos(wt + pull_phase)]
+
+    Parameters
+    ----------
+    epsilon : array or str
+        Relative amplitude of the load at the modulation frequency, its phase being zero.
+    load : mapping of int to pair, optional
+        Further harmonics of the load: n -> (e_n, p_n), phases in rad or texts like ``"30 deg"``.
+    pull : array or str
+        Amplitude of the pulling velocity over its mean (dimensionless).
+    pull_phase : array or str
+        Its phase against the load (rad).
+    tilt : array or str
+        Angle between the direction in which the modulated force acts and the interface's normal
+        (rad, in (-pi/2, pi/2)), positive where a growing load also pushes the slider along
+        the pulling direction. The shear force on the slider is then tan(tilt) times the modulated
+        part of the load.
+
+    Returns
+    -------
+    Periodic
+
+    Raises
+    ------
+    InputError
+        If the load would vanish within the period, or a value breaks its rule.
+    """
+    series = _load_series(epsilon, load)
+    speed = _pair(to_si(pull, "dimensionless", "pull"), to_radians(pull_phase, "pull_phase"))
+    gain = np.tan(_checked_tilt(tilt))
+    shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
+    _require_contact(series)
+    swing = (speed,) if any(np.any(part) for part in speed) else ()
+    return Periodic(series, shear, swing)
+
+
+def lowest_load(
+    epsilon: ArrayLike | str = 0.0, load: Mapping[int, tuple[Any, Any]] | None = None
+) -> Float:
+    """Lowest W/W0 over the period at each point; a lower bound of it where that is positive.
+
+    Parameters
+    ----------
+    epsilon, load
+        As for `modulated`, of shape (points,).
+    """
+    return np.ravel(_lowest_load(_load_series(epsilon, load)))
+
+
+def no_contact(lowest: float) -> str:
+    """The sentence for a load whose lowest W/W0 is not positive."""
+    return (
+        f"load must stay positive over the period, so that contact is never lost, got a "
+        f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
+    )
+
+
+def sampled(
+    load: ArrayLike | None = None,
+    *,
+    velocity: ArrayLike | None = None,
+    shear: ArrayLike | None = None,
+    harmonics: int | None = None,
+) -> Periodic:
+    """Modulation from evenly spaced samples of one period, the first at theta = 0.
+
+    Between the samples the signal is their trigonometric interpolation, as exact as the samples
+    are for a signal without harmonics beyond half their number.
+
+    Parameters
+    ----------
+    load : array, shape (samples,), optional
+        W at each sample; its mean counts as W0.
+    velocity : array, shape (samples,), optional
+        Pulling velocity; its mean counts as V.
+    shear : array, shape (samples,), optional
+        Force on the slider along the pulling direction, in addition to the spring's, over W0, of
+        mean zero.
+    harmonics : int, optional
+        Harmonics to keep, all by default.
+
+    Raises
+    ------
+    InputError
+        If samples are missing or not finite, a mean is not positive, or the load vanishes.
+    """
+    given = {"load": load, "velocity": velocity, "shear": shear}
+    if all(values is None for values in given.values()):
+        raise InputError("load, velocity or shear", "be given", "none", "give samples of one")
+    series = {name: _series_of(name, values, harmonics) for name, values in given.items()}
+    _require_contact(series["load"])
+    return Periodic(series["load"], series["shear"], series["velocity"])
+
+
+def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] | None) -> Series:
+    """Fourier coefficients of the load."""
+    terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
+    for n, term in (load or {}).items():
+        rule = "have harmonics from 2 on"
+        require(not n < 2 and n == int(n), "load", rule, n, "give the first one as epsilon")
+        try:
+            amplitude, phase = term
+        except (TypeError, ValueError):
+            rule = "be a pair of amplitude and phase"
+            advice = f"write it like load={{{n}: (0.1, 0.0)}}"
+            raise InputError(f"load[{n}]", rule, shown(term), advice) from None
+        size = to_si(amplitude, "dimensionless", f"load[{n}]")
+        terms[int(n)] = (size, to_radians(phase, f"load[{n}]"))
+    return tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
+
+
+def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+    """Coefficients of cos and sin of amplitude cos(n theta + phase)."""
+    size = np.asarray(amplitude, float)
+    return size * np.cos(phase), -size * np.sin(phase)
+
+
+def _checked_tilt(value: Any) -> Float:
+    angle = np.asarray(to_radians(value, "tilt"), float)
+    bad = angle[~(np.abs(angle) < np.pi / 2)]
+    if bad.size:
+        advice = "give the angle from the normal, such as '5 deg'"
+        raise InputError("tilt", "be less than a right angle", f"{bad.flat[0]:g} rad", advice)
+    return angle
+
+
+def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Series:
+    if values is None:
+        return ()
+    samples = np.asarray(values, float)
+    holds = samples.ndim == 1 and len(samples) >= 3 and np.isfinite(samples).all()
+    rule, got = "be at least 3 finite samples of one period", f"an array of shape {samples.shape}"
+    require(holds, name, rule, got, "give evenly spaced samples without the end point")
+    spectrum = np.fft.rfft(samples) / len(samples)
+    scale = 1.0
+    if name != "shear":
+        scale = spectrum[0].real
+        rule = "have a positive mean"
+        require(scale > 0, name, rule, f"{scale:g}", "give it in the sense of sliding")
+    # At half the number of samples, cos and sin cannot be distinguished.
+    top = (len(samples) - 1) // 2
+    kept = spectrum[1 : min(top, harmonics or top) + 1] / scale
+    size = np.abs(kept).max(initial=0.0)
+    kept = kept[: np.flatnonzero(np.abs(kept) > _NEGLIGIBLE * size).max(initial=-1) + 1]
+    return tuple((2 * c.real, -2 * c.imag) for c in kept)
+
+
+def _require_contact(series: Series) -> None:
+    """Raise `InputError` where the load does not stay positive over the period."""
+    lowest = float(np.min(_lowest_load(series), initial=np.inf))
+    if not lowest > 0:
+        raise InputError(no_contact(lowest))
+
+
+def _lowest_load(series: Series) -> Float:
+    """Lowest W/W0 over the period at each point, a few points at a time.
+
+    Where the amplitudes together are below 1 it is their bound 1 - sum e_n instead.
+    """
+    pairs = [np.broadcast_arrays(a, b) for a, b in series]
+    shape = np.broadcast_shapes(*(np.shape(a) for a, _ in pairs))
+    flat = [[np.broadcast_to(part, shape).ravel() for part in pair] for pair in pairs]
+    lowest = 1 - sum((np.hypot(a, b) for a, b in flat), np.zeros(int(np.prod(shape))))
+    doubtful = np.flatnonzero(~(lowest > 0))
+    for start in range(0, len(doubtful), 4096):
+        part = doubtful[start : start + 4096]
+        w = sum(
+            a[part] * np.cos(k * _PHASES[:, None]) + b[part] * np.sin(k * _PHASES[:, None])
+            for k, (a, b) in enumerate(flat, start=1)
+        )
+        lowest[part] = 1 + np.min(w, axis=0)
+    return lowest.reshape(shape)

@@ -132,7 +132,7 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     Parameters
     ----------
     blocks : BlockSums
-        Of one recording, or joined from its parts.
+        Block sums of one recording, or joined from its parts.
     refine : bool
         Correct the frequency to first order, from the sums.
     settles : bool

@@ -2,9 +2,8 @@
 
 The error of the amplitude at a frequency is the noise at that frequency. The variance of the
 coefficient of a column is therefore the mean of the periodogram of the residual over the nearest
-lines that are free of fitted columns, and not the mean square of the residual: both are the same
-for white noise, and only the former is right for coloured noise. Each averaged line counts as two
-degrees of freedom.
+spectral lines that are free of fitted columns. The mean square of the residual is the same for
+white noise, and wrong for coloured noise. Each averaged line counts as two degrees of freedom.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ _FEWEST = 4
 
 @dataclass(frozen=True)
 class LocalNoise:
-    """Variance of the white noise that is as strong as the noise at k f.
+    """Noise at the harmonics k f, as the variance of white noise of the same strength.
 
     Attributes
     ----------
     spectra : complex array, (n + 1, channels, channels)
         Hermitian, for k = 0..n; in the channels' units squared.
     dof : array, (n + 1,)
-        Degrees of freedom.
+        Degrees of freedom of each matrix.
     """
 
     spectra: Complex
@@ -92,7 +91,7 @@ def local_noise(
     white : array, (channels, channels)
         Covariance of the residual, used where the window is too short to resolve lines.
     settles : bool
-        Whether a settling of the mean was fitted too.
+        Whether an exponential settling of the mean was fitted too.
     """
     orders = range(blocks.basis.harmonics + 1)
     noises = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
@@ -103,11 +102,12 @@ def local_noise(
 def noise_around(
     k: int, blocks: BlockSums, residual: Complex, white: Float, *, settles: bool
 ) -> tuple[Complex, float]:
-    """Noise around one harmonic: its spectral matrix, and its degrees of freedom.
+    """Spectral matrix of the noise around one harmonic, and its degrees of freedom.
 
     Parameters
     ----------
     k : int
+        Order of the harmonic; 0 for the mean.
     blocks : BlockSums
     residual : complex array, (blocks, channels)
         Sums of the residual times e^(-i k phi).
@@ -121,8 +121,8 @@ def noise_around(
     lines = _free_lines(k, periods, blocks, 1 + (basis.degree > 0) + settles)
     if lines.size < 2 * _FEWEST:
         return white.astype(complex), max(samples - basis.linear - 1, 1.0)
-    # Lines lie whole numbers of half lines from the harmonic, and none on it: powers of one turn
-    # take a tenth of the time of their cosines and sines.
+    # Lines lie at multiples of half a line from the harmonic: powers of one complex number take a
+    # tenth of the time of cosines and sines.
     steps = np.rint(2 * (lines - k * periods)).astype(int)
     furthest = int(np.abs(steps).max())
     turn = np.exp(-1j * np.pi * at)
@@ -132,17 +132,17 @@ def noise_around(
     near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
     spectrum = near.T @ near.conj() / (near.shape[0] * samples)
     if not k:
-        grown = np.sqrt(_growth(lines, turned))
+        grown = np.sqrt(_growth_below_lowest_line(lines, turned))
         spectrum = spectrum * grown[:, None] * grown
     # Two numbers per line; half-integer lines carry no independent information.
     return spectrum, float(near.shape[0])
 
 
-def _growth(lines: Float, turned: Complex) -> Float:
+def _growth_below_lowest_line(lines: Float, turned: Complex) -> Float:
     """Ratio of the noise that acts on the mean to that of the lowest lines; (channels,).
 
-    1/f noise is stronger below the lowest line than at it. Its power law is extrapolated down to a
-    third of a line, as for noise that started three windows ago.
+    1/f noise is stronger below the lowest line than at that line. Its power law is extrapolated
+    down to a third of a line, as if the noise had started three windows ago.
     """
     away = np.log(lines) - np.log(lines).mean()
     lever = max(float(away @ away), 1e-300)
@@ -158,8 +158,8 @@ def _growth(lines: Float, turned: Complex) -> Float:
 def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:
     """Numbers of the spectral lines next to harmonic k that are free of fitted columns.
 
-    Lines farther from it than an eighth of the number of blocks are averaged out; the slow columns
-    take up the `taken` lines above zero.
+    Lines farther from the harmonic than an eighth of the number of blocks are left out, because
+    the blocks average them out. The slow columns take up the lowest `taken` lines.
     """
     basis, samples = blocks.basis, float(blocks.count.sum())
     wanted = _AROUND_HARMONIC if k else _ABOVE_ZERO
@@ -170,8 +170,8 @@ def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:
     )
     first = max(float(taken), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
-    # Integer and half-integer lines: a distant line such as hum leaks into one of these sets as it
-    # leaks into the harmonic or its derivative, and may vanish in the other set.
+    # Both integer and half-integer lines are used. A distant line such as hum leaks into one of
+    # these two sets as it leaks into the harmonic or its derivative, and may vanish in the other.
     away = np.arange(np.ceil(2 * (first - k * periods)), 2 * (last - k * periods) + 1e-9) / 2
     lines = k * periods + away
     nearest = np.clip(np.rint(lines / periods), 0, basis.harmonics)
@@ -207,7 +207,7 @@ def sum_covariance(
     ----------
     basis : Basis
     gram : array, (size, size)
-        Of the whole window.
+        Gram matrix of the columns over the whole window.
     noise : LocalNoise
     columns : (array (size, p), array (size, q))
         Coefficients of the columns of each channel; each column belongs to one harmonic.

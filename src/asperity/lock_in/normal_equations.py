@@ -146,7 +146,7 @@ def solved(normal: Float, right: Float) -> Float:
     Returns
     -------
     array
-        Of the shape of `right`.
+        Array of the shape of `right`.
     """
     return inverted(normal) @ right
 
@@ -305,7 +305,7 @@ def _turned(
 
 
 def _uneven(basis: Basis, time: Float, channels: list[Float], length: int) -> BlockSums:
-    """Blocks by their own columns, which are computed for several short ones together."""
+    """Sums of blocks with columns of their samples; several short blocks are computed together."""
     edges = np.arange(0, time.size, length)
     gram = np.empty((edges.size, basis.size, basis.size))
     moments = np.empty((edges.size, basis.size, len(channels)))

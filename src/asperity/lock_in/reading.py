@@ -28,7 +28,7 @@ class Phasor:
     value : complex
         Its modulus is the peak amplitude, its argument the phase against the load.
     covariance : array, (2, 2)
-        Of the real and the imaginary part.
+        Covariance of the real and the imaginary part.
     dof : float
         Degrees of freedom of the covariance.
     """
@@ -250,7 +250,7 @@ def reading_of(
     omega : float
         Angular frequency (rad/s).
     covariance : array
-        Of (beta of the load, omega if `fitted`, beta of the force).
+        Covariance of (beta of the load, omega if `fitted`, beta of the force).
     noise, residual
         As in `LockInReading`.
     fitted : bool

@@ -117,7 +117,7 @@ def settling_of_mean(blocks: BlockSums) -> Settling | None:
     fitted = np.zeros(blocks.basis.size)
     fitted[:linear] = inner @ moments[:linear, 0]
     left = (blocks.moments[:, 0, 0] - blocks.gram[:, 0] @ fitted) / np.sqrt(blocks.count)
-    # Where the blocks are too few for lines, what differs between them is noise.
+    # If there are too few blocks for spectral lines, the differences between blocks are noise.
     white = float(left @ left) / max(blocks.count.size - linear, 1)
     return _Profile(blocks, 0, fitted, inner, white, 0).settling()
 

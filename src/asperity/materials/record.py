@@ -181,7 +181,7 @@ def load_from(folder: Path, name: str) -> Material:
     Raises
     ------
     InputError
-        As of `load`.
+        As in `load`.
     """
     return load(folder / name if name.endswith(".toml") else name)
 

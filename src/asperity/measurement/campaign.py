@@ -34,7 +34,7 @@ Row = dict[str, Any]
 
 #: Columns that stand first; the others follow in the order of their first row.
 _FIRST = ("file", "part", "kind", "start", "end", "verdict", "reason")
-#: What rows without modulation are of.
+#: Kinds of rows without modulation.
 _SLIDING_KINDS = ("step", "hold", "level", "stick-slip")
 #: Fields of steps and holds that the table does not have, or has under another name.
 _LEFT_OUT = {"time", "start", "end", "dof", "uncertainty", "slope_before", "slope_after", "choices"}
@@ -42,7 +42,7 @@ _LEFT_OUT = {"time", "start", "end", "dof", "uncertainty", "slope_before", "slop
 
 @dataclass(frozen=True)
 class CampaignSummary:
-    """What became of a campaign.
+    """Outcome of a campaign.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ def write_rows(path: Path, table: list[Row], name: str) -> None:
     table : list of dict
         From `modulated_rows` and `sliding_rows`.
     name : str
-        Of the path in messages.
+        Name of the argument in messages.
     """
     with written_file(path, name) as file:
         (write_csv if path.suffix.lower() == ".csv" else _write_netcdf)(file, table)
@@ -270,7 +270,7 @@ def write_csv(path: Path, table: list[Row]) -> None:
 
 
 def _cell(value: Any) -> Any:
-    """What is not known is an empty cell."""
+    """Text of a cell; empty for an unknown value."""
     return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 

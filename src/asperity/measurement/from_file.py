@@ -1,4 +1,4 @@
-"""A recording measured, be it a file or a trace, modulated or not."""
+"""Measurement of a recording, a file or a trace, with or without modulation."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def measure_recording(
     Parameters
     ----------
     recording : Trace or path
-        What `asperity.read` returns, or a file that it reads without further arguments.
+        Result of `asperity.read`, or a file that it reads without further arguments.
     modulated : bool
         Whether the load was modulated. If not, velocity steps and holds are measured; by default
         they are if the load is constant, or not recorded, and there are some.
@@ -60,7 +60,7 @@ def measure_recording(
     frequency : float or str, optional
         Initial guess of the modulation frequency (Hz); by default the strongest line.
     harmonics : int
-        Of a modulated recording.
+        Number of harmonics, for a modulated recording.
     window : (float, float), optional
         First and last time (s), numbers or texts with units.
     detrend : {"none", "linear", "quadratic"}
@@ -68,12 +68,12 @@ def measure_recording(
         Of a modulated recording: whether the window is cut to whole periods, which the fit does
         not need, and whether the frequency is fitted. If not, `frequency` is taken to be exact.
     steps : sequence of float, optional
-        Of a recording without modulation: times (s) of velocity steps.
+        For a recording without modulation: times (s) of velocity steps.
     velocities : sequence of float or str, optional
-        Of the drive between the steps (m/s), one more than these, 0 in a hold; measured where a
-        channel has the motion.
+        Velocities of the drive between the steps (m/s), one more than these, 0 in a hold; measured
+        where a channel has the motion.
     holds : sequence of (float, float), optional
-        Of a recording without modulation: begin and end (s) of holds.
+        For a recording without modulation: begin and end (s) of holds.
     stick_slip : bool
         Whether slip events are read; by default they are if there are some, and no modulation.
     stiffness, velocity, mass, normal_load : float or str, optional
@@ -105,7 +105,7 @@ def measure_recording(
 def answer_measurement(
     trace: Trace, question: Question, *, plain: bool = False
 ) -> tuple[Measurement | SlidingMeasurement | StickSlipMeasurement, str]:
-    """What a question asks of a recording: its longest modulated stretch, events, or sliding.
+    """The measurement that a question asks for: the modulated stretch, slip events, or sliding.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ def answer_measurement(
     -------
     measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
     what : str
-        What the recording is, where the program reads it as not modulated by itself; else empty.
+        A note if the program itself takes the recording as not modulated; else empty.
 
     Raises
     ------
     InputError
-        As of `measure_recording`.
+        As in `measure_recording`.
     """
     return _either(trace, question, measure, plain=plain)
 
@@ -143,7 +143,7 @@ def _either(
     *,
     plain: bool = False,
 ) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
-    """What `modulated` reads, the sliding or the slip events, as question or recording says."""
+    """The result of `modulated`, the sliding or the slip events, as question or recording says."""
     if question.stick_slip:
         return measure_stick_slip(trace, question), ""
     if question.modulated is False:

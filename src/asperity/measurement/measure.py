@@ -76,7 +76,7 @@ class Measurement(Judged):
     stretches : tuple of LoadInterval
         Modulated and unmodulated parts of the whole recording.
     samples : Samples
-        What could be used of it.
+        The usable samples.
     window : (int, int)
         Samples that were read, as a slice of `samples`.
     chosen_by : {"program", "user"}
@@ -120,7 +120,7 @@ def measure(trace: Trace, question: Question = _DEFAULTS) -> Measurement:
 
     Without a window the longest modulated stretch is read, without what has not settled where that
     leaves half of it, and away from gaps and saturation where the longest run between them is long
-    enough. What settles in the window is fitted.
+    enough. A settling in the window is fitted.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _prepared(trace: Trace, question: Question) -> _ModulatedRecording:
 
 
 def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Measurement:
-    """One stretch; the longest modulated one, or that of the window, if none is given."""
+    """One stretch: the longest modulated stretch, or the window, if none is given."""
     samples, parts, start = recording.samples, recording.parts, recording.frequency
     question, window = recording.question, recording.question.window
     if window is None:
@@ -242,7 +242,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     before, after = _around(samples, parts, chosen, reading.W0)
     rates = _rates(samples, (before, after))
     if after and before and rates[0] and rates[1]:
-        # A pause that drifts as the one before the modulation does not has not recovered from it.
+        # If a pause drifts while the pause before the modulation does not, it still recovers.
         change = rates[1].beyond(rates[0]) * (after[0].end - after[0].start)
         if change > LOCK_IN["transient"][0] * abs(after[0].value):
             after = None
@@ -300,7 +300,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
 
 
 def modulation_line(time: Float, load: Float, near: float | None = None) -> SpectralLine:
-    """The modulation of a load, be it in only a part of the recording.
+    """The modulation of a load, which may be in a part of the recording only.
 
     Parameters
     ----------

@@ -113,9 +113,9 @@ def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], Fl
     names : tuple of str
         Without delta_mu where the force at constant load was not recorded.
     covariance : array, shape (len(names), len(names))
-        Of amplitudes and phases (rad) to first order: the parts of a harmonic along its measured
-        phasor, and across it over the amplitude. Its diagonal are the squares of the reported
-        uncertainties.
+        Covariance of amplitudes and phases (rad) to first order: the parts of a harmonic along its
+        measured phasor, and across it over the amplitude. Its diagonal are the squares of the
+        reported uncertainties.
     """
     reading = measurement.reading
     at = reading.names.index
@@ -143,7 +143,7 @@ def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], Fl
         measurement.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n)
         for n in names
     ]
-    # A variance of zero may come out a round-off below it.
+    # By rounding, a variance of zero may be negative.
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale = np.divide(uncertainties, spread, out=np.zeros_like(spread), where=spread > 0)
     covariance *= np.outer(scale, scale)
@@ -160,7 +160,7 @@ def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
     Returns
     -------
     dict
-        As of `modulated_record`.
+        As in `modulated_record`.
     """
     return {
         "mode": "sliding",

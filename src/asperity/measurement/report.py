@@ -29,7 +29,7 @@ def measured_sections(measurement: Any, name: str, names: Names = "friction") ->
     ----------
     measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
     name : str
-        Of the recording.
+        Name of the recording.
     names : {"friction", "geophysics"}
         In which a load that is a force keeps a name of its own: it is no stress.
     """
@@ -88,7 +88,7 @@ def amplitude_sections(rows: list[dict[str, Any]], name: str) -> list[Section]:
     rows : list of dict
         From `asperity.measurement.campaign.modulated_rows`.
     name : str
-        Of the recording.
+        Name of the recording.
     """
     shown = ("epsilon", "frequency", "mean_friction", "delta_mu", "mu1", "phase1", "mu2")
     table = []
@@ -256,7 +256,7 @@ def _holds(measurement: SlidingMeasurement) -> list[Section]:
 
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
-    """A number with as many digits as its uncertainty allows: two uncertain ones."""
+    """A number rounded to two digits of its uncertainty."""
     from asperity.units import display_unit
 
     # A recording of the tide lasts for days, a stress is one of MPa.

@@ -1,7 +1,7 @@
-"""Which channels are load and shear, and which of their samples can be used.
+"""The channels of load and shear of a recording, and their usable samples.
 
-Signs that are conventions of the recorder are turned, gaps and defects are kept as samples that a
-window avoids.
+A sign that is a convention of the recorder is reversed. Gaps and defects are listed as samples that
+a window avoids.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _FEWEST = 16
 
 _NONE: Index = np.empty(0, dtype=np.intp)
 
-#: Largest size of a value, and one over the smallest of a channel's largest: fits take squares of
-#: squares of ratios, which doubles must hold.
+#: The largest value of a channel must lie between the inverse of this number and this number: fits
+#: compute fourth powers of ratios, which must not overflow.
 _LARGEST = 1e30
 
 
 def load_channel(trace: Trace, load: str) -> Channel | None:
-    """The load; None where the user names none and none is recorded.
+    """The channel of the load; None where the user names no load and no load is recorded.
 
     Parameters
     ----------
@@ -49,17 +49,17 @@ def load_channel(trace: Trace, load: str) -> Channel | None:
     Raises
     ------
     InputError
-        If the user names a load that is not there.
+        If the recording lacks the load that the user names.
     """
     named = load != "W" or "W" in trace.roles
     return trace.channel(load) if named or trace.has(load) else None
 
 
 def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Channel, bool]:
-    """The shear force or, where that makes no friction, the recorded friction coefficient.
+    """The shear force, or the recorded friction coefficient where F/W cannot be computed.
 
-    What the user has named goes first, the force before the friction. Of what goes by its name, a
-    force (or stress) counts with a load of its dimension; without one the friction counts.
+    A channel that the user has named comes first, the force before the friction. Otherwise a shear
+    force (or stress) is used if the load has the same dimension, and the friction if not.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Chann
     Returns
     -------
     (Channel, bool)
-        And whether it is a friction coefficient.
+        The channel, and whether it is a friction coefficient.
 
     Raises
     ------
     InputError
-        If neither is recorded, or more than one can be meant.
+        If neither is recorded, or several channels can be meant.
     """
     if force != "F" or "F" in trace.roles:
         shear = trace.channel(force)
@@ -100,7 +100,7 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
     ----------
     W, F : Channel
     load, force : str
-        Their names, or roles.
+        Names or roles of the two channels.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
 
 
 def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Float) -> None:
-    """Refuse a recorded friction that is not F/W, where the user has chosen neither.
+    """Refuse a recorded friction that is not F/W, unless the user has named one of the two.
 
     Parameters
     ----------
@@ -136,14 +136,14 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
     force : str
         Channel, by name or role.
     shear : Channel
-        The force that F/W is made of.
+        The force in F/W.
     friction : array, (n,)
         F/W; NaN where undefined.
 
     Raises
     ------
     InputError
-        With what to choose.
+        If the two contradict each other.
     """
     recorded = _friction(trace)
     named = force != "F" or {"F", "friction"} & set(trace.roles)
@@ -175,8 +175,8 @@ def _friction(trace: Trace) -> Channel | None:
 def compressive(load: Float, shear: Float) -> tuple[Float, Float, list[Finding]]:
     """Load and shear with the load positive in compression.
 
-    A negative mean load is a convention of the recorder: contacts bear no tension. A shear that is
-    negative as well follows the same convention, and is turned with it.
+    A negative mean load is a convention of the recorder: contacts bear no tension. If the mean
+    shear is negative too, both channels follow this convention and both signs are reversed.
 
     Parameters
     ----------
@@ -186,7 +186,8 @@ def compressive(load: Float, shear: Float) -> tuple[Float, Float, list[Finding]]
     Returns
     -------
     (array, array, list of Finding)
-        And what was turned, a warning if it is one of the two.
+        Load, shear, and a finding on reversed signs: a note if both were reversed, a warning if
+        the load alone was.
     """
     if not _mean(load) < 0:
         return load, shear, []
@@ -211,26 +212,27 @@ def _mean(values: Float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Load and force where both are numbers and time goes on.
+    """Load and force in the rows in which both are finite and time increases.
 
     Attributes
     ----------
     time, load, force : array, (n,)
         The load positive in compression.
     unit : str
-        SI unit of load and force; empty where the file has none.
+        SI unit of load and force; empty where the file has no unit.
     names : (str, str)
-        Of the channels.
+        Names of the two channels.
     defects : int array
-        Samples that are saturated, stand out, or follow a gap or a missing one, in rising order.
+        Indices of samples that are saturated, are spikes, or follow a gap or a missing sample, in
+        rising order.
     findings : tuple of Finding
         About time and these two channels.
     dropped : int
-        Samples of the recording that are not among these.
+        Number of samples of the recording that were left out.
     unread : int
-        Findings about channels that are not read.
+        Number of findings about channels that are not read.
     trace : Trace
-        The recording of these two channels, with what cannot be used.
+        The recording of these two channels, with all its samples.
     """
 
     time: Float
@@ -257,12 +259,12 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     Raises
     ------
     InputError
-        If a channel is not there, the two have units that cannot be divided, or nothing is left.
+        If a channel is missing, the units of the two cannot be divided, or no sample is left.
 
     Notes
     -----
-    Where a friction coefficient is recorded in place of a shear force of the load's dimension, the
-    force is that times the load, and is called so.
+    Where a friction coefficient is recorded in place of a shear force, the force is the friction
+    times the load, and its name says so.
     """
     W = trace.channel(load)
     F, name = _force(trace, force, W)
@@ -295,7 +297,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
 
 
 def too_few(fewest: int, usable: int, time: Float, columns: Mapping[str, Float]) -> InputError:
-    """The error of a recording with too few usable samples: the columns without numbers, if any.
+    """The error of a recording with too few usable samples; it names columns that lack numbers.
 
     Parameters
     ----------
@@ -326,12 +328,12 @@ def require_computable(**channels: Float) -> None:
     Parameters
     ----------
     **channels : array
-        Finite values by the name of their channel; all of them may be zero.
+        Finite values by the name of their channel; a channel may be zero throughout.
 
     Raises
     ------
     InputError
-        Which names the channel and its largest value.
+        If the largest value of a channel is out of range.
     """
     for name, values in channels.items():
         largest = float(np.abs(values).max(initial=0.0))
@@ -342,7 +344,7 @@ def require_computable(**channels: Float) -> None:
 
 
 def about_window(samples: Samples, start: float, end: float) -> list[Finding]:
-    """Findings on the part of a recording that is read; those of the file stay with it."""
+    """Findings on the part of a recording that is read, and on its file."""
     if not samples.findings:
         return []
     return list(samples.trace.slice(start, np.nextafter(end, np.inf)).findings)
@@ -358,7 +360,7 @@ def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
 
 
 def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:
-    """Findings without those on other channels; what names no channel is about the file.
+    """Findings on the channels that are read and on the file, without those on other channels.
 
     Parameters
     ----------

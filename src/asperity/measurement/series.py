@@ -1,9 +1,9 @@
 """Slow series of a recording: block means, their steady part, levels and trends with uncertainties.
 
 Friction in a segment is averaged in bins of equal time and fitted by least squares with a level, a
-trend over slip and optionally decaying exponentials. The residual of such machines is correlated
-over hundreds of samples and holds lines, so the variance of the coefficients is not that of white
-noise: it is the residual's spectral density next to zero frequency, from its projections on the
+trend over slip and optionally decaying exponentials. The residual is correlated over hundreds of
+samples and contains spectral lines: the variance of the coefficients is not that of white noise. It
+is estimated from the spectral density of the residual near zero frequency, by projections on the
 slowest cosines that the fitted columns leave free (equal-weighted cosines: Mueller, J. Econometrics
 141, 1331, 2007; Lazarus et al., J. Bus. Econ. Stat. 36, 541, 2018). Where the density grows
 significantly towards zero, its power law is extrapolated. Each cosine is a degree of freedom.
@@ -22,7 +22,7 @@ from asperity.arrays import Float
 #: Cosine transforms from which the noise of a mean is estimated.
 _COSINES = 8
 _MOST_BLOCKS = 512
-#: Probability at which noise explains that two rates differ.
+#: Two rates differ if noise alone has less than this probability of such a difference.
 _ACCIDENT = 3e-3
 
 #: Most bins of a segment, and cosines from which its slow noise is estimated.
@@ -65,14 +65,14 @@ def rate_between(first: MeanLevel, second: MeanLevel) -> Rate:
 
 
 def block_means(values: Float, blocks: int) -> Float:
-    """Means of about `blocks` runs of equally many samples; a short run at the end is left out."""
+    """Means over about `blocks` blocks of equal length; a shorter block at the end is left out."""
     length = max(1, values.size // blocks)
     whole = values.size // length
     return values[: whole * length].reshape(whole, length).mean(1)
 
 
 def mean_level(time: Float, values: Float) -> MeanLevel:
-    """Mean of a stretch, correlated noise honoured.
+    """Mean of a stretch of time, with the uncertainty due to correlated noise.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
 
     Notes
     -----
-    The variance of the mean is that of the first type-II cosine transforms of the series, which
-    see the same slow noise as the mean does (equal-weighted cosines: Mueller, J. Econometrics 141,
+    The variance of the mean is that of the first type-II cosine transforms of the series, because
+    they have the same slow noise as the mean (equal-weighted cosines: Mueller, J. Econometrics 141,
     1331, 2007). A slow drift counts as noise.
     """
     means = block_means(values, _MOST_BLOCKS)
@@ -97,7 +97,7 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
 
 
 def neighbour_scatter(values: Float) -> float:
-    """Standard deviation of noise, by the differences of neighbours, which steps hardly change."""
+    """Standard deviation of noise, by differences of neighbours, which steps hardly change."""
     if values.size < 3:
         return 0.0
     return 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
@@ -127,7 +127,7 @@ class WeightedLine(NamedTuple):
     covariance : array, (2, 2)
         By the uncertainties of the values.
     excess : float
-        Chi-squared over its degrees of freedom; 1 of two values.
+        Chi-squared over its degrees of freedom; 1 for two values.
     """
 
     beta: Float
@@ -147,16 +147,17 @@ def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
 def steady_from(values: Float, degree: int) -> int:
     """Index of the first value after the initial transient of a series.
 
-    The cut is where the rest determines its mean best, by the marginal standard error rule (White,
-    Simulation 69, 323, 1997), about a drift of the given degree; of cuts that are equally good
-    within noise, the earliest. At most half is cut.
+    The cut is chosen so that the standard error of the mean of the remaining values, about a drift
+    of the given degree, is smallest (marginal standard error rule: White, Simulation 69, 323,
+    1997). Among cuts that are equally good within noise, the earliest is chosen. At most half of
+    the values are cut.
 
     Parameters
     ----------
     values : array, (n,)
-        About a hundred.
+        About a hundred values.
     degree : int
-        Of the drift that is no transient.
+        Degree of the drift that is no transient.
     """
     n = values.size
     if n < 8:
@@ -195,10 +196,10 @@ class TrendFit:
     beta : array, (p,)
         Level at zero slip, then the coefficients of slip, of its square, and of exponentials.
     inverse : array, (p, p)
-        Inverse of the normal matrix: times the variance per bin, the covariance of `beta`.
+        Inverse of the normal matrix; `variance` times `inverse` is the covariance of `beta`.
     variance : float
-        Variance per bin that white noise would need to have, to be as strong as the noise of
-        `beta`.
+        Variance per bin of white noise that would give `beta` the same uncertainty as the actual
+        noise.
     dof : int
         Degrees of freedom of `variance`.
     """
@@ -210,12 +211,12 @@ class TrendFit:
 
 
 def bin_means(at: Float, values: Float) -> tuple[Float, Float]:
-    """Means over bins of equal width, at most half as many as samples, without empty ones.
+    """Mean positions and values in bins of equal width; empty bins are left out.
 
     Parameters
     ----------
     at, values : array, (n,)
-        Positions, rising, and what is averaged there.
+        Positions, rising, and the values at these positions.
     """
     wanted = min(_BINS, max(4, at.size // 2))
     edges = np.linspace(at[0], at[-1], wanted + 1)[1:-1]
@@ -273,7 +274,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     waves = np.cos(np.pi * order * (np.arange(n) + 0.5) / n).T
     together = np.concatenate([matrix, waves], axis=1)
     gram = together.T @ together
-    # Cosines nearly span a trend: what is left of the last of them must not be rounding.
+    # Cosines nearly span a trend: the remainder of the last cosines must exceed rounding errors.
     gram[np.diag_indices_from(gram)] *= 1 + 1e-10
     projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
     power = projections[taken:] ** 2

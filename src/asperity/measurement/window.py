@@ -51,7 +51,7 @@ class LoadInterval(NamedTuple):
     first, stop : int
         Samples, as of a slice.
     amplitude : float
-        Of the load's modulation; 0 where there is none.
+        Amplitude of the load's modulation; 0 where there is none.
     """
 
     first: int
@@ -88,7 +88,7 @@ def stretches(time: Float, load: Float, frequency: float) -> list[LoadInterval]:
     for a, b in pairwise(bounds):
         first, stop = a + (a > 0), b - (b < amplitude.size)
         if b - a == 1 and not on[a]:
-            # The only block of a short pause hardly holds any modulation.
+            # A short pause has a single block, with hardly any modulation.
             first, stop = a, b
         if stop - first < 1:
             continue
@@ -141,7 +141,7 @@ def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
     frequency : float
         Hz, of the modulation.
     degree : int
-        Of the drift.
+        Degree of the drift.
     """
     first, latest = 0, time.size // 2
     late = settling_from(time[latest:], force[latest:], frequency, degree)
@@ -174,7 +174,7 @@ def settling_from(time: Float, force: Float, frequency: float, degree: int) -> S
     frequency : float
         Hz, of a modulation or of none.
     degree : int
-        Of the drift.
+        Degree of the drift.
     """
     per_period = 1 / (frequency * float(np.median(np.diff(time[: 1 << 14]))))
     harmonics = int(min(_HARMONICS, _RESOLVED * per_period))
@@ -186,7 +186,7 @@ def settling_from(time: Float, force: Float, frequency: float, degree: int) -> S
 
 
 def clean_run(first: int, stop: int, defects: Index) -> tuple[int, int]:
-    """The longest run of samples between defects, if it is worth being read alone.
+    """The longest run of samples between defects, if it is long enough for a reading.
 
     Parameters
     ----------
@@ -229,18 +229,18 @@ def under_the_same_load(
     Parameters
     ----------
     load : array, (n,)
-        Of the whole recording.
+        Load of the whole recording.
     first, stop : int
         The pause.
     mean_load : float
-        Of the reading.
+        Mean load of the reading.
     before : bool
         Whether the pause ends, or begins, at the modulated stretch.
 
     Returns
     -------
     (int, int)
-        As a slice; empty where even the next samples are under another load.
+        A slice; empty if the next samples are under another load already.
     """
     length = max(1, (stop - first) // _BLOCKS)
     whole = (stop - first) // length

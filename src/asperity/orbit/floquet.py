@@ -129,7 +129,7 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
     J : matrix of arrays, shape (nodes, points)
         Derivatives of the rates to the states, per unit of tau, on that grid.
     integral : array, shape (nodes, nodes)
-        Of `asperity.algebra.mirrored_grid.grid`.
+        The matrix of `asperity.algebra.mirrored_grid.grid`.
     factor : bool
         Whether P is wanted, which takes about twice as many steps.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import even_phases
+from asperity.theory.limits import even_phases
 
 if TYPE_CHECKING:
     from asperity.orbit.mesh.mesh import Orbit

@@ -35,7 +35,7 @@ SMALLEST_RATE, LARGEST_RATE = 1e-9, 1e15
 #: Exponent of the growth of a disturbance by which the error of a mesh, 1e-6 or less, becomes as
 #: large as the orbit.
 LARGEST_GROWTH = 15.0
-#: Largest share of W0 that may be taken off the contacts: of a harmonic load, epsilon.
+#: Largest share of W0 by which the load may decrease: epsilon, for a harmonic load.
 LARGEST_UNLOADING = 0.999
 
 #: Outcomes of a branch from steady sliding without an orbit; another branch may have one.

@@ -56,7 +56,7 @@ def over_a_period(response: PeriodicResponse) -> Period:
     Parameters
     ----------
     response : PeriodicResponse
-        Of a single point, with a waveform.
+        Response of a single point, with a waveform.
 
     Notes
     -----

@@ -339,9 +339,9 @@ def dimension_names(
     Parameters
     ----------
     shape : tuple of int
-        Of the grid.
+        Shape of the grid.
     shapes : mapping of str to tuple of int
-        Of each parameter, broadcastable to `shape`.
+        Shape of each parameter, broadcastable to `shape`.
     dims : tuple of str, optional
         Names of the axes in place of automatic ones.
 

@@ -1,6 +1,6 @@
 """The search for periodic orbits: methods in order, each for the points not solved so far.
 
-`METHODS` is the order in which methods are tried, fast ones first; what each does is in its own
+`METHODS` is the order in which methods are tried, fast methods first; each is described in its
 module.
 
 Orbits are searched for within limits of dimensionless numbers, so that units do not matter, wider
@@ -40,7 +40,7 @@ from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.parameters.arguments import one_of
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import adiabatic_growth
+from asperity.theory.limits import adiabatic_growth
 
 
 def mark_out_of_range(problem: Problem, solution: Solution) -> None:
@@ -120,7 +120,8 @@ def find_orbits(
         Called with the number of points finished since the last call.
     methods : tuple of Method
     intervals : int
-        Of the meshes on which orbits are kept, by methods on meshes alone; 0 to keep none.
+        Number of intervals of the meshes on which orbits are kept, by methods on meshes alone; 0 to
+        keep none.
     """
     options = SearchOptions(harmonics, phases, progress, intervals)
     solution = Solution.unsolved(problem, points, options)

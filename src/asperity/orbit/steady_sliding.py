@@ -14,8 +14,7 @@ from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import chunk_of, points_of, run_chunks
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import even_phases
-from asperity.theory.averaged import slip_pulse
+from asperity.theory.limits import even_phases, slip_pulse
 
 #: Number of phases at which the extremes of a non-harmonic load are sampled.
 _PHASES = 64

@@ -1,8 +1,8 @@
 """Output files and folders: checked before a computation, and complete or absent after it.
 
-`targets` checks where results go before anything is computed, `written` writes a file or a folder
-completely or not at all, and `unfinished` keeps the finished blocks of a long computation, which
-goes on from there after an interruption.
+`targets` checks output paths before anything is computed, `written` writes a file or a folder
+completely or not at all, and `unfinished` keeps the finished blocks of a long computation, so that
+it can continue after an interruption.
 """
 
 from asperity._lazy import public_names

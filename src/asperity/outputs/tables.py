@@ -24,7 +24,7 @@ class Section(NamedTuple):
     sentences : tuple of str
         Before the table.
     head : tuple of str
-        Of the columns; empty for none.
+        Headings of the columns; empty for none.
     rows : tuple of tuple of str
     warnings : tuple of str
     """

@@ -30,7 +30,7 @@ def read_headed_columns(
     Parameters
     ----------
     path : Path
-        As of `csv_rows`.
+        As in `csv_rows`.
     numbers, texts : collection of str
         Columns that are read; others are left out.
     label : str
@@ -89,7 +89,7 @@ def headings(
     Parameters
     ----------
     cells : iterable of str
-        Of the heading.
+        Cells of the heading.
     label : str
         What messages call the table.
     known : callable

@@ -30,11 +30,11 @@ class Rule:
     Attributes
     ----------
     words : str
-        What follows "must" in a message.
+        Text after "must" in a message.
     holds : callable
         Whether each element of an array obeys the rule.
     advice : str
-        What to do about a value that does not.
+        Advice for a value that breaks the rule.
     """
 
     words: str
@@ -284,7 +284,7 @@ class Displayed:
     """
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """What the object is, and its most telling values."""
+        """Title of the object, and its most important values."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

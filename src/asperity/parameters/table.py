@@ -68,7 +68,7 @@ MACHINE = _parameters("machine")
 #: Pulling velocity and modulation.
 DRIVE = _parameters("drive")
 
-#: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulated`.
+#: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulation`.
 #: Angles are in rad. Continuation and fits have a harmonic load and take none of them.
 MODULATION = _parameters(
     "modulation", kind="dimensionless", rule="finite", place="drive", default=0.0
@@ -79,7 +79,7 @@ EXPERIMENT: Mapping[str, Parameter] = MappingProxyType({**MACHINE, **DRIVE, **MO
 
 
 def plain_name(name: str) -> str:
-    """The name of a parameter without what Python or a message puts around it.
+    """The bare name of a parameter, without additions by Python or a message.
 
     ``lambda_`` is how Python has to write ``lambda``; ``law.D0`` is what messages call ``D0``.
     """

@@ -82,7 +82,7 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
     ----------
     text : str
     label : str
-        What it is, for messages.
+        Kind of the content, for messages.
     source : str
         Where it is from, for messages.
 

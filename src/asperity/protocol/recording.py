@@ -53,9 +53,9 @@ class RecordingSetup:
         Variable of the motion that each sensor measures; ``"load point"`` for the far end of the
         spring.
     seed : int
-        Of the noise.
+        Seed of the noise.
     stiffness : float
-        Of the spring (N/m), for the load point.
+        Stiffness of the spring (N/m), for the load point.
     """
 
     tribometer: Tribometer
@@ -77,7 +77,7 @@ def setup_of(
     sampling : float or None
         At which the motion is written (Hz).
     stiffness : float
-        Of the spring (N/m).
+        Stiffness of the spring (N/m).
 
     Raises
     ------

@@ -1,8 +1,7 @@
 """Running a protocol into a NetCDF file, with resumption after an interruption.
 
-The state of an unfinished run is saved with its finished blocks, from which it is resumed.
-
-A run that begins with unstable steady sliding reports this.
+The finished blocks of a run are saved with the state of the integration, from which an interrupted
+run is resumed. A run that begins with unstable steady sliding reports this.
 """
 
 from __future__ import annotations
@@ -38,8 +37,8 @@ _ROUND_OFF = 1e-3
 def stability_statement(protocol: Protocol) -> str:
     """A sentence if the run begins with unstable steady sliding, else empty.
 
-    Without a perturbation such sliding goes on until rounding errors have grown: what the run
-    shows before is no stable state.
+    Without a perturbation such sliding continues until rounding errors have grown, and looks
+    stable until then.
 
     Parameters
     ----------
@@ -120,13 +119,13 @@ class RunProgress:
     steps, rejected : int
         Steps of the integrator so far.
     unresolved_ringing : float
-        Velocity (m/s) below which ringing has been left out; see `asperity.transient`.
+        Velocity (m/s) below which ringing was not resolved; see `asperity.transient`.
     methods : list of str
         Methods of integration that have been used.
     stopped : str
         Reason why the motion ended before the programme; empty if it did not.
     finished : bool
-        Whether nothing follows.
+        Whether no block follows.
     """
 
     lengths: dict[str, int] = field(default_factory=dict)
@@ -154,7 +153,7 @@ class RunProgress:
         Raises
         ------
         TypeError, ValueError
-            If the values are no progress.
+            If the values are not those of a `RunProgress`.
         """
         progress = cls(**values)
         if progress.checkpoint is not None:
@@ -176,7 +175,7 @@ class RunSummary:
         Sentence why the motion ended before the programme; None if it did not.
     out : Path
     unstable_start : str
-        A sentence where the run begins with steady sliding that is unstable; empty where not.
+        Sentence that steady sliding is unstable at the start; empty if it is stable.
     """
 
     rows: int
@@ -197,8 +196,8 @@ def run_protocol(
 ) -> RunSummary:
     """Integrate the motion of a protocol and write it block by block.
 
-    Every block starts from the checkpoint of the block before, whether the run was interrupted or
-    not: both give the same numbers to the last bit.
+    Every block starts from the checkpoint of the block before. An interrupted and resumed run
+    therefore gives the same numbers, to the last bit, as an uninterrupted run.
 
     Parameters
     ----------
@@ -211,8 +210,8 @@ def run_protocol(
     progress : callable, optional
         Called now and then with the time reached and the end of the programme (s).
     rows : int
-        Rows of a block. The last bits of the numbers depend on it; a resumed run must have the
-        same.
+        Rows of a block. The last bits of the numbers depend on this; a resumed run must have the
+        same value.
 
     Returns
     -------
@@ -402,11 +401,11 @@ def run_experiment(
     Parameters
     ----------
     protocol : Protocol or path
-        Or the path of its TOML file.
+        A protocol, or the path of its TOML file.
     out : path
         NetCDF file of the motion.
     resume : bool
-        Go on after an interruption.
+        Whether to continue an interrupted run.
     progress : callable, optional
         Called now and then with the time reached and the end of the programme (s).
 

@@ -135,7 +135,7 @@ class StepForm:
 
 
 def _list(text: str) -> tuple[str, ...]:
-    """Quantities with commas between them, each with its unit."""
+    """Quantities that commas separate, each with its unit."""
     return tuple(part.strip() for part in text.split(","))
 
 
@@ -195,7 +195,7 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
     name : str
         Name in messages, such as ``"steps[3]"``.
     folder : Path
-        Where files that the line names lie.
+        Folder of files that the line names.
 
     Raises
     ------
@@ -214,14 +214,14 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
 
 
 def _meant(line: str, name: str) -> list[StepForm]:
-    """The forms that begin as the line does."""
+    """The forms that begin with the same words as the line."""
     words = line.lower().split()
     for length in (1, 2):
         forms = [form for form in FORMS if form.verb == " ".join(words[:length])]
         if forms:
             return forms
     verbs = sorted({verb for form in FORMS for verb in (form.verb, form.verb.split()[0])})
-    # `ramp` begins two forms; of "step velocity" the forms with a velocity may be meant too.
+    # "ramp" begins two forms; "step velocity" may also mean a form with a velocity.
     if words and words[0] in verbs:
         named = f"{{{words[1]}}}" if len(words) > 1 else "{}"
         return [f for f in FORMS if f.verb.split()[0] == words[0] or named in f.pattern]
@@ -274,7 +274,7 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[In
     ----------
     steps : sequence of str, ProgrammeStep, or object with ``repeat`` and ``steps``
     folder : Path
-        Where files that lines name lie.
+        Folder of files that lines name.
     """
     mistakes: list[InputError] = []
     return _planned(steps, "step ", folder, mistakes), mistakes
@@ -343,5 +343,5 @@ def _repetition(line: str, place: str) -> tuple[int, list[str]]:
 
 
 def _count(digits: str) -> int:
-    """The number, or one beyond `MOST` of digits that are too many to be read."""
+    """The number that digits write; if they are too many, a number that exceeds `MOST`."""
     return int(digits) if len(digits) < 1000 else 10**1000

@@ -27,7 +27,7 @@ class Range(Record):
     levels : int
         Values of a range.
     spacing : {"log", "linear"}, optional
-        Of these; by default equal factors for V and frequency.
+        Spacing of the levels; by default equal factors for V and frequency.
     """
 
     values: tuple[Given, ...] | None = None

@@ -92,7 +92,7 @@ class Track(Record):
     length : float or str
         Over which mu0 forgets itself (m).
     exponent : float
-        Of the power law of its spectrum beyond one over that length.
+        Exponent of the power law of its spectrum beyond one over that length.
     origin : float or str
         Where on the track the slider begins (m).
     """

@@ -30,7 +30,7 @@ class Data(Record):
     ----------
     file : Path
     name : str
-        What people call it; the file's name by default.
+        Name of the data in messages; by default that of the file.
     source : Source
         How a recording is read.
     window : (float, float), optional
@@ -95,7 +95,7 @@ Priors = Annotated[dict[str, NormalPrior | None], BeforeValidator(_priors)]
 
 
 class Estimation(Record):
-    """What is estimated, and how.
+    """The parameters that are estimated, and how.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class FitOptions(Estimation):
     inertia, radiation_damping : bool
         Whether the mass M and the damping eta count.
     trend : {"none", "linear", "quadratic"}
-        Of the friction of a recording over slip.
+        Trend of the friction of a recording over slip.
     drift : bool
         Whether its friction may drift over time too.
     initial : {"steady", "free"}
@@ -156,7 +156,7 @@ class FitOptions(Estimation):
 
 
 class _OfData(Question, FitOptions):
-    """What a fit and a comparison have in common.
+    """Common fields of a fit and a comparison.
 
     Attributes
     ----------

@@ -119,7 +119,7 @@ def source_options(source: Source) -> list[str]:
 
 
 def measure_options(question: Measurement, *, modulated: bool) -> list[str]:
-    """What is measured, as options.
+    """A measurement as options of the command line.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""An operating point: a law, and where its numbers come from."""
+"""An operating point: a law with its numbers or a material that supplies them."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from asperity.questions.record import Given, Question
 
 
 class Point(Question):
-    """A law and its numbers, those of the machine and those of the motion.
+    """A law with the numbers of the law, of the machine and of the motion.
 
     Attributes
     ----------
     law : str
-        Registered.
+        Name of a registered law.
     material : str
-        Name, or a file relative to `folder`: its numbers apply where `parameters` has none.
+        Name of a material, or a file relative to `folder`. Its numbers apply where `parameters`
+        has none.
     parameters : mapping of str to float, str or bool
-        By the names of `asperity.parameters`: of the law, K, W0, M, eta, V, epsilon, frequency,
-        inertia. Numbers in SI, or texts with units.
+        Numbers in SI, or texts with units, by the names of `asperity.parameters`: parameters of
+        the law, K, W0, M, eta, V, epsilon, frequency, inertia.
     folder : Path
-        Where files that the record names lie.
+        Folder of files that the record names.
     """
 
     subject = "point"

@@ -1,4 +1,4 @@
-"""What every question is made of: a frozen record, its types, and sentences about mistakes in it.
+"""The parts of all questions: a frozen record, its types, and sentences about its mistakes.
 
 Keywords of Python, options of the command line, TOML files and the JSON of the page fill the same
 record. A quantity is a number in SI or a text with its unit; in a file it must carry its unit.
@@ -67,7 +67,7 @@ class Question(Record):
     Attributes
     ----------
     subject : str
-        What messages call it where no field is named.
+        Name of the record in messages without a field.
     prefix : str
         What they put before the name of a field.
     mistakes_error : type of MistakesError

@@ -39,7 +39,7 @@ class ReadingRecipe(Question):
     rate : float or str, optional
         Samples per second.
     group, delimiter, decimal, format : str, optional
-        As of `asperity.read`.
+        As in `asperity.read`.
     """
 
     subject = "recipe"
@@ -93,7 +93,7 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
 
 
 class Measurement(Question):
-    """What is measured in a recording.
+    """A measurement of a recording.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Measurement(Question):
     steps : tuple of float, optional
         Times (s) of the velocity steps of a recording without modulation.
     velocities : tuple of float, optional
-        Of the drive between the steps (m/s), 0 in a hold; measured by default.
+        Velocities of the drive between the steps (m/s), 0 in a hold; measured by default.
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
     stick_slip : bool, optional

@@ -25,13 +25,14 @@ class AxisTable(Record):
     Attributes
     ----------
     from_, to, count, spacing
-        A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
+        A grid that includes both ends; ``from_`` is written ``from`` in the plan, and ``spacing``
+        is ``"linear"`` or ``"log"``.
     values : tuple
         All values.
     zip : mapping of str to tuple
-        Several numbers that vary together, all of one length.
+        Several numbers that vary together, with equally many values.
     cases : tuple of mapping
-        Rows; a case with lists gives a row for every combination of their values.
+        Rows; a case with lists gives a row for every combination of the values in the lists.
     draw : {"random", "sobol", "halton"}
         ``count`` draws of the numbers in ``over``.
     over : mapping of str to mapping
@@ -136,7 +137,7 @@ class FitTable(Estimation):
     Attributes
     ----------
     data : tuple of str
-        Tables of readings, all in one likelihood; left out where an axis has a column ``data``.
+        Tables of readings that are fitted together; left out if an axis has a column ``data``.
     """
 
     data: Names | None = None
@@ -148,22 +149,22 @@ class Sweep(Point):
     Attributes
     ----------
     axes : mapping of str to AxisTable
-        In the order of the dimensions. The grid is the product of the axes.
+        Axes in the order of the dimensions. The grid is the product of the axes.
     law : str
-        Friction law; left out where an axis has a column ``law``.
+        Friction law; left out if an axis has a column ``law``.
     material : str
-        Material whose numbers apply where neither an axis nor `parameters` has one.
+        Material whose numbers apply where neither an axis nor `parameters` has a value.
     parameters : mapping of str to float, str or bool
         Numbers and ratios that are the same at every point, by name.
     solve : {"periodic", "threshold", "transient", "fit"}
     outputs : tuple of str
-        Outputs to keep of each point; the default outputs of `solve` if left out.
+        Outputs to store; the default outputs of `solve` if left out.
     seed : int
         Seed of drawn axes.
     chunk : int, optional
         Approximate number of points that are solved and written together.
     threshold, transient, fit
-        Settings of these kinds of solve.
+        Settings for these values of `solve`.
     title : str
     folder : Path
         Folder of the files that the plan names.

@@ -1,4 +1,4 @@
-"""Channels computed from recorded ones: effective stress, area, gain, zero offset, clock."""
+"""Channels computed from recorded channels: effective stress, area, gain, zero offset, clock."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "
 
 
 def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
-    """A recording with further channels, each computed by an expression of other channels.
+    """Add channels to a recording, each computed by an expression of other channels.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     Returns
     -------
     Trace
-        With the expressions in its provenance. A new channel has the findings of the channels in
-        its expression.
+        The recording with the new channels, and with the expressions in its provenance. A new
+        channel has the findings of the channels in its expression.
 
     Raises
     ------
@@ -52,12 +52,12 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         require(str(text).strip(), field, rule, repr(text), "write it like '2.4 N/V * Gauge'")
         require(target.strip(), "channels", "have names", "an empty one", "write 'load = ...'")
         quantity, sources = evaluate(str(text), _names(trace, field), field)
-        trace = _with(trace, target, quantity, sources, field, text)
+        trace = _with_channel(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def _with(
+def _with_channel(
     trace: Trace,
     target: str,
     quantity: Quantity,
@@ -76,9 +76,9 @@ def _with(
     channel = Channel(values, kind, unit, target, unit or unit_text(quantity.dimension))
     channels, findings, roles = dict(trace.channels), trace.findings, dict(trace.roles)
     if target in channels:
-        kept = _free(f"{target} (recorded)", channels)
+        kept = _free_name(f"{target} (recorded)", channels)
         channels = {kept if name == target else name: c for name, c in channels.items()}
-        findings = tuple(_moved(f, target, kept) for f in findings)
+        findings = tuple(_renamed(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
         sources = tuple(kept if source == target else source for source in sources)
     channels[target] = channel
@@ -121,7 +121,7 @@ def _names(trace: Trace, field: Argument) -> Names:
 
 
 def _key_of(trace: Trace, name: str) -> str | None:
-    """The channel of a name: a name, a heading, a role, or a name that differs by dots only."""
+    """The channel of a name, heading or role; blanks, dots at the ends and case may differ."""
     if name in trace.channels:
         return name
     headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
@@ -137,7 +137,7 @@ def _key_of(trace: Trace, name: str) -> str | None:
     try:
         channel = trace.channel(name)
     except InputError:
-        # Names such as V and N are units where no channel has that role.
+        # V, N, W and F are units where no channel has the role of this name.
         if any(name in unit for unit in ("V", "N", "W", "F")):
             return None
         raise
@@ -184,12 +184,12 @@ def _inherited(
     return made
 
 
-def _moved(finding: Finding, old: str, new: str) -> Finding:
+def _renamed(finding: Finding, old: str, new: str) -> Finding:
     moved = new + finding.where.removeprefix(old)
     return replace(finding, where=moved) if finding.concerns(old) else finding
 
 
-def _free(name: str, taken: Mapping[str, object]) -> str:
+def _free_name(name: str, taken: Mapping[str, object]) -> str:
     number = 2
     free = name
     while free in taken:

@@ -61,7 +61,7 @@ class Names(NamedTuple):
     known : tuple of str
         For messages.
     time : array, (n,)
-        Of the samples (s).
+        Times of the samples (s).
     """
 
     find: Callable[[str, bool], tuple[Quantity, str] | None]
@@ -179,7 +179,7 @@ class _Expression:
         return " ".join(parts)
 
     def _number(self, token: re.Match[str]) -> tuple[Quantity, int]:
-        """A number with its unit, and where the text goes on behind them."""
+        """A number with its unit, and the position in the text after them."""
         number, text = float(token["number"]), token["unit"]
         if text is None:
             unit = self._unit(token["behind"] or "")

@@ -10,7 +10,7 @@ from asperity.errors import InputError, printable
 
 Severity = Literal["note", "warning", "error"]
 
-#: Findings about files that may lack recorded columns, or have them under wrong names.
+#: Findings that may explain why a column is missing or has a wrong name.
 _COLUMNS = frozenset(
     {"truncated", "heading mismatch", "other length", "short column", "text column"}
 )
@@ -34,7 +34,9 @@ class Finding:
     sentence : str
         The sentence for the user.
 
-    Control characters of a damaged file are escaped, and long texts cut.
+    Notes
+    -----
+    Control characters of a damaged file are escaped, and long texts are cut.
     """
 
     name: str
@@ -48,7 +50,7 @@ class Finding:
         object.__setattr__(self, "sentence", printable(self.sentence))
 
     def concerns(self, channel: str) -> bool:
-        """Whether it is about this channel."""
+        """Whether the finding is about this channel."""
         return self.where == channel or self.where.startswith(f"{channel}, ")
 
     def __str__(self) -> str:
@@ -61,7 +63,7 @@ def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:
     Parameters
     ----------
     error : InputError
-        Unchanged if there is no such finding.
+        Returned unchanged if no finding is about missing columns.
     findings : iterable of Finding
         Findings of the reader.
     """

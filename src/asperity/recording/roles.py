@@ -245,7 +245,7 @@ def _may_be(role: str | None, kind: str | None) -> bool:
 
 
 def _missing(role: str, kinds: Mapping[str, str | None]) -> str:
-    """What to do where no column is named like `role`."""
+    """Advice if no column has a name of `role`."""
     others = {n for r in ROLES if r != role for n in candidates(r, kinds)}
     free = sorted({*kinds} - others)
     like = Argument("columns", role, *free[:1])

@@ -199,7 +199,7 @@ class Trace(Displayed):
 
 
 def _column(values: Any, name: str) -> Float:
-    """A read-only float64 view; the caller's array stays as it is."""
+    """A read-only float64 view; the caller's array is unchanged."""
     column = np.asarray(values, dtype=np.float64).view()
     require(column.ndim == 1, name, "have one dimension", column.ndim, "give one array per channel")
     column.flags.writeable = False

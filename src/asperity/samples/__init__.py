@@ -69,7 +69,7 @@ def record(name: str, seed: Annotated[int, at_least(0)] = 0) -> Trace:
     name : str
         One of `names`.
     seed : int
-        Of the noise of the instrument; the same seed makes the same recording.
+        Seed of the noise of the instrument; the same seed makes the same recording.
 
     Returns
     -------

@@ -158,9 +158,9 @@ def slopes_along(
     -------
     rates : array, shape (directions, size, ..., points)
     force : array, shape (directions, ..., points)
-        Of F/W0.
+        Derivatives of F/W0 along the directions.
     gradient : array, shape (size, ..., points)
-        Of F/W0 to the states.
+        Derivatives of F/W0 with respect to the states.
     """
     return _by_rows(partial(_slopes, problem, directions), theta, states)
 

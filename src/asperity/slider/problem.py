@@ -52,9 +52,9 @@ def equation_of_motion(
     Raises
     ------
     InputError
-        If inertia is included without a mass, damping is not positive where nothing else
-        would be left of it, a batch mixes points with and without elastic asperities, or either is
-        combined with a law that does not depend on the velocity.
+        If inertia is included without a mass; if damping without inertia is not positive; if some
+        points have elastic asperities and others have none; or if inertia or damping is combined
+        with a law that does not depend on the velocity.
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)
@@ -80,7 +80,7 @@ def _require_positive(name: str, value: ArrayLike | None, unit: str, remedy: str
 
 
 def _elastic(slider: Slider) -> bool:
-    """Whether the asperities are elastic, at every point or at none."""
+    """Whether the asperities are elastic; an error if they are at some points only."""
     length = np.asarray(slider.law.elastic_length)
     rule = "be positive at all points or 0 at all points with inertia or radiation damping"
     got, advice = "both: the states differ", "solve the two groups separately"
@@ -131,8 +131,7 @@ def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation
     Raises
     ------
     InputError
-        Unless exactly one of the two is given, or where the amplitude breaks its rule or the
-        modulation one of `checked_modulation`.
+        If both or neither are given, or if a value breaks its rule.
     """
     if (epsilon is None) == (modulation is None):
         given = "neither" if epsilon is None else "both"

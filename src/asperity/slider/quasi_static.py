@@ -1,8 +1,8 @@
 """Equation of motion without inertia: the interface force equals the spring force.
 
 With f = F/W0, w = W/W0, theta = omega t and the plastic velocity v_pl that the law yields from
-(F_i/W, state, w), the spring and the asperities are two springs in series with the
-joint. Their joint elongation over W0/K,
+(F_i/W, state, w), the spring and the asperities are two springs in series with the sliding
+interface. Their total elongation over W0/K,
 
     z = f + l F_i/W,      l = lambda K / W0,      dz/dtheta = kappa (p - v_pl / V),
     kappa = V K / (omega W0),
@@ -34,7 +34,7 @@ class QuasiStatic(Motion):
     logarithmic: ClassVar[tuple[bool, ...]] = (False,)
 
     def steady(self) -> Array:
-        """Steady sliding."""
+        """States of steady sliding under a constant load."""
         return self._steady_states(self.slider.law.mu_ss(self.V) * (1 + self.compliance_ratio))
 
     def force(self, Y: Array, at: Excitation) -> Array:
@@ -65,7 +65,7 @@ class QuasiStatic(Motion):
     def mechanical_states(
         self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
     ) -> tuple[Array, ...]:
-        """Joint elongation z."""
+        """Total elongation z."""
         return (friction * (at.w + self.compliance_ratio) - at.shear,)
 
     def _velocity(self, Y: Array, at: Excitation, slip: Array) -> Array:

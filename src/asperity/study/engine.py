@@ -29,7 +29,7 @@ class WorkersGoneError(RuntimeError):
 
 @dataclass(frozen=True)
 class DoneChunk:
-    """What a worker reports of a chunk that is solved and written.
+    """Report of a worker on a chunk that is solved and written.
 
     Attributes
     ----------

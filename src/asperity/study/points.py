@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Float, Index
 from asperity.laws import get_law
-from asperity.loads.modulated import no_contact
+from asperity.loads.modulation import no_contact
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import Parameter, point_parameters
 

@@ -67,7 +67,7 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     Parameters
     ----------
     slider : Slider
-        Of a law with A, B and D0; numbers, no arrays.
+        Slider of a law with A, B and D0; numbers, no arrays.
     velocity : float or str
         Pulling velocity V (m/s).
 

@@ -248,7 +248,7 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
 def critical_stiffness_form(
     law: str, *, elastic: bool, inertia: bool
 ) -> Callable[[SmallModulation], Array] | None:
-    """The closed form of Kc that holds for a law; None where there is none.
+    """The closed form of Kc for a law; None without a closed form.
 
     Parameters
     ----------

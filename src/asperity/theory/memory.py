@@ -75,7 +75,7 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
     Parameters
     ----------
     law, velocity
-        As of `decay_rates`. Any law; elastic asperities count.
+        As in `decay_rates`. Any law; elastic asperities count.
 
     Returns
     -------
@@ -155,7 +155,7 @@ class LongHold(NamedTuple):
     Attributes
     ----------
     leading : array
-        Of contacts that only age in the hold.
+        Leading term of contacts that only age in the hold.
     renewal : array
         Next order: reduction by the slip in the hold, negative. It falls with the hold time as
         t^(-(B - A)/A) if B > A, slowly where A and B are close.

@@ -40,7 +40,7 @@ class StickSlipCycle(NamedTuple):
     slip : array
         Displacement of the slider (m): V period.
     peak_velocity : array
-        Of the slider (m/s).
+        Largest velocity of the slider (m/s).
     """
 
     drop: Float

@@ -25,7 +25,7 @@ class StepChunk(NamedTuple):
     begin, length : array, shape (STEPS,)
         Beginning of each accepted step and its length (s).
     coefficients : array, shape (STEPS, degree + 1, size)
-        Of rising powers of (time - begin) / length.
+        Coefficients of rising powers of (time - begin) / length.
     taken : int
         Number of accepted steps; rows beyond are not used.
     t, Y : array

@@ -186,7 +186,7 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     Parameters
     ----------
     slider, V
-        As of `hold`.
+        As in `hold`.
     extremum : Reached
         The second result of `hold` or `step`.
     runaway : array, shape (points,)

@@ -445,7 +445,7 @@ def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]
     begin, rounds = first, 0
     while begin < last:
         if first > 0 and rounds > 100:
-            # Doubles no longer tell the phases apart: the envelope decides.
+            # The phases differ by less than the resolution of doubles: the envelope decides.
             return first, first
         rounds += 1
         times = np.minimum(begin + spacing * np.arange(4097), duration)

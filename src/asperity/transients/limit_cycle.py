@@ -65,10 +65,10 @@ _TOO_MANY = (
 
 
 class CycleEnd(Enum):
-    """What becomes of a motion; the text is what a user reads."""
+    """Outcome of a motion, as a text for the user."""
 
     REPEATS = "stick-slip"
-    STEADY = "no stick-slip: the slider comes to slide steadily"
+    STEADY = "no stick-slip: the slider reaches steady sliding"
     IRREGULAR = (
         f"irregular: the motion does not repeat itself after up to {_MOST_SLIPS} slips, within "
         f"{_MOST_CYCLES}, or is too close to the onset of stick-slip"
@@ -78,7 +78,7 @@ class CycleEnd(Enum):
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A motion that repeats itself, or why there is none; numbers are NaN then.
+    """A periodic motion, or the reason why there is none; numbers are then NaN.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class LimitCycle:
     result : str
         The same as a sentence.
     slips : int
-        In a period; 0 without stick-slip.
+        Number of slips in a period; 0 without stick-slip.
     period, stick_duration, slip_duration : float
         Seconds. The force falls in a slip, from a peak to a trough; sums over the slips of a
         period.
@@ -130,7 +130,7 @@ class LimitCycle:
         Parameters
         ----------
         t : array, shape (n,)
-            As of `force`.
+            As in `force`.
         names : sequence of str
             Parameters of the law, K, W0, M or eta.
 
@@ -209,7 +209,7 @@ class _Run:
 
 @dataclass(frozen=True)
 class _Orbit:
-    """A motion from one fall to another, with its return map about there.
+    """A motion from one fall to another, with the derivatives of the return map.
 
     The force and the period are those of the motion with Newton's step to first order, so that they
     do not depend on where the motion began.
@@ -279,7 +279,7 @@ class _Orbit:
         return bool(np.abs(np.linalg.eigvals(self.map[:, :size])).max() < 1)
 
     def solve(self, change: Float) -> Float:
-        """Changes of the first states that make up for changes of the last ones."""
+        """Changes of the first states that compensate changes of the last states."""
         size = len(self.first)
         return np.asarray(np.linalg.solve(np.eye(size) - self.map[:, :size], change))
 
@@ -342,7 +342,7 @@ def limit_cycle(
     rtol: float = 1e-9,
     near: LimitCycle | None = None,
 ) -> LimitCycle:
-    """The motion that a slider pulled at a constant velocity comes to.
+    """The final motion of a slider that is pulled at a constant velocity.
 
     Parameters
     ----------
@@ -353,8 +353,8 @@ def limit_cycle(
     inertia, radiation_damping, rtol
         As in `asperity.transients.transient`.
     near : LimitCycle, optional
-        Of similar parameters and the same law: its cycle is followed to the present ones, where it
-        stays stable.
+        Cycle of similar parameters and the same law: its cycle is followed to the present ones,
+        where it stays stable.
 
     Returns
     -------
@@ -392,7 +392,7 @@ def limit_cycle(
 
 
 def _followed(integration: Integration, Y: Float) -> LimitCycle:
-    """The cycle that a motion from the states comes to."""
+    """The cycle that a motion from the given states reaches."""
     falls: list[Float] = []
     count = 0
     while count < _MOST_CYCLES:
@@ -441,7 +441,7 @@ def _motion(
 
 
 def _closed(integration: Integration, Y: Float, slips: int, period: float) -> LimitCycle | None:
-    """The stable cycle of so many slips near states at a fall, by Newton's method."""
+    """The stable cycle of a given number of slips near states at a fall, by Newton's method."""
     tolerance = _CLOSED * integration.tolerances.rtol
     end = integration.programme.duration
     for _ in range(_PASSES):
@@ -466,7 +466,7 @@ def _closed(integration: Integration, Y: Float, slips: int, period: float) -> Li
 
 
 def _fewer(orbit: _Orbit, slips: int, tolerance: float) -> int:
-    """After how many slips the states are the first ones already."""
+    """Number of slips after which the states repeat."""
     for count in range(1, slips):
         after = orbit.run.states(np.array([orbit.run.cycles[count - 1].end]))[:-1, 0]
         if slips % count == 0 and _size(orbit.motion, after - orbit.first, after) < 2 * tolerance:

@@ -56,7 +56,7 @@ def integrate_blocks(
     rows : int
         Largest number of samples of a block.
     resume : Checkpoint, optional
-        Of the last block of an earlier call with the same arguments.
+        Checkpoint of the last block of an earlier call with the same arguments.
 
     Yields
     ------
@@ -120,7 +120,7 @@ class _BlockWriter:
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
         none, over = len(part.dense_output.begin) == 0, part.termination
-        # There is no motion at a break point with a loss of contact.
+        # At a break point with a loss of contact there is no motion.
         if len(times) == 0 or (none and over is not None and over.kind == "loss of contact"):
             return
         checkpoint, (W0, K, V) = part.checkpoint, self._scales

@@ -48,7 +48,7 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Parameters
     ----------
     function : callable
-        Of a `SegmentEquations` and other arguments.
+        Function of a `SegmentEquations` and other arguments.
     """
     apart, joined = jax.jit(function), jax.jit(_joined(function))
 
@@ -176,7 +176,7 @@ def run_steps(
         Smallest and largest factor by which a step may change its length.
     """
     # Where a slip ends, the logarithm of the velocity changes within times far below the resolution
-    # of the clock, over which load and drive stay as they are.
+    # of the clock, over which load and drive are constant.
     by_rest = isinstance(system.motion, StiffInertial | ReversingInertial)
     shortest = _SHORTEST if by_rest else 0.0
 

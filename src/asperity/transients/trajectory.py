@@ -108,7 +108,7 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
     sampling : None, float, str or array
         None for the integrator's steps, a rate (Hz) or rising times (s).
     duration : float
-        Of the programme (s).
+        Duration of the programme (s).
 
     Raises
     ------
@@ -281,7 +281,7 @@ class Trajectory(Drawn):
         import xarray
 
         def channel(values: Float, units: str, name: str, role: str = "") -> tuple:
-            # What an instrument would record, for readers of recordings.
+            # The motion as a recording, as an instrument would record it.
             recorded = {"recording_role": role} if role else {}
             return "time", values, {"units": units, "long_name": name, **recorded}
 

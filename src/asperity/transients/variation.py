@@ -47,7 +47,8 @@ class Variation:
     nodes : array, shape (steps + 1,)
         Beginnings of the steps, and the end (s).
     coefficients : array, shape (STAGES + 1, steps, size, size + parameters)
-        Of rising powers of the share of a step. Columns are the first states, then the parameters.
+        Coefficients of rising powers of the share of a step. Columns are the first states, then the
+        parameters.
     """
 
     nodes: Float
@@ -70,7 +71,7 @@ class Variation:
         states : callable
             States of shape (size, n) at times (s) of shape (n,).
         nodes : array, shape (steps + 1,)
-            Of the steps, of which the first begins where the derivatives are to.
+            Times of the steps; the derivatives refer to the beginning of the first step.
         names : sequence of str
             Parameters of the law or the machine, whose derivatives are in SI.
         """

@@ -20,7 +20,7 @@ class DirectShear:
     Parameters
     ----------
     area : float or str
-        Of the surface (m^2).
+        Area of the surface (m^2).
     """
 
     area: Given
@@ -61,7 +61,7 @@ class Triaxial:
     Parameters
     ----------
     diameter : float or str
-        Of the cylinder (m).
+        Diameter of the cylinder (m).
     angle : float or str
         Between the cut and the axis of the cylinder (rad), such as ``"30 deg"``.
     """

@@ -70,7 +70,7 @@ def filtered(values: Float, rate: float, poles: NDArray, residues: NDArray) -> F
     rate : float
         Samples per second (Hz).
     poles, residues : complex array
-        Of the transfer function, rad/s.
+        Poles and residues of the transfer function, rad/s.
 
     Returns
     -------

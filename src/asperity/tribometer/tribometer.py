@@ -47,7 +47,7 @@ class Recorder:
     cut_off : float or str, optional
         Cut-off frequency (gain 1/sqrt 2) of the Butterworth low-pass before the converter (Hz).
     order : int
-        Of that filter.
+        Order of that filter.
     bits : int
         Bits of the converter; 0 for a converter without steps.
     ranges : mapping of str to (float or str, float or str)
@@ -121,7 +121,7 @@ class Tribometer:
         signals : mapping of str to array, shape (n,)
             Input of each sensor in SI, such as the spring force for a gauge of the spring.
         seed : int or Generator
-            Of all noise: the same seed makes the same recording.
+            Seed of all noise: the same seed makes the same recording.
         provenance : mapping, optional
             Kept in the trace.
 

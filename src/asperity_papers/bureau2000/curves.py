@@ -53,7 +53,7 @@ class FigureCurve:
     inertia : bool
         Whether the mass counts.
     damping : float
-        Of a damper between slider and track (N s/m); 0 for none.
+        Damping of a damper between slider and track (N s/m); 0 for none.
 
     All arrays broadcast against each other.
     """
@@ -77,7 +77,7 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
     machine : Machine
     curves : iterable of FigureCurve
     **options
-        As of `asperity.periodic_response`.
+        As in `asperity.periodic_response`.
 
     Returns
     -------
@@ -202,7 +202,7 @@ class CurveFigure:
 
 
 def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
-    """What formulas of figures.toml may name: quantities at a curve's end or at eps = 0.5."""
+    """Names for formulas of figures.toml: quantities at a curve's end or at eps = 0.5."""
 
     def amplitude(curve: str, column: str, value: float) -> float:
         """Where a falling quantity has a value."""

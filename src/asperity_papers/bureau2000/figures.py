@@ -32,7 +32,7 @@ _FURTHER = (
     *(stability.floquet_figure, curves.phase_figure),
     *(motion.resonance_figure, curves.law_figure),
 )
-#: What computes each figure.
+#: The function that computes each figure.
 NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
     **{figure.name: figure for figure in (*_OF_THE_PAPER, *_FURTHER)},
     "figure-13": motion.period_figure,

@@ -57,7 +57,7 @@ def printed() -> Material:
 
 
 class Machine:
-    """What the laws and the air layer predict at one set of the paper's numbers.
+    """Predictions of the laws and the air layer at one set of the paper's numbers.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class Machine:
 
     @cached_property
     def terms(self) -> dict[str, Any]:
-        """What formulas of claims.toml may name.
+        """Names for formulas of claims.toml.
 
         Observables take a law, ``slow`` or ``fast``, and an applied amplitude, eps = 0.5 by
         default; ``exponent`` and the slopes take an observable first. ``borne`` takes a frequency
@@ -293,11 +293,11 @@ class Machine:
     # --- Closed forms and the reference integration ----------------------------------------------
 
     def small_modulation(self, V: float, **overrides: float) -> SmallModulation:
-        """What the closed forms take; rigid asperities, no inertia."""
+        """Arguments of the closed forms; rigid asperities, no inertia."""
         return SmallModulation(**self._point(V, **overrides))
 
     def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
-        """What the reference integration takes; rigid asperities, no inertia."""
+        """Arguments of the reference integration; rigid asperities, no inertia."""
         numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
         return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
 

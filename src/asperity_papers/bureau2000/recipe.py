@@ -55,7 +55,7 @@ class Thresholds:
     Attributes
     ----------
     name : str
-        What messages call the table.
+        Name of the table in messages.
     V : array, shape (rows,)
         Pulling velocity (m/s).
     K_over_W0, K_over_W0_err : array, shape (rows,)

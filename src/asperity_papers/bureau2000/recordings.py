@@ -86,7 +86,7 @@ def tribometer(frequency: float, seed: int | None = None) -> Tribometer:
     ----------
     frequency : float
     seed : int, optional
-        Of a run, which draws its drift of the gauge; None is one without drift.
+        Seed of a run, which draws its drift of the gauge; None is one without drift.
     """
     drift = 0.0
     if seed is not None:
@@ -159,7 +159,7 @@ class Series:
     epsilons : tuple of float
         Commanded, in their order.
     number : int
-        Of the series; run r has the seed 10 number + r.
+        Number of the series; run r has the seed 10 number + r.
     vacuum : bool
     """
 

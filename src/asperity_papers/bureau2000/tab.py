@@ -110,7 +110,7 @@ def _inertial_line(figure: str, numbers: Material, name: str, progress: Any) -> 
 
 
 def _marks(figure: str, numbers: Material) -> Mapping[str, Sequence[dict[str, Any]]]:
-    """What the text states at one amplitude, by observable; an interval has two ends."""
+    """Statements of the text at one amplitude, by observable; an interval has two ends."""
     machine = _machine(numbers)
     seen = machine.stated()
     at = machine.strongest if FIGURES[figure].x == "epsilon_eff" else STRONGEST
@@ -125,7 +125,7 @@ def _marks(figure: str, numbers: Material) -> Mapping[str, Sequence[dict[str, An
 
 
 def _element_lines(numbers: Material) -> list[dict[str, Any]]:
-    """What the element does over a period: stretch of the asperities, and rates over V."""
+    """Motion of the element over a period: stretch of the asperities, and rates over V."""
     machine, lines = _machine(numbers), []
     for name, V in zip(("1 µm/s", "10 µm/s"), machine.velocities, strict=True):
         period = one_period(machine, EXT, V, machine.strongest, samples=_INSTANTS)

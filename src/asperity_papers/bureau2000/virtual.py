@@ -48,7 +48,7 @@ _DRAWN = {
 
 @dataclass(frozen=True)
 class RecoveredQuantity:
-    """A number read off the simulated recordings, and the one in the simulated machine.
+    """A number measured in the simulated recordings, and its value in the simulated machine.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class RecoveredQuantity:
     value, uncertainty : float
         Standard uncertainty.
     true_value : float
-        Of the model, or given to the machine: what the readings know nothing of.
+        Value of the model, or given to the machine: what the readings know nothing of.
     stated : str
         What the text of the paper says about its own experiment.
     """
@@ -107,7 +107,7 @@ def last_point(points: pd.DataFrame, series: str, name: str) -> Read:
 
 
 def ratio(a: Read, b: Read) -> Read:
-    """Value, uncertainty and model of a quotient of two independent ones."""
+    """Value, uncertainty and model of a quotient of two independent quantities."""
     value = a[0] / b[0]
     return value, abs(value) * float(np.hypot(a[1] / a[0], b[1] / b[0])), a[2] / b[2]
 
@@ -348,7 +348,7 @@ VIRTUAL: tuple[Callable[[SimulatedPoints], VirtualFigure], ...] = (
 
 
 def introduction(figures: Sequence[VirtualFigure]) -> str:
-    """What is simulated and what is not, in front of the figures."""
+    """Text before the figures: the parts of the experiment that are simulated."""
     # Figures share series, and the points of eps = 0 have no window.
     points = pd.concat([f.points.dropna(subset="window") for f in figures])
     readings = points.drop_duplicates(["series", "epsilon_set"])
@@ -413,7 +413,7 @@ def provenance(
     ----------
     figure : VirtualFigure
     place : str
-        Of the figure in the report.
+        Place of the figure in the report.
     what : str
         The table: of the points or of the lines.
     parameters : sequence of str

@@ -74,7 +74,7 @@ def test_laws_are_compared_without_naming_what_is_free(made, pmma):
     assert found.best == "elasto-plastic"
     # Nothing says where to look for its cut-off velocities.
     assert list(found.not_compared) == ["cut-off"]
-    assert "Not compared: cut-off, for want of numbers" in found.verdict
+    assert "Not compared: cut-off, because a number is neither free nor given" in found.verdict
 
 
 @pytest.mark.long

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from asperity.inference.fitting.description import described_fit
+from asperity.inference.fitting.estimated_noise import with_noise
 from asperity.inference.fitting.intervals import Profile
 from asperity.inference.fitting.minima import extends, minima_of
-from asperity.inference.fitting.own_noise import with_noise
 from asperity.inference.levenberg_marquardt import minimised
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm

@@ -26,7 +26,7 @@ from asperity.orbit.mesh.mesh import (
 from asperity.orbit.mesh.newton import ACCEPTED, Plane, solve, solve_in_plane
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_problem, flatten
-from asperity.theory.adiabatic import adiabatic_growth
+from asperity.theory.limits import adiabatic_growth
 
 #: Round-off times the condition of a random small matrix.
 EXACT = 1e-11

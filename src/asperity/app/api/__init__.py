@@ -1,7 +1,7 @@
-"""What the page asks for: one module a tab or a panel, and the catalogue that all tabs share.
+"""Endpoints of the page: one module for each tab or panel, and the catalogue that all tabs share.
 
-Such a module has ``ENDPOINTS``, a tuple of `asperity.app.endpoints.Answer` and `Job`, and may have
-``preparations()``, see `asperity.app.jobs.threads`.
+A module of a tab has ``ENDPOINTS``, a tuple of `asperity.app.endpoints.Answer` and `Job`, and may
+have ``preparations()``, see `asperity.app.jobs.threads`.
 """
 
 #: Modules of this package with endpoints, in the order of the tabs.

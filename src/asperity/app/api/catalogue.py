@@ -1,4 +1,4 @@
-"""What the page can choose from: materials, laws with their equations, parameters with units.
+"""Choices of the page: materials, laws with their equations, parameters with units.
 
 Names, units, rules and defaults come from `asperity.parameters`, values from the materials.
 """

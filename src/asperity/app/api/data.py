@@ -40,7 +40,7 @@ class Driven(Question):
     ----------
     law : str
     numbers : dict of str to float
-        Of the law, with K over the load (1/m) as ``K/W0``; SI.
+        Numbers of the law, with K over the load (1/m) as ``K/W0``; SI.
     segments : list of (float, float)
         Durations (s) and pulling velocities (m/s), 0 in a hold; the first one is steady sliding.
     """

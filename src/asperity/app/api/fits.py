@@ -1,4 +1,4 @@
-"""Fits and comparisons of laws to what was measured, with profiles and posteriors."""
+"""Fits and comparisons of laws on measured data, with profiles and posteriors."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
-#: Transients that are shown enlarged, samples that one has, and the share of its largest departure
-#: from the line after it below which it counts as settled.
+#: Largest number of transients that are shown enlarged, smallest number of samples of a transient,
+#: and the share of its largest departure from the final line below which it counts as settled.
 _MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
 
 
@@ -53,10 +53,10 @@ class Run(Question):
     Attributes
     ----------
     recording : str
-        A file that was sent.
+        Key of an uploaded file.
     source : Source
     window, steps, velocities
-        As of `asperity.questions.fit.Data`.
+        As in `asperity.questions.fit.Data`.
     """
 
     recording: str
@@ -75,7 +75,7 @@ class Fitted(Question, FitOptions):
     Attributes
     ----------
     laws : list of str
-        One is fitted, several are compared.
+        A single law is fitted, several are compared.
     tables : list of Table
     rows : list of dict
         Rows of a measurement, see `asperity.measurement.campaign`.
@@ -85,7 +85,7 @@ class Fitted(Question, FitOptions):
     report : bool
         Whether to write the folder of the fit or of the comparison.
     names : {"friction", "geophysics"}
-        Of the parameters in sentences and tables.
+        Names of the parameters in sentences and tables.
     """
 
     laws: Annotated[tuple[str, ...], Field(min_length=1, max_length=20)]
@@ -120,19 +120,19 @@ def check(question: Fitted) -> None:
 
 
 def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
-    """The fields, with the place and the name of each recording."""
+    """The fields of a question, with path and name of each recording."""
     files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
     return {"question": question.model_dump(mode="json"), "files": places}
 
 
 def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Fit a law, or compare several; the share of the work that is done is reported.
+    """Fit a law, or compare several laws; messages report the share of the work that is done.
 
-    The result has ``fit`` or ``comparison``, and ``sections``, what these say in words and tables,
-    with a comparison also ``laws``, the same of each law; of the fit, or the best law, the pictures
-    ``bands``, ``residuals`` and ``runs``; and, if requested, ``posterior`` and ``report``, the
-    folder as a ZIP file in base64.
+    The result has ``fit`` or ``comparison``, and ``sections`` with its sentences and tables. A
+    comparison also has ``laws``, the sections of each law. The pictures ``bands``, ``residuals``
+    and ``runs`` are those of the fit or of the best law. If requested, there are ``posterior``, and
+    ``report``, the folder as a ZIP file in base64.
     """
     from asperity.inference import sample_posterior
     from asperity.inference.answers import answer_comparison, answer_fit
@@ -201,7 +201,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
 def _data(
     question: Fitted, files: Sequence[Mapping[str, str]], folder: Path
 ) -> list[dict[str, Any]]:
-    """Files of a fit: tables from the texts that were sent, and recordings."""
+    """Files of a fit: tables, written from the texts in the question, and recordings."""
     from asperity.measurement.campaign import write_csv
 
     data: list[dict[str, Any]] = []
@@ -236,7 +236,7 @@ def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
 
 
 def _bands(result: Any, posterior: Any) -> list[dict[str, Any]]:
-    """Readings of each table, and what the law predicts between them."""
+    """Readings of each table, and the predictions of the law between them."""
     from asperity.fit_report.bands import bands_of
     from asperity.inference.tables.term import LockInTerm
 
@@ -337,14 +337,14 @@ def _around(time: Float, fitted: Float, begin: float, end: float) -> slice:
 
 
 def _fit_command(question: Fitted, recordings: list[str]) -> str:
-    """The command; measured rows stand in a table that ``asperity measure`` writes."""
+    """The same fit as a command; ``campaign.csv`` stands for rows measured on the page."""
     files = [t.name for t in question.tables] + ["campaign.csv"] * bool(question.rows) + recordings
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
     parts += [f"--law {law}" for law in question.laws]
     of_run: dict[str, Any] = {}
     if question.runs:
-        # Options that each recording can have: the command takes those of the first recording.
+        # Recordings may have different options; the command shows those of the first recording.
         run = question.runs[0]
         parts += source_options(run.source)
         of_run = {name: getattr(run, name) for name in ("window", "steps", "velocities")}

@@ -1,4 +1,4 @@
-"""Map: response and stability over any two numbers, coarse at once and then finer."""
+"""Map tab: response and stability over any two numbers, on ever finer grids."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from asperity.parameters.arguments import one_of
 from asperity.study.map import SHOWN, Axis, response_map
 from asperity.study.map.dataset import boundary_lines
 
-#: Points along each axis: at once and without a boundary, then ever finer, up to the
-#: number that the question states.
+#: Points along each axis of the first grid, which has no boundary; each following grid has twice as
+#: many, up to the number in the question.
 _COARSE = 8
 #: Largest number of points along an axis.
 _FINEST = 128
@@ -51,7 +51,7 @@ class MapQuestion(OperatingPoint):
     count: Annotated[int, Field(ge=2, le=_FINEST)] = 64
 
     def axes(self, count: int) -> tuple[Axis, Axis]:
-        """Axes with so many points."""
+        """Axes with `count` points each."""
         x, y = (Axis(a.name, a.low, a.high, count, a.log) for a in (self.x, self.y))
         return x, y
 
@@ -138,7 +138,7 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
         "count": x.count,
         "x": x.values,
         "y": y.values,
-        # As many digits as a colour and a readout need: a grid is the longest answer of all.
+        # Five digits are enough for a colour and a readout: a grid is the longest answer.
         "values": [[_short(v) for v in row] for row in values.tolist()],
         "stable": result["stable"].values.astype(int),
         "regions": region_names(result),

@@ -1,4 +1,4 @@
-"""Motion in time of an operating point: steady response, or the stick-slip that takes its place.
+"""Motion in time of an operating point: the steady response, or stick-slip if that is unstable.
 
 The equation of motion is integrated from steady sliding at a lower velocity, block by block, and
 each block is reported: the page draws it while the next one is computed.
@@ -26,13 +26,13 @@ from asperity.transients import Trajectory, integrate_blocks
 _BEFORE = 0.7
 #: Periods of the load over which the modulation begins.
 _RISE = 3.0
-#: Drop of F/W0 of one cycle of stick-slip, for the time that is computed; cycles of that.
+#: The computed time is that of so many cycles of stick-slip with this drop of F/W0.
 _DROP, _CYCLES = 0.15, 12.0
-#: Cycles that are enough to see, and e-folds of a decay.
+#: Cycles after which the computation stops, and e-folds of growth or decay that are computed.
 _ENOUGH, _FOLDS = 6, 6.0
 #: Periods of the load that are shown where sliding is stable.
 _FEWEST_PERIODS, _MOST_PERIODS = 6.0, 120.0
-#: Rows of a block, time (s) on the clock after which no further block is computed, and tolerance.
+#: Rows of a block, elapsed time (s) after which no further block is computed, and tolerance.
 _ROWS, _PATIENCE, _RTOL = 4000, 15.0, 1e-6
 #: Points of the curves, and of the cycle that the drawing repeats.
 _BLOCKS, _FRAMES = 700, 300
@@ -46,25 +46,25 @@ class Motion(OperatingPoint):
     Attributes
     ----------
     growth_rate : float, optional
-        Of its slowest mode (1/s).
+        Growth rate of the slowest mode (1/s).
     """
 
     growth_rate: float | None = None
 
 
 class Cycles(NamedTuple):
-    """Stick-slip in a motion: its last whole cycle, as the first ones grow.
+    """Stick-slip in a motion, with its last whole cycle: the first cycles still grow.
 
     Attributes
     ----------
     onsets : array, (k,)
         Times (s) at which slips begin.
     period : float
-        Time (s) from the last slip but one to the last.
+        Time (s) from the second last slip to the last slip.
     slip : float
-        Displacement (m) of the last slip but one, which is over.
+        Displacement (m) of the second last slip, which is complete.
     drop : float
-        Range of F/W0 between the two.
+        Range of F/W0 between these two slips.
     """
 
     onsets: Float
@@ -74,7 +74,7 @@ class Cycles(NamedTuple):
 
 
 def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Integrate; each message has ``curves`` up to the time reached, and the last one the outcome.
+    """Integrate the motion; each message has ``curves`` and the outcome up to the time reached.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     epsilon = epsilon_on_contacts(question, values)
     unstable = question.growth_rate is not None and question.growth_rate > 0
     duration = _duration(values, epsilon, question.growth_rate)
-    # Without a mass nothing bounds the velocity of a slip, not even of the one after the start.
+    # Without a mass nothing bounds the velocity of a slip, not even of the slip after the start.
     inertia = values.get("M", 0.0) > 0
     slider = slider_from(law, values)
     V, f = values["V"], values["frequency"]
@@ -106,7 +106,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
         rtol=_RTOL,
         progress=lambda done, total: report(),
     )
-    # Neither the modulation nor the slider on its spring turns within this time.
+    # Longer than a period of the modulation and of the slider on its spring.
     natural = 2 * np.pi * np.sqrt(values.get("M", 0.0) / values["K"])
     window = max(min(1 / f if epsilon > 0 else np.inf, duration / _CYCLES / 20), natural)
     begin, parts = clock.monotonic(), []
@@ -127,7 +127,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
 
 
 def _duration(values: Mapping[str, float], epsilon: float, rate: float | None) -> float:
-    """Time (s) that is computed at most."""
+    """Largest time (s) that is computed."""
     if rate is not None and rate > 0:
         cycle = _DROP * values["W0"] / (values["K"] * values["V"])
         return float(_CYCLES * cycle + _FOLDS / rate)
@@ -145,7 +145,7 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
     Parameters
     ----------
     whole : Trajectory
-        Or anything with its columns.
+        A trajectory, or an object with its columns.
     velocity : float
         V (m/s).
     window : float
@@ -189,7 +189,7 @@ def _record(
     record: dict[str, Any] = {"curves": curves, "reached": time[-1], "inertia": inertia, "V": V}
     if cycles is None:
         return record
-    # The last whole cycle, which the drawing repeats, against the motion at V.
+    # The last whole cycle, which the drawing repeats, relative to the motion at V.
     grid = np.linspace(cycles.onsets[-2], cycles.onsets[-1], _FRAMES)
     behind = np.interp(grid, time, whole.displacement) - V * grid
     frames = {

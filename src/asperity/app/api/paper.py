@@ -120,7 +120,7 @@ def _section(place: str) -> str:
 
 
 def _slider(paper: Paper, name: str) -> dict[str, Any]:
-    """What the page shows of a number: symbol, meaning, slider and where it is printed."""
+    """A number on the page: symbol, meaning, slider, and its place in the paper."""
     number, words = paper.numbers[name], paper.words.slider.get(name)
     symbol, meaning = paper.contents.paper.parameters.get(name, (name, ""))
     low, high = number.si / _FACTOR, number.si * _FACTOR

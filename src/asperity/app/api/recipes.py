@@ -1,4 +1,4 @@
-"""The same calculation as Python and as a command, to be copied from the page."""
+"""A calculation of the page as Python and as a command, for copying."""
 
 from __future__ import annotations
 

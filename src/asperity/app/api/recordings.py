@@ -1,6 +1,6 @@
 """Recordings: read and measured in a separate process with limits.
 
-Imports are late and few: every file is read by a new process.
+Imports are late and few, because a new process reads each file.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ LARGEST_TABLE = 1024**2
 
 
 class Source(questions.Source):
-    """How an uploaded file is read: without a reduction file, which would be one of the server."""
+    """How an uploaded file is read: without a reduction file, whose path would be on the server."""
 
     @field_validator("recipe")
     @classmethod

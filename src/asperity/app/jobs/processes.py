@@ -11,7 +11,7 @@ from collections.abc import AsyncGenerator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-_BUSY = "too many computations wait; try again in a while"
+_BUSY = "too many computations wait; try again later"
 #: Longest message of a worker (bytes).
 _LONGEST = 64 * 1024**2
 #: Time (s) within which a cancelled job must stop.
@@ -28,9 +28,10 @@ class Jobs:
     preload : str
         Module that a worker imports before its first job.
     laws : sequence of str
-        Places of laws outside the package, which it registers.
+        Locations of laws outside the package, which a worker registers.
     folder : Path, optional
-        For temporary files of workers: the owner of the folder removes what a killed worker leaves.
+        Folder of temporary files of workers. The owner of the folder removes files that a killed
+        worker leaves.
     """
 
     def __init__(
@@ -58,23 +59,22 @@ class Jobs:
         limits: Mapping[str, int] | None = None,
         seconds: float = 600.0,
     ) -> AsyncGenerator[dict[str, Any], None]:
-        """Messages of a job, the last of which has ``done``.
+        """Messages of a job; the last message has ``done``.
 
-        Closing the iterator early ends the job, as when the page closes the connection.
+        Closing the iterator early ends the job; this happens when the page closes the connection.
+        Where too many jobs wait, the only message says so.
 
         Parameters
         ----------
         job : str
             ``module:function``; see `asperity.app.jobs.worker`.
         argument
-            Of the types of JSON.
+            Value of a JSON type.
         limits : mapping of str to int, optional
             ``memory`` (bytes) and ``seconds`` (of processor time); a worker with limits runs this
             job only.
         seconds : float
-            After which the job is ended.
-
-        Where too many jobs wait, the one message says so.
+            Time after which the job is ended.
         """
         if self._waiting >= self._most:
             yield {"error": _BUSY, "done": True}
@@ -94,7 +94,7 @@ class Jobs:
         clock = asyncio.get_running_loop().time
         end = clock() + seconds
         try:
-            worker = self._idle_one() or await _Worker.start(self._preload, self._folder)
+            worker = self._idle_worker() or await _Worker.start(self._preload, self._folder)
             self._alive.add(worker)
             await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
             while not finished:
@@ -107,24 +107,24 @@ class Jobs:
                 finished = message is None or bool(message.get("done"))
                 yield message or {"error": _why_it_ended(limits), "done": True}
         finally:
-            # The client may be gone, and this task with it: another task looks after the worker.
+            # The client may be gone, and this task cancelled: another task takes over the worker.
             task = asyncio.get_running_loop().create_task(
-                self._look_after(worker, reusable=not limits, finished=finished)
+                self._release(worker, reusable=not limits, finished=finished)
             )
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
-    def _idle_one(self) -> _Worker | None:
+    def _idle_worker(self) -> _Worker | None:
         while self._idle:
             worker = self._idle.pop()
             if worker.running:
                 return worker
         return None
 
-    async def _look_after(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
-        """Keep a worker for the next job if its job is done, or stops when cancelled.
+    async def _release(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
+        """Keep a worker for the next job if its job is done or stops when cancelled.
 
-        A new worker replaces a worker that had limits, and does its imports ahead of the next job.
+        A worker that had limits is replaced by a new worker, which imports its modules at once.
         """
         try:
             if worker is not None:
@@ -160,13 +160,13 @@ class Jobs:
             worker.kill()
         while self._tasks:  # a task that ends may start another task
             await asyncio.gather(*self._tasks, return_exceptions=True)
-        for worker in self._alive:  # and a worker that started meanwhile
+        for worker in self._alive:  # a worker may have started in the meantime
             worker.kill()
         await asyncio.gather(*(worker.ended() for worker in self._alive))
 
 
 class _Worker:
-    """One process."""
+    """One worker process."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
@@ -197,14 +197,14 @@ class _Worker:
         return self._process.returncode is None
 
     async def send(self, message: Mapping[str, Any]) -> None:
-        """Write a line."""
+        """Write a message to the process."""
         assert self._process.stdin is not None
         with contextlib.suppress(ConnectionError):
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
             await self._process.stdin.drain()
 
     async def read(self) -> dict[str, Any] | None:
-        """Read a line; None where the process has ended."""
+        """Read a message of the process; None if the process has ended."""
         line = await self._lines.get()
         if not line:
             return None

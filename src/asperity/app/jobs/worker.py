@@ -1,4 +1,4 @@
-"""The process that runs a job: one line of JSON in a request, lines of JSON as it goes on.
+"""The process that runs jobs: a request is one line of JSON, each message of a job another line.
 
 Started as ``python -m asperity.app.jobs.worker MODULE [LAW...]``: it imports the module and
 registers the laws. A request is ``{"job": "module:function", "argument": ..., "limits": ...}``. The
@@ -31,19 +31,19 @@ except ImportError:  # Windows has no such limits
 
 
 def set_limits(limits: Mapping[str, int]) -> None:
-    """Address space (``memory``, bytes) and processor time (``seconds``) until the process ends.
+    """Limit address space (``memory``, bytes) and processor time (``seconds``) of the process.
 
-    Both count from what the process has used so far. The system ends the process after its time,
-    and refuses it memory.
+    Both are in addition to what the process has used so far. The system ends the process after its
+    time, and refuses further memory.
     """
-    for kind, end in _ends(limits).items():
+    for kind, end in _limit_values(limits).items():
         resource.setrlimit(kind, (end, end))
 
 
 @contextlib.contextmanager
 def limited(limits: Mapping[str, int]) -> Iterator[None]:
     """`set_limits` for a part of the work."""
-    ends = _ends(limits)
+    ends = _limit_values(limits)
     earlier = {kind: resource.getrlimit(kind) for kind in ends}
     for kind, end in ends.items():
         resource.setrlimit(kind, (end, earlier[kind][1]))
@@ -54,8 +54,8 @@ def limited(limits: Mapping[str, int]) -> Iterator[None]:
             resource.setrlimit(kind, before)
 
 
-def _ends(limits: Mapping[str, int]) -> dict[int, int]:
-    """The new values of the limits of the system, within the present ones."""
+def _limit_values(limits: Mapping[str, int]) -> dict[int, int]:
+    """The new values of the limits of the system, at most the present values."""
     if resource is None:
         return {}
     used = resource.getrusage(resource.RUSAGE_SELF)

@@ -1,4 +1,4 @@
-"""Which laws do the data exclude, and what would tell the others apart."""
+"""Comparison of laws: those that the data exclude, and measurements that would exclude others."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ from asperity.parameters import law_parameters
 from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Drawn, SummaryLine
 
-#: Called with how many laws are done, parts of one included.
+#: Called with the number of finished laws; fractions are the finished part of the next law.
 Report = Callable[[float], None]
-#: Parts that the fit of a law, and its evidence, count as in the progress.
+#: Steps of progress for the fit of a law, and for its evidence.
 _STEPS = 100
-#: Drawn starts of a fit that is repeated without outliers.
-_STARTS_AGAIN = 16
-#: At or above this probability of chi-squared there are no outliers to look for.
+#: Random starts of a fit that is repeated without outliers.
+_STARTS_WITHOUT_OUTLIERS = 16
+#: Outliers are searched for only if the p-value of chi-squared is below this.
 _DESCRIBED = 0.01
-#: What is tried to tell two laws apart: factors of the applied amplitude, velocity and frequency.
+#: Factors of amplitude, velocity and frequency at which the predictions of two laws are compared.
 _FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
-#: Largest amplitude on the contacts that is tried.
+#: Largest amplitude on the contacts for that comparison.
 _LARGEST_EPSILON = 0.95
 
 
@@ -64,7 +64,7 @@ class Judged:
     weight : float
         Akaike weight among the laws compared.
     evidence : Evidence or None
-        None where it was not asked for, or the fit did not converge.
+        None if not requested, or if the fit did not converge.
     cross_validation : CrossValidation or None
         The same.
     """
@@ -78,13 +78,13 @@ class Judged:
 
 
 class Standing(NamedTuple):
-    """Where a law stands relative to the best one.
+    """The result for a law relative to the best law.
 
     Attributes
     ----------
     word : {"excluded", "disfavoured", "cannot tell", "no fit"}
     number : str
-        The number that decides, with its thresholds.
+        The deciding number, with its thresholds.
     """
 
     word: Literal["excluded", "disfavoured", "cannot tell", "no fit"]
@@ -98,16 +98,16 @@ class Comparison(Drawn):
     Attributes
     ----------
     laws : mapping of str to Judged
-        By rising AICc.
+        Fitted laws in order of rising AICc.
     decided : bool
-        Whether exactly one law is left, and describes the data.
+        Whether exactly one law is not excluded, and describes the data.
     best : str
-        Law of the lowest AICc; empty if none converged.
+        Law with the lowest AICc; empty if no fit converged.
     verdict : str
     left_out : tuple of str
-        Rows that the verdict is without, because no law describes them together with the others.
+        Rows that the verdict leaves out: no law describes them together with the other rows.
     not_compared : mapping of str to str
-        Laws of which no fit could be made, and why.
+        Laws that could not be fitted, with the reasons.
     """
 
     _drawn_by = "asperity.fit_report.folder:draw_comparison"
@@ -120,7 +120,7 @@ class Comparison(Drawn):
     not_compared: Mapping[str, str] = field(default_factory=dict)
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """The verdict, and where each law stands."""
+        """The verdict, and the standing of each law."""
         lines = [SummaryLine("verdict", self.verdict)]
         for name in self.laws:
             word, number = self.standing(name)
@@ -128,7 +128,7 @@ class Comparison(Drawn):
         return "Comparison of laws", lines
 
     def standing(self, name: str) -> Standing:
-        """Where a law stands relative to the best one, and by which number."""
+        """The result for a law relative to the best law, and the deciding number."""
         judged, best = self.laws[name], self.laws.get(self.best)
         result = judged.fit
         if best is None or not result.converged:
@@ -153,7 +153,7 @@ class Comparison(Drawn):
 
 
 def _evidence_lost(best: Judged, other: Judged) -> float:
-    """Logarithm of the evidence of one law over that of another; NaN where it is not reliable."""
+    """Logarithm of the ratio of the evidences of two laws; NaN if not reliable."""
     a, b = best.evidence, other.evidence
     return a.log - b.log if a and b and a.reliable and b.reliable else math.nan
 
@@ -168,22 +168,22 @@ def compare(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> Comparison:
-    """Fit several laws to the same data and say which of them the data exclude.
+    """Fit several laws to the same data, and determine which of them the data exclude.
 
     Parameters
     ----------
     data : LockInTable, RecordedRun or Trace, or several
     laws : sequence of str
     free : sequence of str, optional
-        Free parameters; each law takes those that it has. One that has none of them is compared
-        as it stands, with its fixed numbers. By default those of `fit`, for each law its own.
+        Free parameters; each law takes those that it has. A law that has none of them is compared
+        with its fixed numbers. The default is that of `fit` for each law.
     evidence : bool
         Whether to compute evidence and leave-one-run-out cross-validation too.
     progress : callable, optional
         Called with the work done so far and all work: a hundred for the fit of each law, and a
         hundred for its evidence and cross-validation.
     **options
-        As of `fit`.
+        As in `fit`.
 
     Returns
     -------
@@ -192,22 +192,23 @@ def compare(
     Raises
     ------
     InputError
-        As `fit`; if fewer than two laws are given, or a free parameter belongs to none of them.
+        As `fit`; if fewer than two laws are given, or no law has one of the free parameters.
 
     Notes
     -----
-    The rule, fixed beforehand: a law is excluded if its chi-squared has a probability below 0.001
-    while that of another law has not and its AICc is lower by 4 or more, or if its AICc exceeds
-    the lowest by 10 or more. Of recordings, whose noise is estimated from what the law leaves, the
-    second alone counts. If no law describes the data, their uncertainties may be too small:
-    chi-squared is divided by that of the best law per degree of freedom before the second
-    comparison; and the simplest law that would describe a table with another stiffness than the
-    given one is named with it. Rows that alone keep every law from describing the data are left
-    out, and named.
+    The rule was fixed beforehand. A law is excluded in two cases. (1) Its chi-squared has a
+    probability below 0.001, while another law has a higher probability and an AICc that is lower
+    by 4 or more. (2) Its AICc exceeds the lowest AICc by 10 or more. For recordings, whose noise is
+    estimated from the residuals, only case 2 applies.
+
+    If no law describes the data, the uncertainties may be too small: for case 2, chi-squared is
+    then divided by the chi-squared per degree of freedom of the best law. The verdict also names
+    the simplest law that would describe a table with another stiffness than the given one. If a
+    few rows alone keep every law from describing the data, they are left out, and named.
     """
     rule = "be two or more"
     require(len(set(laws)) >= 2, "laws", rule, ", ".join(laws) or "none", "name those to compare")
-    # Parameters of laws; those of machine and runs, and unknown names, are checked by the fit.
+    # Only parameters of laws: the fit checks those of machine and runs, and unknown names.
     of_any_law = {p for law in registered() for p in _parameters(law)}
     of_these = {p for law in laws for p in _parameters(law)}
     nobodys = [p for p in free or () if p in of_any_law - of_these]
@@ -220,11 +221,11 @@ def compare(
         name: (
             free_by_default(get_law(name), several, options.get("fixed"), options.get("material"))
             if free is None
-            else _own(name, free, laws)
+            else _own_parameters(name, free, laws)
         )
         for name in dict.fromkeys(laws)
     }
-    # Each law takes its part of these; an empty mapping and None are one thing, no numbers.
+    # Each law takes the numbers that it has; an empty mapping means the same as None.
     given = {
         key: options.pop(key, None) or {}
         for key in ("fixed", "start", "prior")
@@ -244,19 +245,21 @@ def compare(
         before: Mapping[str, Fit] | None = None,
     ) -> dict[str, Fit]:
         done: dict[str, Fit] = {}
-        # Special cases come before the laws that have them, which begin there.
+        # Special cases are fitted before the laws that contain them, whose fits start there.
         ordered = sorted(own.items(), key=lambda pair: len(_parameters(pair[0])))
         ordered = [pair for pair in ordered if before is None or pair[0] in before]
         for k, (name, names) in enumerate(ordered):
             mine: dict[str, Any] = {
-                key: {n: values[n] for n in _own(name, list(values), laws)}
+                key: {n: values[n] for n in _own_parameters(name, list(values), laws)}
                 for key, values in given.items()
             }
             chosen = dict(options)
             if before and before[name].converged:
                 # Nearly the same data.
                 mine["start"] = {n: before[name].values[n] for n in names}
-                chosen["starts"] = min(_STARTS_AGAIN, options.get("starts", _STARTS_AGAIN))
+                chosen["starts"] = min(
+                    _STARTS_WITHOUT_OUTLIERS, options.get("starts", _STARTS_WITHOUT_OUTLIERS)
+                )
             try:
                 done[name] = fit(
                     data,
@@ -275,7 +278,7 @@ def compare(
         return done
 
     fits = fits_to(several, report)
-    if missed := _missed(fits):
+    if missed := _better_at_extension(fits):
         fits |= fits_to(several, lambda _: None, missed)
     if len(fits) < 2:
         raise InputError(
@@ -290,20 +293,21 @@ def compare(
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())
     doubt, stretches = _support(result)
-    # The table has the reason of each.
+    # The table has the reason for each law.
     lacking = (
-        f" Not compared: {enumerated(list(not_compared))}, for want of numbers that are neither "
-        "free nor given, or of samples."
+        f" Not compared: {enumerated(list(not_compared))}, because a number is neither free nor "
+        "given, or because there are too few samples."
     ) * bool(not_compared)
-    verdict = doubt + result.verdict + stretches + _freed(result) + lacking
+    verdict = doubt + result.verdict + stretches + _with_free_stiffness(result) + lacking
     result = replace(result, not_compared=not_compared, verdict=verdict)
-    return _examined(result, lambda laws: report(len(own) + laws)) if evidence else result
+    return _with_evidence(result, lambda laws: report(len(own) + laws)) if evidence else result
 
 
-def _missed(fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Laws that describe a table better elsewhere: at the minimum of a law that extends them.
+def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
+    """Laws that describe a table better at the minimum of a law that extends them.
 
-    By name, with the fit of that law. Where the extension is needed, they describe it worse there.
+    The result has the fit of the extending law by the name of the law. If the extension is needed,
+    the law describes the table worse at that minimum.
     """
     missed = {}
     for name, own in fits.items():
@@ -322,7 +326,7 @@ def _missed(fits: Mapping[str, Fit]) -> dict[str, Fit]:
 
 
 def _support(comparison: Comparison) -> tuple[str, str]:
-    """Doubts and deciding stretches of the verdict on the best disfavoured law."""
+    """Sentences on doubts and deciding stretches of the verdict on the best disfavoured law."""
     for judged in comparison.laws.values():
         best = comparison.laws[comparison.best].fit if comparison.best else judged.fit
         if judged.fit.converged and judged.fit.aicc - best.aicc >= DISFAVOURED:
@@ -330,12 +334,12 @@ def _support(comparison: Comparison) -> tuple[str, str]:
     return "", ""
 
 
-def _freed(comparison: Comparison) -> str:
-    """A sentence on the law that describes the data with a free stiffness, where none does."""
+def _with_free_stiffness(comparison: Comparison) -> str:
+    """A sentence on a law that describes the data with a free stiffness, if no law does so else."""
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     if any(f.dof <= 0 or f.p_value >= IMPOSSIBLE for f in fits):
         return ""
-    # The law with the fewest parameters that does: those that extend it do as well.
+    # The law with the fewest parameters: laws that extend it describe the data too.
     for f in sorted(fits, key=lambda f: len(f.parameters)):
         sentence = stiffness_that_describes(f)
         if sentence:
@@ -344,7 +348,7 @@ def _freed(comparison: Comparison) -> str:
 
 
 def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
-    """Rows without which some law describes the data: the fewest that do."""
+    """The smallest set of rows without which a law describes the data."""
     lists = [list(f.outliers) for f in fits.values() if f.converged and len(f.residuals) == 1]
     if not lists or any(
         f.converged and (f.dof <= 0 or f.p_value >= _DESCRIBED) for f in fits.values()
@@ -354,7 +358,7 @@ def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
 
 
 def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Comparison:
-    """The comparison without outliers, with a verdict that says what they do."""
+    """The comparison without outliers; its verdict says what the outliers change."""
 
     def excluded(comparison: Comparison) -> list[str]:
         return sorted(name for name, j in comparison.laws.items() if j.excluded)
@@ -367,11 +371,11 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
     return replace(rest, verdict=outliers + rest.verdict, left_out=tuple(rows))
 
 
-def _examined(comparison: Comparison, report: Report) -> Comparison:
+def _with_evidence(comparison: Comparison, report: Report) -> Comparison:
     """The comparison with evidence and cross-validation of every law.
 
-    Orbits that are searched for, and motions through recordings, take minutes for it: of a law that
-    is excluded or far from the data, only the normal approximation of the evidence.
+    Searched orbits and motions through recordings take minutes. For these, a law that is excluded
+    or far from the data gets only the normal approximation of the evidence.
     """
     judged = {}
     for k, (name, j) in enumerate(comparison.laws.items(), 1):
@@ -449,7 +453,7 @@ def _parameters(law: str) -> Collection[str]:
     return law_parameters(get_law(law))
 
 
-def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
+def _own_parameters(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in _parameters(law)}
     own = _parameters(name)
     return [p for p in free if p in own or p not in others]
@@ -539,10 +543,10 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
 
 
 def what_would_tell(first: Fit, second: Fit) -> str:
-    """Where the predictions of two fitted laws differ most, as a sentence.
+    """A sentence on the operating point at which the predictions of two fitted laws differ most.
 
-    Looks at the operating points of the data with velocity, amplitude and frequency changed by
-    factors up to 4, and at differences in units of the median uncertainty of each observable.
+    The points are those of the data, with velocity, amplitude and frequency changed by factors up
+    to 4. Differences are in units of the median uncertainty of each observable.
     """
     terms = first.objective.terms_of(LockInTerm)
     if not terms:
@@ -589,7 +593,7 @@ def what_would_tell(first: Fit, second: Fit) -> str:
 
 
 def comparison_record(comparison: Comparison) -> dict[str, Any]:
-    """Everything that a comparison says."""
+    """The comparison as plain numbers and texts, for JSON."""
     return {
         "laws": {
             name: {
@@ -616,14 +620,14 @@ def comparison_record(comparison: Comparison) -> dict[str, Any]:
 def laws_table(
     comparison: Comparison, *, reasons: bool = False
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Laws in the order of the comparison, as texts for people: columns' names and rows.
+    """Table of the laws in the order of the comparison: names of the columns, and rows of text.
 
-    What decides stands in it: chi-squared where uncertainties are given, the logarithm of the
-    likelihood where the noise is estimated. With `reasons`, why a law is excluded.
+    The table has the deciding numbers: chi-squared if uncertainties are given, the logarithm of the
+    likelihood if the noise is estimated. With `reasons`, it says why a law is excluded.
     """
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     lowest = min((f.aicc for f in fits), default=0.0)
-    # Where the noise is estimated from the same residuals, chi-squared judges nothing.
+    # If the noise is estimated from the same residuals, chi-squared cannot judge a law.
     by_chi2 = any(f.judged_by_chi2 for f in fits)
     numbers = ("chi-squared", "dof", "p") if by_chi2 else ("log-likelihood",)
     head = ("law", *numbers, "AICc - lowest", "weight", "ln evidence", "")
@@ -636,7 +640,7 @@ def laws_table(
             continue
         shown = (f"{f.chi2:.4g}", str(f.dof), f"{f.p_value:.2g}")
         evidence = f"{j.evidence.log:.2f}" if j.evidence else ""
-        # Of excluded laws among searched orbits it is the normal approximation's.
+        # For excluded laws with searched orbits this is the normal approximation.
         if j.evidence and math.isfinite(j.evidence.standard_error):
             evidence += f" +- {j.evidence.standard_error:.2g}"
         word, number = comparison.standing(name)

@@ -1,11 +1,11 @@
-"""Second opinions on a law: its evidence, how well other runs predict each run, and its support.
+"""Further tests of a law: its evidence, cross-validation by runs, and doubts about a verdict.
 
-Evidence is the probability of the data under a law, averaged over its prior: the integral of
-likelihood times prior over the parameters by importance sampling from Student's t about the mode in
-whitened coordinates; without samples, the normal approximation (Laplace).
+Evidence is the probability of the data under a law, averaged over its prior. The integral of
+likelihood times prior over the parameters is computed by importance sampling from Student's t about
+the mode in whitened coordinates; without samples, by the normal approximation (Laplace).
 
-Samples of one run share what was the same in it, so that leaving out one reading at a time would
-flatter every law. A run is what was measured together: a file, or the rows of one entry in the
+Cross-validation leaves out one run at a time. Readings of one run share their errors: leaving out
+single readings would flatter every law. A run is a file, or all rows with the same entry in the
 column ``run``.
 """
 
@@ -26,9 +26,9 @@ from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 
-#: Degrees of freedom of the distribution that samples come from.
+#: Degrees of freedom of the distribution from which samples are drawn.
 _TAILS = 5.0
-#: Effective samples below which the number is no more than a guess.
+#: With fewer effective samples the evidence is not reliable.
 _ENOUGH = 50.0
 
 
@@ -41,9 +41,9 @@ class Evidence:
     log : float
         Natural logarithm of the evidence.
     standard_error : float
-        Of `log`, by sampling.
+        Standard error of `log`, due to sampling.
     effective_samples : float
-        Of the importance weights.
+        Effective number of samples, from the importance weights.
     laplace : float
         The normal approximation of `log`.
     failed : int
@@ -61,7 +61,7 @@ class Evidence:
 
     @property
     def reliable(self) -> bool:
-        """Whether there are effective samples enough."""
+        """Whether there are enough effective samples."""
         return self.effective_samples >= _ENOUGH
 
 
@@ -73,19 +73,19 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
     fit : Fit
         Converged.
     samples : int, optional
-        By default what the data afford, 1024 for a table, 256 with a recording, and 80 where
-        orbits are searched for; 0 for the normal approximation alone.
+        By default 1024 for a table, 256 with a recording, and 80 where orbits are searched for; 0
+        for the normal approximation alone.
     seed : int
 
     Notes
     -----
-    The prior is that of `Coordinates`. A range k times as wide of a parameter that these data
-    determine lowers the logarithm by ln k.
+    The prior is that of `Coordinates`. If the range of a parameter that these data determine is k
+    times wider, the logarithm of the evidence is lower by ln k.
     """
     if samples is None:
         samples = min(term.affordable for term in fit.objective.terms)
     if not fit.objective.unknowns:
-        # Nothing to average over.
+        # Without free parameters there is no average.
         density = fit.log_likelihood
         return Evidence(density, 0.0, float(samples), density, 0, {})
     whitened = Whitened.of(fit)
@@ -94,7 +94,7 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
     laplace = fit.objective.log_likelihood(mode) + at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
         return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior_record())
-    # The whole of scipy.stats takes longer to load than a fit of a velocity step to begin.
+    # Loading all of scipy.stats would take longer than the start of a fit of a velocity step.
     from scipy.stats import multivariate_t
 
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)
@@ -129,7 +129,7 @@ def _log_target(fit: Fit, whitened: Whitened, z: Float) -> Float:
     u, total = _with_log_prior(whitened, z)
     values = [fit.objective.named(x) for x in u]
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
-        # The change from the estimate: the error of a coarse model of searched orbits is in both.
+        # The difference from the estimate: the error of a coarse model of searched orbits cancels.
         at_estimate, *chi2 = term.chi2_of_many([fit.values, *values], near=True)
         total += log_density(residuals) - 0.5 * (np.array(chi2) - at_estimate)
     return total
@@ -142,11 +142,11 @@ class CrossValidation:
     Attributes
     ----------
     log_density : float
-        Sum over the runs: expected log predictive density.
+        Expected log predictive density: the sum over the runs.
     runs : mapping of str to float
-        Of each run.
+        Log predictive density of each run.
     message : str
-        Why there are no numbers, if there are none.
+        Reason if there are no numbers.
     """
 
     log_density: float
@@ -154,7 +154,7 @@ class CrossValidation:
     message: str = ""
 
     def difference(self, other: CrossValidation) -> tuple[float, float]:
-        """How much better this one predicts than the other, and the standard error."""
+        """Difference of the log densities from another law's, and its standard error."""
         apart = np.array([self.runs[name] - other.runs[name] for name in self.runs])
         if apart.size < 2:
             return float(apart.sum()), math.nan
@@ -164,8 +164,8 @@ class CrossValidation:
 def leave_one_run_out(fit: Fit) -> CrossValidation:
     """Cross-validation of a converged fit to tables of lock-in readings.
 
-    The density of a run is normal about the prediction of the fit to the others, with their
-    uncertainty of the parameters on top of the errors.
+    The density of a run is normal about the prediction of the fit to the other runs. Its variance
+    includes the uncertainty of the parameters from these runs and the errors of the readings.
     """
     tables = fit.objective.terms_of(LockInTerm)
     if not tables or len(fit.objective.terms) > 1:
@@ -183,7 +183,7 @@ def leave_one_run_out(fit: Fit) -> CrossValidation:
 
 
 def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
-    """Log density of the rows left out, given the others."""
+    """Log density of the rows left out, predicted by the other rows."""
     objective = fit.objective
     rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))
     u = rest.minimise(objective.coordinates(fit.values))[0]
@@ -205,29 +205,29 @@ def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
     )
 
 
-#: Parts of a recording, share of the difference of two laws that a stretch of them must hold, and
-#: share of the recording up to which such a stretch is named.
+#: Number of parts of a recording. A stretch that holds this share of the difference between two
+#: laws is named if it is shorter than the last share of the recording.
 _PARTS, _MOST, _SHORT = 200, 0.8, 0.1
 
 
 def support(best: Fit, other: Fit) -> tuple[str, str]:
-    """Doubts about what decides between two laws, and a stretch that decides, as sentences.
+    """Sentences on doubts about the verdict between two laws, and on stretches that decide it.
 
-    Two of the doubts are about the window. The difference of AICc is a sum over the recording, in
-    the proportion of the squared innovations: the verdict rests on a short stretch without which it
-    would not exclude the other law; and it changes with the window where one half is for the other
-    law by as much as excludes. With the better law true that has a probability below exp(-5), by
-    Markov's inequality for the ratio of likelihoods.
+    Two doubts are about the window. The difference of AICc is a sum over the recording, in
+    proportion to the squared innovations. The verdict may rest on a short stretch: without it, the
+    other law would not be excluded. Or it may depend on the window: one half of the recording alone
+    would exclude the better law. If the better law is true, the latter has a probability below
+    exp(-5), by Markov's inequality for the ratio of likelihoods.
 
     Parameters
     ----------
     best, other : Fit
-        Converged, to the same data.
+        Converged fits to the same data.
 
     Returns
     -------
     doubts, stretches : str
-        Empty where there is nothing to say.
+        Empty if there are none.
     """
     doubts, stretches = [], []
     pairs = zip(best.objective.terms_of(RunTerm), other.objective.terms_of(RunTerm), strict=True)
@@ -267,10 +267,10 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
 
 
 def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Float, Float]:
-    """Edges of the parts of a recording, as samples, and the share of the gain up to each.
+    """Edges of the parts of a recording, as sample numbers, and the cumulative gain at each edge.
 
-    The gain is that of `best` in the sum of squared innovations. Both laws are judged by the noise
-    that the better one leaves, and without the samples that are wrong under it.
+    The gain is the decrease of the sum of squared innovations from `other` to `best`. Both laws are
+    judged by the noise under the better law, without the samples that are wrong under it.
     """
     run = first.run
     noise = [model.whitening for model in first.models]
@@ -288,9 +288,9 @@ def _gains(first: RunTerm, best: Fit, second: RunTerm, other: Fit) -> tuple[Floa
 
 
 def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[float, float, float]:
-    """Ends (s) of the shortest stretch with so much of the gain, and how much it has.
+    """Ends (s) of the shortest stretch with a given share of the gain, and its actual share.
 
-    The whole recording where no stretch does.
+    The whole recording if no stretch has this share.
     """
     within = total[None, :] - total[:, None] >= share
     within[0, -1] = True
@@ -299,9 +299,9 @@ def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[fl
     return float(time[edges[i]]), float(time[edges[j] - 1]), float(total[j] - total[i])
 
 
-#: A law is excluded by its misfit below this probability of chi-squared, if another law is not.
+#: A law whose chi-squared has a lower probability is excluded if another law fits better.
 IMPOSSIBLE = 1e-3
 #: Differences of AICc from which a law is disfavoured (weight 1/7) and excluded (1/150).
 DISFAVOURED, EXCLUDED = 4.0, 10.0
-#: Factor of the evidence from which a law is disfavoured: strong evidence.
+#: A law whose evidence is lower by this factor is disfavoured: strong evidence.
 FACTOR = 20.0

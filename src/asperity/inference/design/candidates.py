@@ -1,7 +1,7 @@
-"""Operating points of a plan at which the slider slides steadily, and what a law predicts there.
+"""Operating points of a plan at which the slider slides steadily, and predictions at these points.
 
-A reading needs a periodic response that is found and stable: an unstable one drifts into stick-slip
-and is never measured.
+A reading needs a stable periodic response: an unstable response turns into stick-slip and is never
+measured.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from asperity.slider.named import slider_from
 
 Progress = Callable[[int, int, str], None]
 
-#: Points per call of a solver: between two calls progress is reported.
+#: Points per call of a solver; progress is reported after each call.
 _BLOCK = 128
-#: Why a point is no candidate although its response was found.
+#: Reason why a point with a periodic response is no candidate.
 UNSTABLE = "its periodic response is unstable: stick-slip"
 _CUT = (":", ";", " epsilon = ")
 
@@ -44,11 +44,11 @@ class Candidates:
     points : mapping of str to array, shape (n,)
         V, epsilon (as applied), frequency, and other axes of the plan, in SI.
     index : int array, shape (n,)
-        Number of each among all combinations of the plan.
+        Index of each point among all combinations of the plan.
     total : int
         Number of combinations.
     left_out : mapping of str to int
-        Reasons, each with its number of combinations.
+        Number of combinations that were left out, by reason.
     draws : tuple of mapping of str to float
         Values of the free parameters over which the design is averaged.
     usable : bool array, shape (draws, n)
@@ -63,7 +63,7 @@ class Candidates:
     usable: Bool
 
     def without(self, out: Bool, reason: str) -> Candidates:
-        """The candidates without some of them, which are counted under a reason."""
+        """The candidates without those in `out`, which are counted under a reason."""
         if not out.any():
             return self
         return replace(
@@ -94,11 +94,11 @@ def candidates_of(plan: DesignPlan, progress: Progress) -> Candidates:
     ----------
     plan : DesignPlan
     progress : callable
-        Called with points solved, points in all, and what they are.
+        Called with the number of points solved, the number of all points, and a label.
     """
     points = plan.candidates()
     reasons = _reasons(plan, points, expected_values(plan.truth), labelled(progress, "points"))
-    # Without modulation there are no harmonics; the mean says mu_ss(V) all the same.
+    # Without modulation there are no harmonics, but the mean still measures mu_ss(V).
     means = all(n in ("mean_friction", "delta_mu") for n in plan.noise)
     still = (points["epsilon"] == 0) & (reasons == "") & (not means)
     reasons = np.where(still, "its load is not modulated", reasons)
@@ -121,7 +121,7 @@ def candidates_of(plan: DesignPlan, progress: Progress) -> Candidates:
 def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
     """Values of the free parameters, normal about the expected ones, by a Sobol sequence.
 
-    Values that break the rule of their parameter are replaced by the next of the sequence.
+    Values that break the rule of their parameter are replaced by the next values of the sequence.
     """
     count, names, expected = (
         plan.question.draws,
@@ -131,7 +131,7 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
     if not count:
         return ()
     rules = {u.name: RULES[u.parameter.rule] for u in plan.truth.unknowns}
-    # Slow to load, and wanted only here.
+    # Imported here: slow to load.
     from scipy.stats.qmc import Sobol
 
     sequence = Sobol(len(names), seed=plan.question.seed)
@@ -153,7 +153,7 @@ def _reasons(
     values: Mapping[str, float],
     progress: Callable[[int, int], None],
 ) -> NDArray[np.str_]:
-    """Why each point has no stable response, shape (n,); empty where it has one."""
+    """Reasons why points have no stable response, shape (n,); empty where they have one."""
     given = on_contacts({**plan.truth.fixed, **points, **values})
     beyond = given["epsilon"] >= 1
     reasons = np.where(beyond, "contact would be lost", "").astype(object)
@@ -181,23 +181,23 @@ def _reasons(
 
 
 def _short(reason: str) -> str:
-    """A reason without the numbers of its point, so that like ones are counted together."""
+    """A reason without the numbers of its point, so that equal reasons are counted together."""
     for mark in _CUT:
         reason = reason.partition(mark)[0]
     return "no response was found: " + reason.removesuffix(" at").removesuffix(" before")
 
 
 class Predicted(NamedTuple):
-    """What a law predicts at some points.
+    """Predictions of a law at some points.
 
     Attributes
     ----------
     whole : Prediction
         Zero at points without a response.
     slopes : dict of str to Prediction
-        Derivatives to the free parameters.
+        Derivatives with respect to the free parameters.
     seen : bool array, shape (n,)
-        Points that have a response with derivatives.
+        Whether each point has a response with derivatives.
     """
 
     whole: Prediction
@@ -241,7 +241,7 @@ def _term(plan: DesignPlan, hypothesis: Objective, table: LockInTable) -> LockIn
 def expected_readings(
     plan: DesignPlan, points: Mapping[str, Float], whole: Prediction
 ) -> LockInTable:
-    """Readings without noise at some points, with the uncertainty of a reading there.
+    """Readings without noise at some points, with the uncertainty of a reading at each point.
 
     The tangential uncertainty of a harmonic combines that of the phase and the absolute one of the
     amplitude: noise has no preferred direction in the complex plane.
@@ -274,7 +274,7 @@ def differences(
     -------
     array, shape (points, observables)
     array, shape (points, observables, parameters)
-        To the coordinates of the free parameters.
+        Derivatives with respect to the coordinates of the free parameters.
     """
     result = residuals_of(weights_of(readings), at.whole, at.slopes)
     slopes = np.array([u.slope(values[u.name]) for u in hypothesis.unknowns])
@@ -285,7 +285,7 @@ def differences(
 def with_readings(
     plan: DesignPlan, hypothesis: Objective, readings: LockInTable, counts: Float
 ) -> Objective:
-    """The hypothesis with readings to be fitted, each the mean of several, shape (rows,)."""
+    """The hypothesis with readings to be fitted; each is the mean of several, shape (rows,)."""
     term = _term(plan, hypothesis, readings)
     term.use_search(True)
     return replace(hypothesis, terms=(term.weighted(np.sqrt(counts)),))

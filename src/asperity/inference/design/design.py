@@ -1,4 +1,4 @@
-"""From a plan to the operating points that answer its question best, and what a design says."""
+"""Optimal design: the operating points that answer the question of a plan best."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ from asperity.inference.unknowns import Unknown
 
 @dataclass(frozen=True)
 class Simulated:
-    """What came of fits to synthetic readings.
+    """Results of fits to synthetic readings.
 
     Attributes
     ----------
     sets : int
-        Fits that converged.
+        Number of fits that converged.
     failed : int
     spread : mapping of str to float
-        Standard deviation of the estimates in SI: half the width that holds 68 % of them.
+        Standard deviation of the estimates in SI: half the width of the central 68 %.
     uncertainty : mapping of str to float
         Standard error of that spread, by bootstrap.
     decided : float or None
@@ -84,7 +84,7 @@ class DesignedPoint:
         V, epsilon (as applied), frequency, and other axes of the plan, in SI.
     readings : int
     time : float or None
-        Of all its readings (s), settling included; None where the budget is a number of readings.
+        Time of all readings (s), including settling; None if the budget is a number of readings.
     predicted : mapping of str to (float, float)
         Expected reading of each observable, and its standard uncertainty.
     """
@@ -103,11 +103,12 @@ class ExpectedError:
     ----------
     name, unit : str
     value : float
-        Expected value, for which the design is made.
+        Expected value, at which the design is optimised.
     se : float
-        With the readings of the design; infinite if they do not determine the parameter.
+        Standard error by the readings of the design; infinite if they do not determine the
+        parameter.
     se_grid : float
-        With the even grid of the same budget.
+        Standard error by the even grid of the same budget.
     """
 
     name: str
@@ -126,36 +127,36 @@ class Design:
     plan : DesignPlan
     points : tuple of DesignedPoint
     readings, spent : float
-        Number of readings, and what they cost, in readings or s.
+        Number of readings, and their cost, in readings or s.
     efficiency : float
-        Information of the optimal shares over that of the best possible design, at least: by the
-        general equivalence theorem.
+        Lower bound of the information of the optimal shares over that of the best possible design,
+        by the general equivalence theorem.
     efficiency_whole : float
-        The same of the whole readings.
+        The same for whole readings.
     parameters : mapping of str to ExpectedError
     correlation : array, shape (n, n)
-        Of the coordinates of the free parameters.
+        Correlation of the coordinates of the free parameters.
     fewer : float
-        How many times fewer readings than an even grid give the same interval, or chi-squared;
-        NaN where a fit of the rival has not reached a minimum.
+        Readings of an even grid over those of this design, for the same interval or chi-squared;
+        NaN if a fit of the rival has not reached a minimum.
     grid_levels : tuple of int
         Levels of the even grid along each axis of the plan.
     grid_usable : (int, int)
-        Points of the grid that are candidates, and all.
+        Number of points of the grid that are candidates, and of all its points.
     candidates, combinations : int
-        Usable points, and all combinations of the plan.
+        Number of usable points, and of all combinations of the plan.
     left_out : mapping of str to int
-        Reasons why combinations are no candidates, with their number.
+        Number of combinations that are no candidates, by reason.
     alone : mapping of str to tuple of (float, int, float)
-        For each level of an axis: its value, the candidates that have it, and how many times the
-        readings of this design are needed if all have that level, the others chosen best. Of
-        designs that measure parameters.
+        For designs that measure parameters, and for each level of an axis: its value, the number of
+        candidates with this level, and the factor by which the readings increase if all points
+        have this level, with the other axes chosen best.
     chi2, chi2_grid : float or None
-        Expected chi-squared by which the refitted rival is behind.
+        Expected excess of chi-squared of the refitted rival.
     probability, probability_grid : float or None
-        Of excluding the rival; None where its fit has not reached a minimum.
+        Probability of excluding the rival; None if its fit has not reached a minimum.
     rival_values : mapping of str to float or None
-        Parameters with which the rival comes nearest to the design's readings.
+        Parameters of the rival's best fit to the readings of the design.
     simulation : Simulated or None
     warnings : tuple of str
     """
@@ -184,7 +185,7 @@ class Design:
     warnings: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
-        """Everything as plain numbers and texts, for JSON; numbers that are infinite are None."""
+        """The design as plain numbers and texts, for JSON; infinite numbers are None."""
         plan = self.plan
         result: dict[str, Any] = {
             "law": plan.truth.law.name,
@@ -261,8 +262,8 @@ class Design:
         """The points as rows of a table that ``asperity response --table`` reads.
 
         Columns: law, all parameters in SI, `readings`, `predicted_NAME` of each observable and
-        `NAME_err`, the standard uncertainty of one reading. `epsilon` is as applied: with eps_ratio
-        other than 1 the contacts carry eps_ratio times it.
+        `NAME_err`, the standard uncertainty of one reading. `epsilon` is the applied amplitude; the
+        contacts carry eps_ratio times this amplitude.
         """
         truth = self.plan.truth
         constants = {**truth.fixed, **expected_values(truth)}
@@ -278,15 +279,16 @@ class Design:
         return rows
 
 
-#: Efficiency below which the shares are not called optimal.
+#: If the efficiency is lower, a warning says that the shares may not be optimal.
 _TRUSTED = 0.95
-#: Candidates per free parameter below which the ranges decide the design.
+#: With fewer candidates per free parameter, the ranges decide the design.
 _FEW = 3
-#: A simulated spread surprises if it differs by more of its own standard errors, plus this share
-#: of the expected one.
+#: A warning is given if the simulated spread differs from the expected one by more than this many
+#: standard errors of the spread, plus this share of the expected spread.
 _SURPRISING, _LINEAR = 3.0, 0.1
-#: Mean chi-squared of a reading below which two laws give the same readings. Of the pairs of eight
-#: laws at numbers of PMMA, those of which one contains the other have 1e-27, all others 1 or more.
+#: Two laws give the same readings if the mean chi-squared of a reading is lower. Among pairs of
+#: eight laws with numbers of PMMA it is 1e-27 if one law contains the other, and at least 1
+#: otherwise.
 _SAME = 1e-12
 
 
@@ -301,11 +303,11 @@ def design(
     Parameters
     ----------
     plan : DesignPlan, path of a plan file, or its content
-        Numbers of a content are SI, texts carry their unit.
+        In a content, numbers are SI and texts have units.
     simulate : int
         Number of synthetic sets of readings that are fitted to check the expected errors.
     progress : callable, optional
-        Called with the work done, all work, and what it is.
+        Called with the work done, all work, and a label of the work.
 
     Returns
     -------
@@ -314,12 +316,12 @@ def design(
     Raises
     ------
     InputError
-        If the plan is wrong, or no operating point of it can be used.
+        If the plan is wrong, or none of its operating points can be used.
 
     Notes
     -----
-    Local design: the information is that at the expected values of the parameters, averaged over
-    draws about them if the plan has `draws` (the mean of the logarithm of the determinant).
+    Local design: the information is evaluated at the expected values of the parameters. If the plan
+    has `draws`, the logarithm of the determinant is averaged over draws about these values.
     """
     if isinstance(plan, str | Path):
         plan = read_plan(plan)
@@ -394,7 +396,7 @@ class _Task:
     def _alone(
         self, criterion: Determinant, value: float
     ) -> dict[str, tuple[tuple[float, int, float], ...]]:
-        """What each setting gives by itself, the others chosen best."""
+        """For each level of each axis, the increase of readings if all points have this level."""
         result: dict[str, tuple[tuple[float, int, float], ...]] = {}
         for axis, values in self.plan.axes.items():
             if values.size == 1:
@@ -462,7 +464,7 @@ class _Task:
         numbers["warnings"] = warnings
         whole = result.criterion.least_efficiency(result.chi2_shares - best.chi2, best.chi2)
         shares, other = result.shares, (fits, best.u)
-        if probable is None:  # the bound is of a minimum
+        if probable is None:  # the bound holds only at a minimum
             shares = replace(shares, efficiency=0.0)
         least = shares.efficiency * whole
         return self._described(result.readings, shares, least, simulate, numbers, other)
@@ -479,7 +481,7 @@ class _Task:
             at = predicted(plan, plan.truth, some, values, labelled(self.report, label))
             readings = expected_readings(plan, some, at.whole)
             jacobian = differences(plan.truth, readings, at, values)[1]
-            # A point that slides unsteadily tells nothing.
+            # A point without steady sliding has no information.
             information = np.zeros((len(points["V"]), *self.prior.shape))
             information[rows] = fisher_information(jacobian)
             parts.append(information)
@@ -575,9 +577,9 @@ class _Task:
         )
 
     def _simulated(self, n: Float, sets: int, rival: tuple[RivalFit, Float] | None) -> Simulated:
-        """Fits of synthetic readings, each set with its own noise and priors about the values.
+        """Fits of synthetic readings; noise and priors are drawn anew for each set.
 
-        Nothing is linear here but the start.
+        Only the start of each fit is from the linear prediction.
         """
         plan, random = self.plan, np.random.default_rng(self.plan.question.seed)
         counts, readings = n[n > 0], self.expected.without(n <= 0)
@@ -613,7 +615,7 @@ class _Task:
 
 
 def _with_drawn_prior(unknown: Unknown, random: np.random.Generator) -> Unknown:
-    """The prior as another measurement of the expected value would have given it."""
+    """The prior with a mean drawn about the expected value, as from another measurement."""
     if unknown.prior is None:
         return unknown
     mean = unknown.middle + unknown.prior.sd * random.normal()
@@ -623,7 +625,7 @@ def _with_drawn_prior(unknown: Unknown, random: np.random.Generator) -> Unknown:
 def _refitted(
     objective: Objective, readings: LockInTable, counts: Float, u: Float
 ) -> Minimum | None:
-    """The minimum for other readings at the same points; None where it was not reached."""
+    """The minimum for other readings at the same points; None if it was not reached."""
     (term,) = objective.terms_of(LockInTerm)
     other = term.with_table(readings).weighted(np.sqrt(counts))
     objective = replace(objective, terms=(other,))
@@ -632,7 +634,7 @@ def _refitted(
 
 
 def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
-    """Half the width of the central 68 %, which outliers do not inflate, and its standard error."""
+    """Half the width of the central 68 %, robust against outliers, and its standard error."""
     if x.size < 3:
         return float("nan"), float("nan")
     copies = np.vstack([x, random.choice(x, size=(200, x.size))])
@@ -642,7 +644,7 @@ def _spread(x: Float, random: np.random.Generator) -> tuple[float, float]:
 
 
 def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
-    """Where the simulated fits differ from what was expected."""
+    """Sentences on simulated fits that differ from the expected errors."""
     warnings = []
     if simulation.failed:
         warnings.append(

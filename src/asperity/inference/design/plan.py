@@ -33,7 +33,7 @@ from asperity.questions.design import MOST, Design, Noise, Range
 from asperity.questions.record import require_unit as with_unit, units_required
 from asperity.units import to_radians, to_si
 
-#: Ranges of these are divided by equal factors unless the plan says otherwise.
+#: By default the ranges of these axes are divided by equal factors.
 _LOGARITHMIC = ("V", "frequency")
 
 
@@ -62,20 +62,20 @@ class DesignPlan:
     Attributes
     ----------
     name : str
-        What messages call the plan.
+        Name of the plan in messages.
     question : asperity.questions.design.Design
-        Aim, budget, draws, seed, and what counts in the equation of motion.
+        Aim, budget, draws, seed, and whether inertia and radiation damping count.
     axes : mapping of str to array, shape (n,)
         Values in SI of V, epsilon (as applied), frequency, and parameters of the machine.
     noise : mapping of str to NoiseLevel
-        By observable: what is measured.
+        Noise of each measured observable.
     truth : Objective
         The law that the readings are expected to follow, without data. Its unknowns start at the
-        values that the design is made for.
+        expected values.
     rival : Objective or None
-        The law to be excluded; None where parameters are to be measured.
+        The law to be excluded; None if parameters are to be measured.
     uncertainty : mapping of str to float
-        Standard deviation of the free parameters over which is averaged, in SI.
+        Standard deviation of free parameters for the draws, in SI.
     """
 
     name: str
@@ -88,29 +88,29 @@ class DesignPlan:
 
     @property
     def motion(self) -> dict[str, bool]:
-        """What counts in the equation of motion."""
+        """Whether inertia and radiation damping count, as arguments of a response."""
         return {n: getattr(self.question, n) for n in ("inertia", "radiation_damping")}
 
     @property
     def budget(self) -> float:
-        """What may be spent: a number of readings, or a time (s)."""
+        """The budget: a number of readings, or a time (s)."""
         return float(self.question.points or self.question.time or 0.0)
 
     def cost(self, V: Float) -> Float:
-        """What one reading costs at each velocity: 1, or settling_slip/V + integration (s)."""
+        """Cost of one reading at each velocity: 1, or settling_slip/V + integration (s)."""
         q = self.question
         if q.points is not None:
             return np.ones_like(V)
         return np.asarray((q.settling_slip or 0.0) / V + (q.integration or 0.0))
 
     def candidates(self) -> dict[str, Float]:
-        """Every combination of the levels, by name of the axis, the last axis fastest."""
+        """All combinations of the levels, by name of the axis; the last axis varies fastest."""
         grid = np.meshgrid(*self.axes.values(), indexing="ij")
         return {name: levels.ravel() for name, levels in zip(self.axes, grid, strict=True)}
 
 
 def expected_values(hypothesis: Objective) -> dict[str, float]:
-    """Values of the free parameters that a design is made for, in SI."""
+    """Expected values of the free parameters, in SI."""
     return {u.name: u.middle for u in hypothesis.unknowns}
 
 
@@ -124,12 +124,12 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
     Raises
     ------
     InputError
-        If the file cannot be read or anything in it is wrong.
+        If the file cannot be read, or a field is wrong.
     """
     file, content = toml_content(path, "plan")
     for key in ("law", "rival"):
         place = content.get(key)
-        # A law in a file of its own stands beside the plan.
+        # A law that is defined in a file is searched in the folder of the plan.
         if isinstance(place, str) and ".py:" in place:
             content[key] = str(file.parent / place)
     try:
@@ -141,21 +141,21 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
 def plan_of(
     content: Mapping[str, Any] | Design, *, name: str = "plan", require_unit: bool = False
 ) -> DesignPlan:
-    """A plan from the content of a file, the same as a dictionary, or a question.
+    """A plan from the content of a file as a dictionary, or from a question.
 
     Parameters
     ----------
     content : mapping or Design
         Keys as in docs/design.md.
     name : str
-        What the design calls the plan.
+        Name of the plan in messages and in the design.
     require_unit : bool
-        Refuse numbers without a unit, as files do; else they are SI.
+        Whether to refuse numbers without a unit, as in files; otherwise they are SI.
 
     Raises
     ------
     InputError
-        If anything is wrong.
+        If a field is wrong.
     """
     with units_required() if require_unit else contextlib.nullcontext():
         question = content if isinstance(content, Design) else Design(**content)
@@ -167,7 +167,7 @@ def _checked(question: Design, name: str) -> DesignPlan:
     material = None if question.material is None else load_material(question.material)
     known = _known(law)
     axes = _axes(question, {n: p for n, p in known.items() if p.place != "law"})
-    # The ends of all axes, as rows that stand for the candidates.
+    # A table with the ends of all axes stands for the candidates.
     ends = {n: np.array([levels.min(), levels.max()]) for n, levels in axes.items()}
     table = LockInTable(name, ends, {}, {})
     truth = _hypothesis(question, law, law, question.free, material, table)
@@ -232,7 +232,7 @@ def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> di
 
 
 def _axes(question: Design, known: Mapping[str, Parameter]) -> dict[str, Float]:
-    """The ranges, in the order of the plan."""
+    """Levels of each range, in the order of the plan."""
     axes = {}
     for name, given in question.ranges.items():
         if name not in known or name == EPS_RATIO.name:
@@ -246,7 +246,7 @@ def _axes(question: Design, known: Mapping[str, Parameter]) -> dict[str, Float]:
 
 
 def _levels(name: str, given: Range, parameter: Parameter) -> Float:
-    """Values of one axis in SI: listed ones, or divisions of a range."""
+    """Values of one axis in SI: a list, or divisions of a range."""
     label = f"plan.ranges.{name}"
     if given.values is not None:
         levels = np.array([_quantity(v, parameter, label) for v in given.values])
@@ -301,8 +301,8 @@ def _hypothesis(
 ) -> Objective:
     """A law with its free and fixed parameters, without data.
 
-    `first` is the law of the plan, whose values are those of the plan, and `table` stands for the
-    candidates.
+    `first` says whether this is the law of the plan, which has the values of the plan. `table`
+    stands for the candidates.
     """
     known = _known(law)
     every = {**known, **_known(first)}

@@ -1,10 +1,10 @@
 """Points that exclude a law: chi-squared of the rival, refitted, is as large as it can be.
 
-With the rival's predictions made linear at its last fit, the optimal shares are a concave problem.
-The rival is then refitted at these shares, and the shares are accepted as far as its chi-squared
-really grows. The general equivalence theorem at the last fit bounds what a better design could
-reach (Atkinson and Fedorov, 1975), whatever the way to it. How probably the readings exclude the
-rival follows from the linear predictions of both laws.
+The rival's predictions are linearised at its last fit; the optimal shares are then a concave
+problem. The rival is refitted at these shares, and a step towards them is accepted if the
+chi-squared of the refitted rival grows. The general equivalence theorem at the last fit bounds the
+gain of any better design (Atkinson and Fedorov, 1975). The probability that the readings exclude
+the rival follows from the linear predictions of both laws.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import LockInTable
 
 _ROUNDS = 15
-#: Efficiency at which the search ends.
+#: The search ends at this efficiency.
 _ENOUGH = 0.99
-#: Parts of the way to the proposed shares that are tried.
+#: Fractions of the step to the proposed shares that are tried.
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 _NEGLIGIBLE = 1e-4
-#: Rounds of exchanges of whole readings, each at the rival's last fit.
+#: Rounds of exchanges of whole readings, with a refit of the rival after each round.
 _EXCHANGES = 4
-#: Synthetic sets of readings, linear in the parameters, for the probability of deciding.
+#: Synthetic sets of readings, by linear predictions, for the probability of deciding.
 _DRAWS = 20_000
-#: Decrease of chi-squared that is left at the end of a fit that has not reached a minimum.
+#: A fit has reached a minimum if chi-squared can decrease by less than this.
 _LEFT = 0.01
 
 
 class Separation(NamedTuple):
-    """Shares of the budget, the whole readings, and the rival that comes nearest to them.
+    """Shares of the budget, the whole readings, and the best fit of the rival to them.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Separation(NamedTuple):
     fitted : Minimum
         The rival refitted to the expected whole readings.
     chi2_shares : float
-        Of the rival refitted to the shares.
+        Chi-squared of the rival refitted to the shares.
     criterion : Misfit
-        At that fit.
+        Criterion at the fit `fitted`.
     unseen : int
-        Candidates at which the rival had no response in the end, so that they were not judged.
+        Number of candidates that were left out because the rival has no response at its last fit.
     """
 
     shares: Shares
@@ -72,7 +72,7 @@ class RivalFit:
     rival : Objective
     points : mapping of str to array, shape (candidates,)
     expected : LockInTable
-        Readings at all candidates by the other law.
+        Readings at all candidates, predicted by the law of the plan.
     """
 
     def __init__(
@@ -99,14 +99,14 @@ class RivalFit:
         return reached(self.to(n), end.u)
 
     def criterion(self, u: Float, n: Float) -> tuple[Misfit, Bool]:
-        """Misfit linear at a fit u to n readings, and the candidates at which there is a response.
+        """The criterion linearised at a fit u to n readings, and which candidates have a response.
 
-        A coordinate that is held at its bound does not move.
+        A coordinate that its bound stops stays constant.
         """
         values = self.rival.named(u)
         at = predicted(self.plan, self.rival, self.points, values)
         residual, jacobian = differences(self.rival, self.expected, at, values)
-        # A point without a response is not judged: it tells nothing.
+        # A point without a response has no information.
         residual = np.where(at.seen[:, None], residual, 0.0)
         prior, prior_slopes = self.rival.prior_residuals(u)
         slope = np.einsum("i,im,imp->p", n, residual, jacobian) + prior @ prior_slopes
@@ -123,7 +123,7 @@ def separation(
     ----------
     fits : RivalFit
     cost : array, shape (candidates,)
-        Of a reading.
+        Cost of a reading.
     total : float
         Budget.
     progress : callable
@@ -166,7 +166,7 @@ def separation(
 
 
 def reached(objective: Objective, u: Float) -> bool:
-    """Whether u is a minimum, and not at the edge of where the law has responses."""
+    """Whether u is a minimum, and not at the edge of the region in which the law has responses."""
     return math.isfinite(objective.chi2(u)) and objective.expected_decrease(u) < _LEFT
 
 
@@ -184,9 +184,9 @@ def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, see
     Parameters
     ----------
     jacobian : array, shape (candidates, m, p)
-        Of the true law, in standard uncertainties of a reading.
+        Jacobian of the true law, in standard uncertainties of a reading.
     rival : Misfit
-        At its fit to the expected readings.
+        Criterion at the rival's fit to the expected readings.
     readings : array, shape (candidates,)
     seed : int
     """
@@ -208,14 +208,14 @@ def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, see
 
 
 def penalty(parameters: int, data: float) -> float:
-    """What AICc adds to the deviance; infinite where the data are too few."""
+    """The term that AICc adds to the deviance; infinite if there are too few data."""
     if data <= parameters + 1:
         return np.inf
     return 2 * parameters + 2 * parameters * (parameters + 1) / (data - parameters - 1)
 
 
 def _outside(jacobian: Float, vectors: Float) -> Float:
-    """Square of what a fit leaves of each vector."""
+    """Squared norm of the part of each vector outside the columns of the Jacobian."""
     u, s, _ = np.linalg.svd(jacobian, full_matrices=False)
     basis = u[:, s > 1e-12 * max(float(s.max(initial=0.0)), 1e-300)]
     inside = vectors @ basis

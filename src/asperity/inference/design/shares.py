@@ -1,19 +1,18 @@
 """Optimal shares of the budget: criteria of a design, and the shares that maximise them.
 
-A criterion is a concave function of the information that the readings add up to.
-
-A design is a measure n over candidates: the number of readings of each, whole or not. Readings are
-independent, so that the information matrix is the sum of n_i M_i, plus that of priors.
+A design gives each candidate a number of readings n_i, which need not be whole. Readings are
+independent: the information matrix is the sum of n_i M_i, plus that of priors. A criterion is a
+concave function of this matrix.
 
 `Determinant` measures parameters (D_s-optimality: the determinant of their covariance matrix, the
-others estimated beside them). `Misfit` excludes a law (T-optimality: the smallest chi-squared that
+others being estimated too). `Misfit` excludes a law (T-optimality: the smallest chi-squared that
 the rival can reach; Atkinson and Fedorov, Biometrika 62, 57, 1975).
 
-Shares: the budget is a unit of readings or of time, each candidate's share is what is spent on it.
-The candidate of the largest derivative joins the support, the shares on the support are optimised,
-and so on, until the general equivalence theorem (Kiefer and Wolfowitz, 1960) says that no design
-is better by more than the tolerance: a concave criterion exceeds its value at a design by at most
-the largest derivative less the mean derivative of the design. Whole readings follow from them.
+The share of a candidate is the part of the budget, in readings or time, that is spent on it. The
+candidates with the largest derivatives join the support, and the shares on the support are
+optimised. This is repeated until the general equivalence theorem (Kiefer and Wolfowitz, 1960) shows
+that no design is better by more than the tolerance: the largest derivative less the mean derivative
+of the design bounds the gain of a concave criterion. Whole readings are derived from the shares.
 
 Designs are compared with an even grid of the same budget.
 """
@@ -31,7 +30,7 @@ from scipy.optimize import brentq, minimize
 
 from asperity.arrays import Float, Index
 
-#: Added to the diagonal of an information matrix, relative to its scale, so that it has an inverse.
+#: Relative addition to the diagonal of an information matrix, which makes it invertible.
 _RIDGE = 1e-11
 
 
@@ -45,7 +44,7 @@ class Determinant:
     prior : array, shape (draws, p, p)
         Information of priors.
     interest : sequence of int
-        The parameters to be measured; all of them for D-optimality.
+        Indices of the parameters to be measured; all indices for D-optimality.
     """
 
     def __init__(self, information: Float, prior: Float, interest: Sequence[int]) -> None:
@@ -68,7 +67,7 @@ class Determinant:
         return np.asarray(summed + self.prior + self._ridge)
 
     def value(self, n: Float) -> float:
-        """Mean over the draws."""
+        """The criterion: mean over the draws."""
         return float(self._log_ratio(self.total(n)).mean())
 
     def _log_ratio(self, total: Float) -> Float:
@@ -80,7 +79,7 @@ class Determinant:
         return np.asarray(whole - np.linalg.slogdet(block)[1])
 
     def gradient(self, n: Float) -> Float:
-        """Tr(M^-1 M_i) less the same of the other parameters' block, averaged over the draws."""
+        """Tr(M^-1 M_i) less the same for the block of the other parameters, mean over the draws."""
         total = self.total(n)
         weight = np.linalg.inv(total)
         if self.others:
@@ -95,11 +94,11 @@ class Determinant:
         return self._log_ratio(total).mean(0)
 
     def least_efficiency(self, gap: float, value: float) -> float:
-        """Of the s-th root of the determinant, which is inverse to a variance."""
+        """Lower bound of the efficiency, by the s-th root of the determinant: inverse variance."""
         return float(np.exp(-max(gap, 0.0) / len(self.interest)))
 
     def restricted(self, rows: Index) -> Determinant:
-        """The same for some of the candidates."""
+        """The criterion for some of the candidates."""
         part = Determinant(self.information[:, rows], self.prior, self.interest)
         part._ridge = self._ridge
         return part
@@ -114,9 +113,9 @@ class Misfit:
         Rival's prediction less the expected reading, in standard uncertainties, at some values of
         the rival's parameters.
     jacobian : array, shape (candidates, m, p)
-        Its derivatives there.
+        Derivatives of the residual at these values.
     prior_residual : array, shape (q,)
-        Of the rival's priors.
+        Residuals of the rival's priors.
     prior_jacobian : array, shape (q, p)
     """
 
@@ -172,11 +171,11 @@ class Misfit:
         return np.asarray(square + self._square - np.einsum("ip,ip->i", slopes, steps))
 
     def least_efficiency(self, gap: float, value: float) -> float:
-        """Of chi-squared."""
+        """Lower bound of the efficiency, by chi-squared."""
         return float(value / (value + max(gap, 0.0))) if 0 < value < math.inf else 0.0
 
     def restricted(self, rows: Index) -> Misfit:
-        """The same for some of the candidates."""
+        """The criterion for some of the candidates."""
         part = Misfit(
             self.residual[rows], self.jacobian[rows], self.prior_residual, self.prior_jacobian
         )
@@ -191,9 +190,9 @@ Criterion = Determinant | Misfit
 #: Largest part of the information of the best design that may be missing.
 _TOLERANCE = 1e-3
 _ROUNDS = 200
-#: Shares below this are none.
+#: Smaller shares are set to zero.
 _NEGLIGIBLE = 1e-5
-#: Candidates that join the support at once.
+#: Number of candidates that join the support in one round.
 _JOINING = 3
 _MULTIPLICATIVE_STEPS = 20
 #: Sweeps of exchanges of whole readings.
@@ -207,9 +206,9 @@ class Shares:
     Attributes
     ----------
     shares : array, shape (candidates,)
-        Sum 1.
+        Shares, with the sum 1.
     efficiency : float
-        Share of the information of the best design that is reached at least.
+        Lower bound of the information over that of the best design.
     """
 
     shares: Float
@@ -240,7 +239,7 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
         if efficiency >= 1 - _TOLERANCE:
             break
         if not reduced:
-            # The best candidates of the even start; the rest comes back if it is needed.
+            # Start from the best candidates of the even shares; others can join the support later.
             few = min(criterion.size, 60)
             support = np.union1d(
                 np.argsort(-slope)[:few], np.flatnonzero(shares > 2 / criterion.size)
@@ -260,7 +259,7 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
 
 def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     """Optimal shares of a few candidates."""
-    # Multiplicative steps always improve a little; the quadratic method finishes.
+    # Multiplicative steps always improve slowly; the quadratic method then converges quickly.
     shares = start
     for _ in range(_MULTIPLICATIVE_STEPS):
         shares = _multiplied(criterion, readings, shares)
@@ -294,9 +293,9 @@ def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Floa
     ----------
     criterion : Criterion
     cost : array, shape (candidates,)
-        Of a reading.
+        Cost of a reading.
     total : float
-        What may be spent.
+        Budget.
     shares : array, shape (candidates,)
     """
     n = np.floor(shares * total / cost + 1e-9)
@@ -322,7 +321,7 @@ def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Floa
 
 
 def _filled(criterion: Criterion, cost: Float, total: float, n: Float) -> Float:
-    """Readings added one by one, each where it gains most for its cost, until none fits."""
+    """Add readings one by one, each with the largest gain per cost, until the budget is spent."""
     n = n.copy()
     while True:
         left = total - float(n @ cost)
@@ -344,7 +343,7 @@ class EvenGrid:
     rows : int array
         Candidates on the grid.
     size : int
-        Points of the grid, those that are no candidates included.
+        Number of points of the grid, including points that are no candidates.
     """
 
     levels: tuple[int, ...]
@@ -384,7 +383,7 @@ def even_grid(shape: tuple[int, ...], index: Index, cost: Float, total: float) -
         if not rows.size:
             continue
         spent = float(cost[rows].sum())
-        # Nearest in budget; of those, the one with the most equal numbers of levels.
+        # Nearest to the budget; among equal grids, the one with the most even numbers of levels.
         rank = (round(abs(np.log(spent / total)), 1), float(np.std(np.log(levels))))
         if best is None or rank < best[0]:
             grid = EvenGrid(tuple(len(p) for p in picks), rows, int(np.prod(levels)))
@@ -394,7 +393,7 @@ def even_grid(shape: tuple[int, ...], index: Index, cost: Float, total: float) -
 
 
 def times_fewer(criterion: Criterion, readings: Float, target: float) -> float:
-    """How many times as many some readings must be for a value of the criterion.
+    """The factor by which readings must be multiplied to reach a value of the criterion.
 
     Parameters
     ----------

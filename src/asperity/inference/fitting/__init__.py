@@ -1,1 +1,1 @@
-"""Maximum likelihood: starts, minima, intervals and what a fit says of itself."""
+"""Maximum likelihood: starts, minima, intervals, and the description of a fit."""

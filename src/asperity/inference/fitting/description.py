@@ -1,4 +1,4 @@
-"""Description of a fit: intervals, what the data do not determine, and warnings."""
+"""Description of a fit: intervals, parameters that the data do not determine, and warnings."""
 
 from __future__ import annotations
 
@@ -32,25 +32,26 @@ from asperity.units import quantity_text
 
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 RIVAL = 9.0
-#: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
-#: between which intervals of the normal approximation are taken: a quarter too wide or too narrow.
-_TRIED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
-#: Correlation from which a parameter's interval follows that of another.
+#: Chi-squared is compared with its parabola at this many standard deviations. The normal
+#: approximation is used if the rise lies between these two: intervals are then wrong by less than a
+#: quarter.
+_COMPARED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
+#: From this correlation on, the interval of a parameter depends on that of the other.
 _TOGETHER = 0.3
-#: Coordinates, in factors of e, that are known better than this are not tried.
+#: Coordinates with a smaller standard deviation (factors of e) are not compared with the parabola.
 _PRECISE = 0.1
-#: Decrease of chi-squared along a profile that is another minimum.
+#: A profile that falls by more than this below the minimum has reached another minimum.
 _LOWER = 0.01
-#: Evaluations without an orbit after which a profile among searched orbits that was not requested
-#: ends: an end of an interval at the edge takes ten, a valley along the edge hundreds.
+#: A profile that was not requested ends after this many evaluations without an orbit: an end of an
+#: interval at the edge takes ten such evaluations, a valley along the edge hundreds.
 _MOST_UNSOLVED = 80
-#: Minima this near, in standard errors of everything but nuisances, give the same answer.
+#: Minima closer than this, in standard errors of all parameters but nuisances, are the same answer.
 _NEAR = 0.5
-#: Standard deviations between data and a prior from which a warning says so.
+#: A warning is given if data and a prior differ by more standard deviations than this.
 _CONTRADICTED = 3.0
-#: Relative change of the coordinates that ends a fit with rows left out, and its evaluations.
-_REFITTED, _EVALUATIONS = 1e-6, 20
-#: A bound is reached if the estimate is nearer to it than this share of its standard error.
+#: Tolerance (relative change of the coordinates) of a fit with rows left out, and its evaluations.
+_REFIT_TOLERANCE, _EVALUATIONS = 1e-6, 20
+#: An estimate closer to a bound than this share of its standard error is at the bound.
 _AT_BOUND = 1e-3
 
 
@@ -80,25 +81,25 @@ def described_fit(
     minima : sequence of (array, float)
         Coordinates and chi-squared, best first.
     profile : bool
-        Intervals by profile likelihood.
+        Whether to compute intervals by profile likelihood.
     described : callable, optional
-        Called with the number of parameters whose intervals are known so far.
+        Called with the number of parameters that have intervals so far.
     """
-    # Those that differ in the order of exchangeable parameters are one.
+    # Minima that differ only in the order of exchangeable parameters are the same.
     minima = [(objective.ordered(u), value) for u, value in minima]
     at = parabola_of(objective, *minima[0])
     if at is None:
-        # It lies at the edge of the region in which there are orbits, and was not reached again.
+        # The minimum lies at the edge of the region with orbits, and was not reached again.
         if not minima[1:]:
             return failed_fit(objective)
         result = described_fit(objective, minima[1:], profile=profile, described=described)
         lost = (
             f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
-            "periodic orbits, and was not found again: this is the next one; leave out the rows "
-            "of the slowest modulation and compare"
+            "periodic orbits, and was not reached again: this is the next minimum; leave out the "
+            "rows of the slowest modulation and compare"
         )
         return replace(result, warnings=(lost, *result.warnings))
-    # A search would not improve intervals under a law that the data contradict.
+    # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
     if not objective.noise_is_known and (open_ended := _open_ended(objective, at, bent)):
@@ -113,7 +114,7 @@ def described_fit(
         along = None
         if i in profiled:
             searching = profile or unknown.name not in at.undetermined
-            # The valley is the same for all.
+            # All parameters share the same valley.
             most = math.inf if profile else -1 if at_edge else _MOST_UNSOLVED
             along = Profile(objective, i, at.u, at.chi2, at.covariance, search=searching, most=most)
         try:
@@ -123,25 +124,25 @@ def described_fit(
             whole = unknown.name in odd
             ends = [unknown.bounds] * len(LEVELS) if whole else _ends(objective, at, i, None)
         if along is not None and along.lowest[1] < at.chi2 - _LOWER:
-            # The search has missed a minimum: begin again there.
+            # The search has missed a minimum: describe the fit again from this minimum.
             missed = objective.minimise(along.lowest[0])
             return described_fit(objective, [missed, *minima], profile=profile, described=described)
         estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
         if described is not None:
             described(i + 1)
-    said = _contradicted(objective, at)
+    warnings = _contradicted(objective, at)
     if at.stopped:
-        said.append(
+        warnings.append(
             "chi-squared still falls where the law has no periodic orbit at some operating point: "
             "the estimate is the last before, and intervals are by profile likelihood or the whole "
             "range; leave those rows out or doubt the law"
         )
     if at_edge:
-        said.append(_not_profiled(at_edge, odd))
+        warnings.append(_not_profiled(at_edge, odd))
     if bent:
         names = [objective.names[i] for i in sorted(profiled)]
         also = [n for n in names if n not in (*bent, *at_edge)]
-        said.append(
+        warnings.append(
             f"chi-squared is no parabola in {enumerated(bent)}: "
             + (
                 f"intervals of {enumerated([*bent, *also])} are by profile likelihood"
@@ -152,11 +153,11 @@ def described_fit(
                 f"likelihood ({Argument('profile')}) take minutes for a recording"
             )
         )
-    return _with_warnings(_fit_with(objective, at, estimates, rivals), said)
+    return _with_warnings(_fit_with(objective, at, estimates, rivals), warnings)
 
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
-    """A sentence on intervals whose profile likelihood runs along the edge of the orbits."""
+    """A sentence on intervals whose profile runs along the edge of the region with orbits."""
     whole = enumerated([n for n in names if n in odd])
     normal = enumerated([n for n in names if n not in odd])
     ends = [
@@ -175,14 +176,14 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
 def _ends(
     objective: Objective, at: Parabola, i: int, along: Profile | None
 ) -> list[tuple[float, float]]:
-    """Ends of the intervals of a coordinate, one for each level.
+    """Intervals of a coordinate, one for each level.
 
-    Those along a profile stop at the first that leads to a lower minimum.
+    Intervals by a profile stop at the first that leads to a lower minimum.
     """
     low, high = objective.unknowns[i].bounds
     ends = []
     for level in LEVELS:
-        # By how much estimated noise widens an interval under known noise.
+        # Factor by which estimated noise widens an interval.
         wider = float(stdtrit(at.freedom[i], (1 + level) / 2) / ndtri((1 + level) / 2))
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
@@ -198,9 +199,9 @@ def _ends(
 
 
 def _normal(unknown: Unknown, at: Parabola, i: int, sd: float, level: float) -> Interval:
-    """An interval of the normal approximation, which holds the estimate.
+    """An interval of the normal approximation, which contains the estimate.
 
-    Where it leaves the range in which the parameter is looked for, the data do not bound it.
+    If an end lies outside the search range of the parameter, the data do not bound this side.
     """
     low, high = unknown.bounds
     u = float(at.u[i])
@@ -219,12 +220,12 @@ def _estimate(
     ends: Sequence[tuple[float, float]],
     rivals: Sequence[tuple[Float, float]],
 ) -> Estimate:
-    """A parameter with its intervals, which hold what other minima leave."""
+    """A parameter with its intervals, widened by other minima."""
     unknown = objective.unknowns[i]
     low, high = unknown.bounds
     above = [(v, value - at.chi2) for v, value in rivals]
     whole = [
-        _hull(objective, i, interval, above, level)
+        _widened_by_minima(objective, i, interval, above, level)
         for interval, level in zip(ends, LEVELS, strict=True)
     ]
     narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in whole)
@@ -274,7 +275,7 @@ def _fit_with(
 
 
 def _bounded(estimate: Estimate) -> bool:
-    """Whether the data bound a parameter, by an interval that holds its estimate."""
+    """Whether the 95 % interval of a parameter is bounded and contains its estimate."""
     low, high = estimate.interval_95
     return low <= estimate.value <= high and (low > 0 or low < 0 or math.isfinite(high))
 
@@ -284,8 +285,8 @@ def _profiled(
 ) -> set[int]:
     """Coordinates whose intervals are by profile likelihood.
 
-    All on request; otherwise those for which the normal approximation fails, and those correlated
-    with them. Objectives with recordings take minutes for it: only on request.
+    All coordinates on request. Otherwise those for which the normal approximation fails, and those
+    correlated with them; but none with recordings, which would take minutes.
     """
     if everything:
         return set(range(len(objective.unknowns)))
@@ -300,28 +301,28 @@ def _profiled(
 def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     """Sentences on priors that the data contradict.
 
-    A prior's residual r at the maximum has the variance 1 - j C j^T, with its derivative j and
-    the covariance C of the coordinates.
+    The residual of a prior at the maximum has the variance 1 - j C j^T, where j is its derivative
+    and C the covariance of the coordinates.
     """
     values, slopes = objective.prior_residuals(at.u)
     with_prior = [k for k in objective.unknowns if k.prior is not None]
-    said = []
+    warnings = []
     for unknown, r, j in zip(with_prior, values, slopes, strict=True):
         prior = unknown.prior
         assert prior is not None  # by the choice of unknowns
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
-            said.append(
+            warnings.append(
                 f"the prior of {unknown.name}, {prior.mean:.4g} +- {prior.sd:.2g} "
                 f"{unknown.parameter.unit}".rstrip()
                 + f", is contradicted by the data by {apart:.3g} standard deviations: one of them "
                 "is wrong, and the other parameters follow it; fit without it and compare"
             )
-    return said
+    return warnings
 
 
 def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
-    """chi-squared and number of data of each observable, over all terms."""
+    """Chi-squared and number of data of each observable, over all terms."""
     values = np.concatenate([d.values for d in data])
     names = np.concatenate([d.observable for d in data])
     return {
@@ -331,10 +332,10 @@ def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
 
 
 def _bent(objective: Objective, at: Parabola) -> list[str]:
-    """Parameters whose interval the normal approximation does not give.
+    """Parameters for which the normal approximation fails.
 
-    Along each, at two standard deviations and with the others following, chi-squared should have
-    risen by four.
+    Two standard deviations away in a coordinate, with the other coordinates following, chi-squared
+    should rise by four.
     """
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
     sd = at.sd
@@ -343,13 +344,13 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
         if unknown.nuisance or at.missing[i] or not _PRECISE < sd[i] <= UNDETERMINED:
             continue
         for sign in (-1, 1):
-            point = at.u + sign * _TRIED_AT * at.covariance[:, i] / sd[i]
+            point = at.u + sign * _COMPARED_AT * at.covariance[:, i] / sd[i]
             if (point <= low).any() or (point >= high).any():
                 continue  # an interval next to a bound
             rise = objective.chi2(point) - at.chi2
             if rise > _HIGHEST_RISE:
-                # The valley may bend, and be as wide as it should be nevertheless.
-                rise = _lowered(objective, point, i) - at.chi2
+                # A valley that bends may still have the right width.
+                rise = _gauss_newton_step(objective, point, i) - at.chi2
             if not _LOWEST_RISE <= rise <= _HIGHEST_RISE:
                 result.append(unknown.name)
                 break
@@ -357,11 +358,11 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
 
 
 def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list[str]:
-    """Parameters among `bent` that the data leave open on one side, and those that follow them.
+    """Parameters in `bent` that the data do not bound on one side, and parameters that follow them.
 
-    A transient longer than its recording is a trend, of any D0 and of B in proportion: where
-    chi-squared, minimised at two factors of e from the estimate, has not risen by what 95 %
-    allow, the estimate is one of many, and so are those of the others that changed as much there.
+    A transient longer than its recording is a trend, which many pairs of D0 and B explain. A
+    parameter is unbounded if chi-squared, minimised at a value that differs by two factors of e,
+    stays within the 95 % limit. Parameters that change as much along the way are unbounded too.
     """
     result = []
     best = objective.named(at.u)
@@ -369,27 +370,27 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
         i = objective.names.index(name)
         for sign in (-1, 1):
             x = float(
-                np.clip(at.u[i] + sign * _TRIED_AT * UNDETERMINED, *objective.unknowns[i].bounds)
+                np.clip(at.u[i] + sign * _COMPARED_AT * UNDETERMINED, *objective.unknowns[i].bounds)
             )
             there = objective.minimise(at.u, {i: x}, tolerance=1e-4)
-            if there.chi2 - at.chi2 < _TRIED_AT**2:
+            if there.chi2 - at.chi2 < _COMPARED_AT**2:
                 values = objective.named(there.u)
                 changed = [
                     k.name
                     for k in objective.unknowns
-                    if not k.nuisance and _apart(values[k.name], best[k.name])
+                    if not k.nuisance and _differs(values[k.name], best[k.name])
                 ]
                 result += [name, *changed]
     return list(dict.fromkeys(result))
 
 
-def _apart(value: float, other: float) -> bool:
+def _differs(value: float, other: float) -> bool:
     """Whether two values differ by more than a factor of e, or in their sign."""
     return abs(value - other) > (1 - math.exp(-UNDETERMINED)) * max(abs(value), abs(other))
 
 
-def _lowered(objective: Objective, u: Float, i: int) -> float:
-    """chi-squared after a step of Gauss and Newton from u that leaves coordinate i as it is."""
+def _gauss_newton_step(objective: Objective, u: Float, i: int) -> float:
+    """Chi-squared after a Gauss-Newton step from u that keeps coordinate i."""
     r, J = objective.residuals(u)
     if not np.isfinite(r).all():
         return math.inf
@@ -404,27 +405,27 @@ def _lowered(objective: Objective, u: Float, i: int) -> float:
 def _rivals(
     objective: Objective, minima: Sequence[tuple[Float, float]], sd: Float
 ) -> list[tuple[Float, float]]:
-    """Other minima that the data do not exclude and that would be other answers."""
+    """Other minima that the data do not exclude and that differ in the parameters of interest."""
     asked = np.array([not k.nuisance for k in objective.unknowns])
     kept = [minima[0]]
     for u, chi2 in minima[1:]:
         if chi2 - minima[0][1] > RIVAL:
             continue
-        # Those that differ in nuisances alone, such as the times of steps, are one answer.
+        # Minima that differ only in nuisances, such as the times of steps, are the same answer.
         away = [(np.abs(u - v)[asked] / sd[asked]).max(initial=0.0) for v, _ in kept]
         if min(away) >= _NEAR:
             kept.append((u, chi2))
     return kept[1:]
 
 
-def _hull(
+def _widened_by_minima(
     objective: Objective,
     i: int,
     interval: tuple[float, float],
     rivals: Sequence[tuple[Float, float]],
     level: float,
 ) -> tuple[float, float]:
-    """An interval widened by what other minima leave below the threshold of chi-squared.
+    """An interval widened by other minima that stay below the threshold of chi-squared.
 
     Parameters
     ----------
@@ -444,12 +445,12 @@ def _hull(
     return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
 
-def _with_warnings(fit: Fit, said: list[str]) -> Fit:
-    """The fit with its warnings, those in `said` first."""
+def _with_warnings(fit: Fit, warnings: list[str]) -> Fit:
+    """The fit with its warnings, added to those in `warnings`."""
     if fit.dof > 0 and fit.p_value < MISFIT:
         sums = fit.observables.items()
         worst, _ = max(sums, key=lambda pair: (pair[1][0] - pair[1][1]) / math.sqrt(2 * pair[1][1]))
-        said.append(
+        warnings.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom (p = "
             f"{fit.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
@@ -459,13 +460,13 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
         and FAR_OFF < fit.p_value < DOUBTFUL
         and any(term.searches for term in fit.objective.terms)
     ):
-        said.append(
+        warnings.append(
             f"orbits of this table are searched for, and with p = {fit.p_value:.2g} a better "
             "minimum may lie where the search, which is a short one, found none at some row: fit "
             "again from other start values, and without the slowest modulations"
         )
     if fit.dof > 5 and fit.p_value > 1 - MISFIT / 10:
-        said.append(
+        warnings.append(
             f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
@@ -474,28 +475,30 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     information = np.sum([J.T @ J for J in slopes], axis=0)
     outliers = _outliers(fit)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
-        said += term.warnings(residuals, information, outliers)
+        warnings += term.warnings(residuals, information, outliers)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
-    said += because.values()
+    warnings += because.values()
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
-            said.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
+            warnings.append(
+                f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}"
+            )
     for other in fit.optima:
         at = ", ".join(
             f"{n} {quantity_text(other.values[n], p.unit)}" for n, p in fit.parameters.items()
         )
-        said.append(
+        warnings.append(
             f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(fit, warnings=tuple(said), because=because, outliers=outliers)
+    return replace(fit, warnings=tuple(warnings), because=because, outliers=outliers)
 
 
 def _outliers(fit: Fit) -> tuple[int, ...]:
-    """Rows of the table without which the law describes it.
+    """Outliers: rows without which the law describes the table.
 
-    Beside recordings, of which a fit takes minutes, predictions count as linear.
+    In a fit together with recordings, which takes minutes, predictions are linearised.
     """
     objective = fit.objective
     tables = fit.parts(LockInTerm)
@@ -520,7 +523,7 @@ def _outliers(fit: Fit) -> tuple[int, ...]:
     def refit(weights: Float) -> Residuals | None:
         nonlocal u
         weighted = replace(objective, terms=(term.weighted(weights),))
-        u, _ = weighted.minimise(u, tolerance=_REFITTED, evaluations=_EVALUATIONS)
+        u, _ = weighted.minimise(u, tolerance=_REFIT_TOLERANCE, evaluations=_EVALUATIONS)
         return whole(u)
 
     now = whole(u)
@@ -536,10 +539,10 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     if partners:
         return (
             f"{name} is not determined by these data together with {enumerated(partners)}: they "
-            "change the predictions in the same way; fix one, give a prior, or measure what tells "
-            "them apart"
+            "change the predictions in the same way; fix one of them, give a prior, or measure at "
+            "points that distinguish them"
         )
     return (
         f"{name} is not determined by these data; fix it or give a prior: the intervals of the "
-        "other parameters hold only for values of it near this one"
+        "other parameters hold only for values near the present one"
     )

@@ -1,7 +1,7 @@
 """Fit of a friction law to data: maximum likelihood from several starts.
 
 The likelihood is normal: each residual of a `DataTerm` has unit variance. The minimum of
-chi-squared is found by `scipy.optimize.least_squares` with the exact Jacobian.
+chi-squared is computed by `scipy.optimize.least_squares` with the exact Jacobian.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
-from asperity.inference.cycles.cycle import AveragedCycle, CycleTerm
+from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
+from asperity.inference.fitting.estimated_noise import under_drift, with_noise
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
@@ -28,7 +29,6 @@ from asperity.inference.fitting.inputs import (
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
-from asperity.inference.fitting.own_noise import under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -36,7 +36,7 @@ from asperity.inference.fitting.plausibility import (
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
-from asperity.inference.holds.table import HealingTable, HoldTerm, joined_holds
+from asperity.inference.holds import HealingTable, HoldTerm, joined_holds
 from asperity.inference.objective import DataTerm, Minimum, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,
@@ -66,9 +66,9 @@ from asperity.parameters import MACHINE, law_parameters
 from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 
-#: Searches for samples that the motion does not explain: a motion without them explains others.
+#: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
-#: The level of sliding (dimensionless; m/s), for data that are counted from it.
+#: Assumed mu0 (dimensionless) and V0 (m/s) for data that are measured relative to sliding.
 _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 
 Data = LockInTable | HealingTable | AveragedCycle | RecordedRun | Trace
@@ -100,45 +100,47 @@ def fit(
     Parameters
     ----------
     data : LockInTable, HealingTable, AveragedCycle, RecordedRun or Trace, or several
-        All in one likelihood; tables of holds, and averaged cycles, go with their like alone.
+        Data for one likelihood. Tables of holds, and averaged cycles, cannot be combined with other
+        kinds of data.
     law : str or type of Law
         Rate-dependent.
     free : sequence of str, optional
-        Free parameters: the law's, K, W0, M, eta, and eps_ratio = eps_eff/eps. By default all
-        numbers of the law that the data may show and that are not fixed, those of a material too,
-        and eps_ratio where there are lock-in readings. The stiffness of a recording is free whether
-        it is named or not, for each run by itself unless it is named. The gain of its gauge,
-        ``gain``, is free where it has a prior.
+        Free parameters: those of the law, K, W0, M, eta, and eps_ratio = eps_eff/eps. By default
+        all parameters of the law that the data may determine and that are not fixed, even if a
+        material has them, and eps_ratio for lock-in readings. The stiffness of a recording is
+        always free: one K for all recordings if it is named, otherwise one for each. The gain of
+        the gauge, ``gain``, is free if it has a prior.
     fixed : mapping, optional
-        Values of other parameters, in SI or as texts with units; before columns of the data, which
-        come before the material.
+        Values of other parameters, in SI or as texts with units. They take precedence over columns
+        of the data, and these over the material.
     material : Material, optional
-        Fixes what is neither free nor given otherwise, and gives a start.
+        Values of parameters that are neither free nor given otherwise, and start values.
     prior : Material or mapping of str to Prior, optional
-        Normal priors of free parameters: published uncertainties of a material, or your own.
+        Normal priors of free parameters: published uncertainties of a material, or any others.
     start : mapping of str to float, optional
-        Start values in SI; further starts are drawn.
+        Start values in SI; further starts are random.
     inertia, radiation_damping : bool
-        Whether M and eta count.
+        Whether the mass M and the damping eta count.
     runs : RunOptions, optional
-        How recordings are compared with the motion.
+        Options of the comparison of recordings with the motion.
     profile : bool
-        Intervals by profile likelihood rather than by the normal approximation.
+        Whether to compute intervals by profile likelihood rather than the normal approximation.
     bare : bool
-        Whether `free` may be empty with tables: the law is compared with them as it stands.
+        Whether `free` may be empty with tables: the law is then compared with them without a fit.
     starts : int
-        Starts that are drawn and evaluated in addition to the given one; the best are followed.
+        Number of random starts that are evaluated in addition to the given one. Minimisations begin
+        at the best of them.
     seed : int
-        Of the starts.
+        Seed of the starts.
     simpler : sequence of Fit
-        Fits of other laws to the same data; those of special cases of this law, such as Rice-Ruina
-        of the elasto-plastic one, are starts too.
+        Fits of other laws to the same data. Fits of special cases of this law are starts too:
+        Rice-Ruina is a special case of the elasto-plastic law.
     check_stiffness : bool
-        Whether a table that the law does not describe is fitted again with K free, and a warning
-        says where the law describes it then. Recordings always are where K is fixed or shared.
+        Whether to fit a table that the law does not describe again with K free; a warning says at
+        which K the law describes it. Recordings with a fixed or shared K are always fitted again.
     progress : callable, optional
-        Called with the number of steps done so far, and of all: a minimisation from each start that
-        is followed, then the interval of each parameter. A fit with K free comes after them.
+        Called with the number of steps done so far and of all steps: the minimisations, then the
+        intervals of all parameters. A fit with K free follows.
 
     Returns
     -------
@@ -148,7 +150,7 @@ def fit(
     ------
     InputError
         If a name or value is wrong, numbers are missing, there are fewer data than parameters, or
-        a parameter cannot be seen in the data.
+        the data do not depend on a parameter.
     """
     chosen = get_law(law) if isinstance(law, str) else law
     if not chosen.rate_dependent:
@@ -190,7 +192,7 @@ def fit(
     def minima_under(
         objective: Objective, recordings: Sequence[RecordedRun]
     ) -> tuple[list[Minimum], bool]:
-        # Minima of a long recording are looked for in fewer, longer blocks.
+        # Minima of a long recording are searched with fewer, longer blocks.
         searched = compared(coarse) if (coarse := coarser(recordings)) else objective
         if recordings:
             searched = under_drift(searched)
@@ -243,9 +245,9 @@ def fit(
 def _without_wrong_samples(
     objective: Objective, u: Float, recordings: Sequence[RecordedRun]
 ) -> list[RecordedRun]:
-    """Recordings without the samples that the motion at u and its noise do not explain.
+    """Recordings without wrong samples: those that neither the motion at u nor noise explains.
 
-    Those of which the user has named the spikes stay as they are.
+    Recordings whose spikes the user has named are unchanged.
     """
     values, terms = objective.named(u), objective.terms_of(RunTerm)
     return [
@@ -255,7 +257,7 @@ def _without_wrong_samples(
 
 
 class _Given(NamedTuple):
-    """Numbers that the caller gives, as of `fit`."""
+    """Numbers of the caller; fields as the arguments of `fit`."""
 
     fixed: Mapping[str, Any]
     material: Material | None
@@ -276,14 +278,14 @@ def _hold_objective(
     *,
     bare: bool,
 ) -> Objective:
-    """The function to minimise for a table of holds, everything wrong refused."""
+    """The function to minimise for a table of holds; all inputs are checked."""
     numbers = law_parameters(law)
     for name in free:
         holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
         require(holds, "free", f"be parameters of {law.name} with holds", f"'{name}'", advice)
     priors = given.priors(free)
     require_free(law, free, priors, bare=bare)
-    # Healing is counted from the level of sliding: the level itself does not enter.
+    # Healing is measured relative to sliding, so that mu0 has no influence.
     assumed = {n: v for n, v in _OF_THE_LEVEL.items() if n in numbers and n not in free}
     material = given.material
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
@@ -303,7 +305,7 @@ def _cycle_objective(
     free: Sequence[str] | None,
     given: _Given,
 ) -> Objective:
-    """The function to minimise for averaged cycles, everything wrong refused."""
+    """The function to minimise for averaged cycles; all inputs are checked."""
     first, numbers = cycles[0], law_parameters(law)
     # The level of friction is fitted in each cycle.
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "W0")}
@@ -343,7 +345,7 @@ def _cycle_objective(
 
 
 def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
-    """Minima under errors that a fit tells: of holds without any, and of a measured epsilon."""
+    """Minima with errors that depend on a fit: of holds without errors, and of epsilon."""
     values = objective.named(minima[0].u)
     for hold in objective.terms_of(HoldTerm):
         hold.estimate_error(values, len(objective.unknowns))
@@ -356,20 +358,20 @@ def _with_estimated_errors(objective: Objective, minima: list[Minimum]) -> list[
 
 
 class _Steps:
-    """Progress of a fit: minimisations, then parameters whose intervals are known."""
+    """Progress of a fit: minimisations, then parameters with intervals."""
 
     def __init__(self, progress: Callable[[int, int], None] | None, parameters: int) -> None:
         self._report = progress or (lambda done, total: None)
         self._parameters, self._done, self._total = parameters, 0, parameters
 
     def minimised(self, done: int, total: int) -> None:
-        # A fit begins again without samples that its motion does not explain.
+        # A fit without wrong samples begins again: progress must not decrease.
         self._done = max(self._done, done)
         self._total = max(self._total, total + self._parameters)
         self._report(self._done, self._total)
 
     def described(self, parameters: int) -> None:
-        # Where another minimum is found on the way, the first ones are described again.
+        # If a profile reaches another minimum, all parameters are described again.
         self._done = max(self._done, self._total - self._parameters + parameters)
         self._report(self._done, self._total)
 
@@ -378,7 +380,7 @@ class _Steps:
 
 
 def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
-    """Where a fit with a stiffness for each recording begins: at one with it fixed or shared."""
+    """Start of a fit with a stiffness for each recording: a fit with a fixed or shared one."""
     laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
     several = len(recordings) > 1
     return laws | {
@@ -392,7 +394,7 @@ def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[s
 def listed_data(
     data: Data | Iterable[Data], options: RunOptions
 ) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
-    """One set of data or several as a list, recordings made ready."""
+    """Data as a list, with recordings as `RecordedRun`."""
     of_its_own = LockInTable | HealingTable | AveragedCycle
     several = [data] if isinstance(data, of_its_own | RecordedRun | Trace) else list(data)
     ready = [d if isinstance(d, of_its_own) else run_of(d) for d in several]
@@ -412,7 +414,7 @@ def _objective(
     motion: Mapping[str, bool],
     bare: bool,
 ) -> Objective:
-    """The function to minimise, with everything that can be refused before computing refused."""
+    """The function to minimise; all inputs are checked before anything is computed."""
     require_motion(free, motion)
     fixed, material = given.fixed, given.material
     if recordings:
@@ -438,7 +440,7 @@ def _objective(
             mu0_given=published or "mu0" in (*free, *fixed) or table is not None,
             beside_table=table is not None,
         )
-        # It is freed by its prior.
+        # Its prior makes it free.
         named = [name for name in named if name.partition("[")[0] != GAIN]
     largest = 0.0 if table is None else float(table.points["epsilon"].max())
     usual = usual_ranges(recordings) if recordings else {}

@@ -1,4 +1,4 @@
-"""Numbers of a fit that are given: start values, fixed parameters, and whether data suffice."""
+"""Inputs of a fit: start values, fixed parameters, priors, and checks that the data suffice."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import Argument, InputError, MistakesError, require
-from asperity.inference.cycles.cycle import AveragedCycle
-from asperity.inference.holds.table import HealingTable
+from asperity.inference.cycles import AveragedCycle
+from asperity.inference.holds import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
@@ -51,21 +51,21 @@ def free_by_default(
     fixed: Mapping[str, Any] | None,
     material: Material | None,
 ) -> list[str]:
-    """Free parameters by default: all numbers of a law that the data may show.
+    """Default free parameters: all parameters of a law that the data may determine.
 
     Parameters
     ----------
     law : type of Law
     data : sequence of LockInTable, HealingTable, AveragedCycle or RecordedRun
-        The stiffness of a recording is free in any case.
+        Data of the fit. The stiffness of a recording is always free, and not in the result.
     fixed : mapping, optional
     material : Material, optional
-        Its mu0 stands where no mean friction is reported.
+        Source of mu0 if the data have no mean friction.
 
     Returns
     -------
     list of str
-        Parameters of the law, and for a table the share of the modulation, ``eps_ratio``.
+        Parameters of the law, and ``eps_ratio`` for a table.
     """
     tables = [d for d in data if isinstance(d, LockInTable)]
     runs = [d for d in data if isinstance(d, RecordedRun)]
@@ -73,7 +73,7 @@ def free_by_default(
     constant_load = table is None and not any(run.load_varies for run in runs)
     known = {*(fixed or {}), *({} if table is None else table.points)}
     if table is None or ("mean_friction" not in table.values and material and "mu0" in material):
-        # The offset of a recording takes its place.
+        # The offset of a recording replaces mu0.
         known.add("mu0")
     names = [name for name in law_parameters(law) if name not in REFERENCES]
     if table is not None:
@@ -105,7 +105,7 @@ def start_values(
     for name, value in (start or {}).items():
         rule, advice = "be of free parameters", "free it or leave it out"
         require(name in free or (name.startswith("K") and runs), "start", rule, f"'{name}'", advice)
-        # A stiffness is read with the run that it belongs to.
+        # A stiffness of a recording is converted with its run, which has the unit.
         known[name] = value if name.startswith("K") else float(_checked(law, "start", name, value))
     return known
 
@@ -113,7 +113,7 @@ def start_values(
 def of_the_table(
     start: Mapping[str, Any], priors: Mapping[str, Prior], constants: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Prior]]:
-    """Start and prior of K in N/m, also where they are given over the load.
+    """Start and prior of K in N/m, converted if they are given over the load.
 
     Raises
     ------
@@ -149,16 +149,16 @@ def fixed_values(
 ) -> dict[str, Any]:
     """Values of all parameters that are not free, by name in SI.
 
-    Without a table, what only its operating points need is left out, and runs give their load,
-    their friction at the begin as mu0, and their first velocity as V0. Where mu0 is free, V0 is 1
-    um/s if it is not given: the velocity at which mu0 is reported.
+    Without a table, parameters of operating points are left out, and the runs supply load, mu0 (the
+    first friction) and V0 (the first velocity). If mu0 is free and V0 is not given, V0 is 1 um/s:
+    the velocity at which mu0 is reported.
 
     Raises
     ------
     InputError
         If a name or value is wrong, or a number is missing.
     """
-    # The gain of a gauge is freed by its prior, which is asked for elsewhere.
+    # The prior of a gain makes it free; `require_calibrated` checks the prior.
     require_fittable(law, [n for n in free if n.partition("[")[0] != GAIN])
     known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
     points: Mapping[str, Any] = {} if table is None else table.points
@@ -219,7 +219,7 @@ def fixed_values(
 
 
 def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
-    """A value in SI; a text has its unit."""
+    """A value in SI, checked by the rule of its parameter; a text has a unit."""
     known = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
     try:
         return known[name].check(value)
@@ -230,7 +230,7 @@ def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
 def require_free(
     law: type[Law], free: Sequence[str], priors: Mapping[str, Prior], *, bare: bool
 ) -> None:
-    """Refuse a fit to tables without free parameters unless asked for, and priors of others.
+    """Refuse a fit to tables without free parameters unless `bare`, and priors of fixed parameters.
 
     Raises
     ------
@@ -254,7 +254,7 @@ def require_motion(
     motion : mapping of str to bool
         ``inertia`` and ``radiation_damping``.
     label : str
-        What the message calls `free`.
+        Name of `free` in messages.
     plan : bool
         Whether the switches are those of a plan file.
 
@@ -274,10 +274,10 @@ def require_motion(
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
-    """Refuse no more data than free parameters; one datum for one parameter is an inversion.
+    """Refuse a table unless it has more data than free parameters; one each is an inversion.
 
-    As many data as parameters have a valley of minima where some of the parameters are not seen,
-    and nothing is left to judge the law by.
+    With equally many data and parameters, the minima form a valley if some parameters have no
+    influence, and no degree of freedom is left to judge the law.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
 
 
 def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
-    """The same for a number of data."""
+    """Refuse `count` data unless they are more than the free parameters."""
     needed = sum(1 for u in unknowns if u.prior is None)
     rule, advice = (
         "hold more data than free parameters",
@@ -306,9 +306,9 @@ def priors_of(
     Parameters
     ----------
     given : mapping of str to NormalPrior or None
-        By parameter; a material, with None, stands for its published uncertainties.
+        Priors by parameter; the name of a material with None means its published uncertainties.
     free : sequence of str or None
-        Parameters that the priors of a material are meant for.
+        Parameters that get the priors of a material.
 
     Raises
     ------
@@ -344,7 +344,7 @@ def priors_of(
 
 
 def _of_some_kind(parameter: Parameter, value: float | str, label: str) -> tuple[float, str]:
-    """SI value and SI unit; K may be of a stress or of a pure number over a length."""
+    """SI value and SI unit; K may be a force, a stress or a pure number over a length."""
     others = ["stress_per_length", "per_length"] if parameter.name == "K" else []
     if isinstance(value, str):
         for kind in others:

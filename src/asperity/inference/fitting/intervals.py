@@ -1,8 +1,8 @@
 """Confidence intervals: by the parabola about a minimum, at a bound, and by profile likelihood.
 
-Near a bound the interval of the likelihood ratio with the usual thresholds covers too often or too
-rarely. The thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) hold the coverage, and
-turn from a two-sided interval to an upper limit by themselves.
+Near a bound, intervals by the usual thresholds of the likelihood ratio have the wrong coverage. The
+thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) have the right coverage, and lead
+from a two-sided interval to an upper limit without a decision by the user.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Interval = tuple[float, float]
 
 #: Coverage of the intervals of a fit: one standard deviation of a normal estimate, and 95 %.
 LEVELS = (math.erf(1 / math.sqrt(2)), 0.95)
-#: Standard deviations from a bound beyond which it has no influence.
+#: Standard deviations beyond which a bound has no influence.
 _FAR = 8.0
 
 
@@ -31,7 +31,7 @@ def bounded_threshold(distance: float, level: float) -> float:
     Parameters
     ----------
     distance : float
-        Of the tested value from the bound, in standard deviations.
+        Distance of the tested value from the bound, in standard deviations.
     level : float
         Coverage, in (0, 1).
 
@@ -44,7 +44,7 @@ def bounded_threshold(distance: float, level: float) -> float:
     if distance > _FAR:
         return far
     if distance <= 0:
-        # Every negative estimate has the ratio 0 there; half of all estimates.
+        # At the bound every negative estimate, half of all estimates, has the ratio 0.
         return float(ndtri(1 - level)) ** 2 if level > 0.5 else 0.0
 
     def covered(threshold: float) -> float:
@@ -65,14 +65,14 @@ def bounded_interval(
     Parameters
     ----------
     estimate : float
-        The unbounded one; it may lie beyond a bound.
+        The estimate without bounds; it may lie beyond a bound.
     sd : float
         Standard deviation of the estimate.
     level : float
         Coverage.
     lower, upper : float
-        Bounds; infinite where there is none. Treated one by one; where there is no room for
-        the interval between them it is the whole range.
+        Bounds; infinite if there is none. Each bound is treated alone; if both are closer than the
+        width of the interval, the interval is the whole range.
 
     Returns
     -------
@@ -83,15 +83,16 @@ def bounded_interval(
         return lower, upper
     low, high = estimate - root * sd, estimate + root * sd
     if (estimate - lower) < _FAR * sd:
-        low, high = _above(estimate, sd, level, lower)
+        low, high = _interval_above(estimate, sd, level, lower)
     if (upper - estimate) < _FAR * sd:
-        mirrored = _above(-estimate, sd, level, -upper)
+        mirrored = _interval_above(-estimate, sd, level, -upper)
         high = -mirrored[0]
         low = max(low, -mirrored[1]) if (estimate - lower) < _FAR * sd else -mirrored[1]
     return max(low, lower), min(high, upper)
 
 
-def _above(estimate: float, sd: float, level: float, bound: float) -> Interval:
+def _interval_above(estimate: float, sd: float, level: float, bound: float) -> Interval:
+    """Interval of a normal estimate with a lower bound."""
     x = (estimate - bound) / sd
 
     def inside(mu: float) -> float:
@@ -105,43 +106,45 @@ def _above(estimate: float, sd: float, level: float, bound: float) -> Interval:
     return bound + sd * low, bound + sd * high
 
 
-#: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
+#: A logarithmic coordinate with a larger standard deviation (a factor of e) is not determined.
 UNDETERMINED = 1.0
-#: A delay that is nearer to its bound, as a share of its range, is there.
+#: A delay that is closer to its bound than this share of its range is at the bound.
 _AT_BOUND = 1e-3
-#: Standard deviations from a bound within which a gradient towards it is held by the bound.
+#: A coordinate closer to a bound than this many standard deviations is stopped by the bound.
 _NEAR_BOUND = 0.1
-#: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
+#: If chi-squared can still decrease by more (a third of a standard error), the minimum is none.
 _STOPPED = 0.1
 
 
 @dataclass(frozen=True)
 class Parabola:
-    """Chi-squared about a minimum.
+    """The quadratic approximation of chi-squared about a minimum.
 
     Attributes
     ----------
     u : array, shape (n,)
         Coordinates of the minimum.
     chi2 : float
+        Chi-squared at the minimum.
     data : tuple of Residuals
-        Of each term.
+        Residuals of each term.
     covariance : array, shape (n, n)
-        Of the coordinates, under noise that is known.
+        Covariance of the coordinates if the noise is known.
     missing : bool array, shape (n,)
-        Coordinates that nothing bounds.
+        Coordinates on which neither data nor priors have any information.
     total : array, shape (n, n)
-        The covariance with what noise adds that is estimated from the same data.
+        Covariance of the coordinates, including the uncertainty of noise that is estimated from
+        the same data.
     freedom : array, shape (n,)
-        Degrees of freedom of its diagonal.
+        Degrees of freedom of the diagonal of `total`.
     unbounded : array, shape (n,)
-        Minimum of the parabola without the bounds that hold coordinates of the minimum.
+        Minimum of the parabola without the bounds that stop coordinates.
     undetermined : tuple of str
-        Parameters of which the data say nothing.
+        Parameters that the data do not determine.
     stopped : bool
-        Whether chi-squared still falls where the law has no orbit.
+        Whether chi-squared still falls towards values at which the law has no orbit.
     fitted, priors : int
-        Numbers that were fitted, those of the noise included, and of priors.
+        Number of fitted parameters, including those of the noise, and number of priors.
     """
 
     u: Float
@@ -164,7 +167,7 @@ class Parabola:
 
     @property
     def se(self) -> Float:
-        """Their standard errors, with what estimated noise adds."""
+        """Standard errors of the coordinates, including the uncertainty of estimated noise."""
         return np.asarray(np.sqrt(np.diag(self.total)))
 
     @property
@@ -184,17 +187,17 @@ class Parabola:
 
 
 def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
-    """The parabola at a minimum; None where the law has no solution after all."""
+    """The parabola at a minimum; None if the law has no solution at the minimum."""
     r, J = objective.residuals(u)
     data = objective.data_residuals(u)
     if data is None:
         return None
-    # A delay at its bound, as the pieces of the drive leave no room, counts as known.
-    J = np.where(_held(objective, u), 0.0, J)
+    # A delay at its bound, which the segments of the drive set, counts as known.
+    J = np.where(_known_at_bound(objective, u), 0.0, J)
     covariance, missing = inverse_information(J.T @ J)
     total, freedom = _with_estimated_noise(objective, u, covariance, missing)
     of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
-    # What is known of the instrument belongs to the data.
+    # Priors of nuisance parameters describe the instrument, and count as data.
     prior_slopes = objective.prior_residuals(u)[1]
     with_prior = [v for v in objective.unknowns if v.prior is not None]
     nuisance = [v.nuisance for v in with_prior]
@@ -213,7 +216,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         missing=missing,
         total=total,
         freedom=freedom,
-        unbounded=u - covariance @ _pressure(objective, u, covariance, J.T @ r),
+        unbounded=u - covariance @ _gradient_at_bounds(objective, u, covariance, J.T @ r),
         undetermined=undetermined,
         stopped=objective.noise_is_known and objective.expected_decrease(u) > _STOPPED,
         fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
@@ -221,10 +224,10 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     )
 
 
-def _held(objective: Objective, u: Float) -> Bool:
-    """Delays and offsets at a bound, which others do not follow beyond it.
+def _known_at_bound(objective: Objective, u: Float) -> Bool:
+    """Delays and offsets at a bound: other parameters do not depend on a value beyond the bound.
 
-    A stiffness at its bound is none: the data bound it on the other side.
+    A stiffness at its bound is not among them, because the data bound it on the other side.
     """
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
     linear = np.array([k.nuisance and not k.logarithmic for k in objective.unknowns], bool)
@@ -232,11 +235,13 @@ def _held(objective: Objective, u: Float) -> Bool:
     return np.asarray(linear & (np.minimum(u - low, high - u) < _AT_BOUND * room))
 
 
-def _pressure(objective: Objective, u: Float, covariance: Float, gradient: Float) -> Float:
-    """The gradient in coordinates that a bound holds, 0 in others.
+def _gradient_at_bounds(
+    objective: Objective, u: Float, covariance: Float, gradient: Float
+) -> Float:
+    """The gradient of coordinates that a bound stops; 0 for all other coordinates.
 
-    There it is zero at a minimum. In a valley that is all but flat a minimisation leaves some,
-    which says nothing about where the minimum is.
+    The gradient of other coordinates is zero at the exact minimum. In a nearly flat valley a
+    minimisation leaves a small gradient, which says nothing about the position of the minimum.
     """
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
     sd = np.sqrt(np.diag(covariance))
@@ -248,7 +253,7 @@ def _pressure(objective: Objective, u: Float, covariance: Float, gradient: Float
 def _with_estimated_noise(
     objective: Objective, u: Float, covariance: Float, missing: Bool
 ) -> tuple[Float, Float]:
-    """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
+    """The covariance including the uncertainty of estimated noise, and its degrees of freedom."""
     known = np.where(missing[:, None] | missing, 0.0, covariance)
     values = objective.named(u)
     slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
@@ -262,10 +267,9 @@ def _with_estimated_noise(
 
 
 def nowhere_negative(added: Float, covariance: Float) -> Float:
-    """What is added to a covariance, without what is negative by rounding.
+    """An addition to a covariance, without eigenvalues that are negative by rounding.
 
-    Where data hardly tell parameters apart, it is the difference of two numbers of many more digits
-    than there are.
+    If the data hardly tell parameters apart, the addition is a small difference of large numbers.
     """
     sd = np.sqrt(np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0))
     values, vectors = np.linalg.eigh(added / np.outer(sd, sd))
@@ -273,7 +277,7 @@ def nowhere_negative(added: Float, covariance: Float) -> Float:
 
 
 def inverse_information(information: Float) -> tuple[Float, Bool]:
-    """Inverse of an information matrix, and which coordinates it leaves without bound."""
+    """Inverse of an information matrix, and a mask of coordinates without information."""
     if not information.size:
         return information, np.zeros(0, bool)
     scale = np.sqrt(np.diag(information))
@@ -287,42 +291,47 @@ def inverse_information(information: Float) -> tuple[Float, Bool]:
     return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
 
 
-#: Steps outwards, each twice as long as the last, before a side counts as without end.
+#: Steps outwards, each twice as long as the last, after which a side counts as unbounded.
 _STEPS = 12
 #: Accuracy of an end, in standard deviations.
 _ACCURACY = 1e-2
 #: Relative change of the other coordinates that ends a minimisation: chi-squared is good to 1e-4.
 _TOLERANCE = 1e-5
-#: Standard deviations below the threshold at which a profile that ends has an edge, not an end.
+#: A profile that ends further below the threshold (standard deviations) was stopped by the method.
 _JUMP = 0.1
-#: Rise of chi-squared between two points of a profile that is no part of a narrow valley, ten
-#: standard deviations, and how often the way there is halved.
+#: If chi-squared rises by more (ten standard deviations) from one point of the profile to the next,
+#: the minimisation has left a narrow valley; the step is then halved up to so many times.
 _LEAP, _HALVINGS = 100.0, 4
 #: Rise of chi-squared that stands for values without a periodic orbit.
 _NO_ORBIT = 1e3
 
 
 class ProfileAtEdgeError(Exception):
-    """A profile runs along the edge of the region in which the data have a prediction."""
+    """A profile runs along the edge of the region in which the law has a solution."""
 
 
 class Profile:
-    """chi-squared along one coordinate, minimised over the others; each point is computed once.
+    """Profile of chi-squared along one coordinate, minimised over all others.
 
     Parameters
     ----------
     objective : Objective
     i : int
-        Which coordinate.
+        Index of the coordinate.
     u, chi2 : array, float
-        The minimum.
+        Coordinates and chi-squared of the minimum.
     covariance : array, shape (n, n)
-        Of the coordinates, by the normal approximation.
+        Covariance of the coordinates, by the normal approximation.
     search : bool
-        Whether orbits are searched for where the fast method ends; without, an interval that gets
-        there is open.
+        Whether to search for orbits where the fast method fails. Without a search, an interval
+        that reaches such values is open.
     most : float
-        Evaluations without a solution, at most, where orbits are searched for.
+        Largest number of evaluations without a solution during the search for orbits.
+
+    Attributes
+    ----------
+    path : dict of float to (array, float)
+        Coordinates and chi-squared of all points so far, by the value of the coordinate.
     """
 
     def __init__(
@@ -339,14 +348,14 @@ class Profile:
         self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
         self.search = search
         self.most = objective.unsolved + most
-        # At most a factor of e in one step: the approximation may fail beyond.
+        # A step is at most a factor of e: the approximation may fail further away.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
 
     @property
     def lowest(self) -> tuple[Float, float]:
-        """Lowest point on the way; below the minimum where that was not the lowest one."""
+        """Lowest point of the profile; lower than the given minimum if a better one exists."""
         return min(self.path.values(), key=lambda point: point[1])
 
     def interval(self, level: float, wider: float = 1.0) -> Interval:
@@ -359,7 +368,7 @@ class Profile:
         level : float
             Coverage.
         wider : float
-            Factor of the interval, for uncertainties that are estimated themselves.
+            Factor of the interval, for noise that is estimated from the data.
 
         Raises
         ------
@@ -370,7 +379,7 @@ class Profile:
         return self._end(level, wider, -1, low), self._end(level, wider, 1, high)
 
     def _end(self, level: float, wider: float, sign: int, bound: float) -> float:
-        """Where the profile passes the threshold on one side."""
+        """The value at which the profile crosses the threshold on one side."""
 
         def excess(x: float) -> float:
             return self._excess(x, level, wider)
@@ -388,7 +397,7 @@ class Profile:
                 within = [x for x in self.path if sign * (end - x) >= 0]
                 last = max(within, key=lambda x: sign * x)
                 if excess(last) < -_JUMP and not self.objective.searches:
-                    # The fast method has no orbit beyond, which says nothing about the data.
+                    # The fast method fails beyond this value; this is no statement about the data.
                     if not self.search:
                         return sign * math.inf
                     self.objective.use_search(True)
@@ -398,8 +407,8 @@ class Profile:
         return sign * math.inf
 
     def _excess(self, x: float, level: float, wider: float) -> float:
-        """Root of the rise of chi-squared less that of its threshold: nearly linear in x."""
-        if x not in self.path and not self._reached(x, _HALVINGS):
+        """Square root of the rise of chi-squared less that of the threshold: nearly linear in x."""
+        if x not in self.path and not self._minimise_at(x, _HALVINGS):
             return math.sqrt(_NO_ORBIT)
         low, high = self.objective.unknowns[self.i].bounds
         distance = min(x - low, high - x) / (wider * self.sd)
@@ -407,8 +416,8 @@ class Profile:
         rise = max(self.path[x][1] - self.chi2, 0.0)
         return math.sqrt(rise) - math.sqrt(limit)
 
-    def _reached(self, x: float, halvings: int) -> bool:
-        """Whether there is a minimum over the others at x, which is kept."""
+    def _minimise_at(self, x: float, halvings: int) -> bool:
+        """Minimise over all other coordinates at x; whether this succeeded."""
         nearest = min(self.path, key=lambda known: abs(known - x))
         for begin in (self._start(x), self.path[nearest][0]):
             if self.objective.searches and self.objective.unsolved > self.most:
@@ -418,16 +427,16 @@ class Profile:
                 break
         far = not value < self.path[nearest][1] + _LEAP
         if self.objective.curved and halvings and far:
-            # Off a narrow valley a minimisation may end anywhere: the way there is made in parts.
-            if self._reached((x + nearest) / 2, halvings - 1):
-                return self._reached(x, halvings - 1)
+            # Outside a narrow valley a minimisation may end anywhere: go to x in smaller steps.
+            if self._minimise_at((x + nearest) / 2, halvings - 1):
+                return self._minimise_at(x, halvings - 1)
             return False
         if math.isfinite(value):
             self.path[x] = result, value
         return math.isfinite(value)
 
     def _start(self, x: float) -> Float:
-        """The others on the line through the nearest points known, or by the approximation."""
+        """Initial guess at x: on the line through the two nearest points, or by the covariance."""
         first, *others = sorted(self.path, key=lambda known: abs(known - x))
         begin = self.path[first][0]
         second = next((other for other in others if abs(other - first) > _ACCURACY * self.sd), None)

@@ -1,8 +1,8 @@
-"""Search for the minima of an objective: screen a quasi-random draw, follow the best, compare.
+"""Search for the minima of an objective: evaluate random starts, minimise from the best ones.
 
-The starts are a Latin hypercube over the ranges of the unknowns. The best of them are followed by
-least squares. Where orbits are searched for, which takes milliseconds a row, both are done with few
-rows of the table on a coarse mesh, and what is as good as the best goes on with all rows.
+The starts are a Latin hypercube over the ranges of the unknowns. Least squares begins at the best
+of them. If orbits are searched for, which takes milliseconds a row, both steps use few rows of the
+table on a coarse mesh; the minima that may be the best are then continued with all rows.
 """
 
 from __future__ import annotations
@@ -20,40 +20,42 @@ from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 
-#: What minima are ordered by.
+#: Sort key of minima.
 _CHI2 = attrgetter("chi2")
-#: Drawn starts that are minimised in addition to the given one.
-_FOLLOWED = 3
-#: Minima nearer than this in every coordinate are one, and those of the coarse objective.
+#: Random starts from which chi-squared is minimised, in addition to the given start.
+_MINIMISED = 3
+#: Minima that differ by less in every coordinate are the same; the second number is for the coarse
+#: objective.
 _SAME, _SAME_COARSE = 1e-3, 0.02
-#: Share of starts below which orbits are searched for at once: the fast method does not reach a
-#: modulation slower than sliding over the memory length, and would see only wrong minima; starts
-#: that are evaluated then.
+#: If the fast method has a solution at a smaller share of the starts, orbits are searched for at
+#: once, with so many starts: the fast method fails if the modulation is slower than sliding over
+#: the memory length, and would lead to wrong minima only.
 _RARE, _WITH_SEARCH = 1 / 16, 32
-#: Rows on which starts are compared.
+#: Rows with which starts are compared.
 _SCREENED_ROWS = 8
-#: Rows of the coarse objective, which are one chunk of the search for orbits, and data for each
-#: free parameter that they hold at least.
+#: Rows of the coarse objective (one chunk of the search for orbits), and the smallest number of
+#: data for each free parameter in them.
 _ROWS, _DATA_EACH = 24, 3
-#: Relative change of the coordinates that ends the way to a minimum of the coarse objective, or of
-#: a law that is far off; its evaluations, and those after which the best ways are chosen.
-_NEARBY, _EVALUATIONS, _FIRST_EVALUATIONS = 1e-3, 60, 12
-#: Probability of chi-squared below which a law is far off: its exact minimum and intervals change
-#: no verdict.
+#: Tolerance of a minimum of the coarse objective, or of a law that is far off; largest number of
+#: its evaluations, and the number after which the best minimisations are chosen.
+_COARSE_TOLERANCE, _EVALUATIONS, _FIRST_EVALUATIONS = 1e-3, 60, 12
+#: A law is far off if the probability of chi-squared is lower: its exact minimum and intervals
+#: change no verdict.
 FAR_OFF = 1e-12
-#: Probability of chi-squared below which a fit among searched orbits is doubtful.
+#: A fit with searched orbits is doubtful if the probability of chi-squared is lower.
 DOUBTFUL = 0.05
-#: Decrease of chi-squared that is worth the slower method: a tenth of a standard error, or this
-#: share of the chi-squared of a law that is far off.
+#: The slower method is used if chi-squared can decrease by more: a tenth of a standard error, or
+#: this share of chi-squared for a law that is far off.
 GAIN, _LARGE_GAIN = 0.01, 0.1
-#: Minima within this of the lowest chi-squared are followed to their end.
-_WORTH = 50.0
-#: Factors of a memory length at which other minima are looked for, the factor between two lengths
-#: below which they are one minimum, and how many times the limit of chi-squared is hopeless there.
+#: Minimisations within this of the lowest chi-squared are continued to their end.
+_CONTINUED = 50.0
+#: Other minima are searched at these multiples of a memory length. Minima with lengths closer than
+#: the next factor are the same. A start is hopeless at the last multiple of the limit of
+#: chi-squared.
 _OTHER_LENGTHS, _SAME_LENGTH, _HOPELESS = (0.1, 1 / 3, 3.0, 10.0), 1.5, 1e2
-#: Parameters that laws extend others by: without them they are another law.
+#: Parameters by which a law extends another law: with a value of zero they have no influence.
 _EXTENSIONS = ("lambda", "alpha", "c", "B2", "D2")
-#: Their coordinate there.
+#: Coordinate of such a parameter that is nearly zero.
 _NEARLY_ZERO = 1e-4
 
 
@@ -65,22 +67,23 @@ def minima_of(
     drawn: int = 64,
     simpler: Sequence[Mapping[str, float]] = (),
 ) -> list[Minimum]:
-    """Minima from the given start and from the best of many drawn ones, best first.
+    """Minima from the given start and from the best of many random starts, best first.
 
     Parameters
     ----------
     objective : Objective
     seed : int
-        Of the drawn starts.
+        Seed of the random starts.
     progress : callable, optional
-        Called with the number of starts that were followed, and of all to be followed.
+        Called with the number of finished minimisations and of all minimisations.
     drawn : int
+        Number of random starts.
     simpler : sequence of mapping of str to float
-        Values, in SI, of fits of special cases of the law. A law never describes data worse than
-        its special cases: no minimum is higher than these starts.
+        Values, in SI, of fits of special cases of the law. They are starts too, because a law never
+        describes data worse than its special cases.
     """
     if not objective.unknowns:
-        return _as_it_stands(objective)
+        return _without_free_parameters(objective)
     special = _of_special_cases(objective, simpler)
     drawn_starts = _latin_hypercube(objective, seed, drawn)
     chi2 = objective.chi2_of_many(np.array(drawn_starts))
@@ -89,9 +92,9 @@ def minima_of(
         minima = _by_few_rows(objective, drawn_starts, special, progress)
         return _with_other_lengths(objective, minima)
     starts = [*special, *_best(objective, drawn_starts, chi2)]
-    minima = _followed(objective, starts, progress)
+    minima = _minimised_from(objective, starts, progress)
     if minima and _blocked(objective, minima[0]):
-        ends = [end.u for end in distinct(minima)[: _FOLLOWED + 1]]
+        ends = [end.u for end in distinct(minima)[: _MINIMISED + 1]]
         objective.use_search(True)
         beyond = _by_few_rows(objective, drawn_starts, ends, None)
         if beyond and beyond[0].chi2 < minima[0].chi2 - GAIN:
@@ -102,16 +105,16 @@ def minima_of(
 
 
 def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]:
-    """The given start, and drawn ones: every third is one of a special case of the law.
+    """The given start and random starts; every third start is a special case of the law.
 
-    Laws have others as special cases, elasto-plastic Rice-Ruina for lambda = 0: data of the special
-    case have their minimum there, and others away from it.
+    A law may contain another law as a special case: the elasto-plastic law with lambda = 0 is
+    Rice-Ruina. The minimum of some data lies at the special case, that of others far from it.
     """
     unknowns = objective.unknowns
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
     low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
-    # (Sobol's sequence would load the whole of scipy.stats for it.)
+    # A Sobol sequence would load all of scipy.stats.
     generator = np.random.default_rng(seed)
     strata = generator.permuted(np.tile(np.arange(drawn), (len(unknowns), 1)), axis=1)
     shares = (strata + generator.random(strata.shape)).T / max(drawn, 1)
@@ -125,23 +128,23 @@ def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]
 
 
 def _extensions(objective: Objective) -> list[int]:
-    """Coordinates that extend the law, and leave a special case of it where they are zero."""
+    """Coordinates of extending parameters: at zero they leave a special case of the law."""
     names = [None if u.logarithmic else u.name for u in objective.unknowns]
     return [i for i, name in enumerate(names) if name in _EXTENSIONS]
 
 
 def _best(objective: Objective, starts: list[Float], chi2: Float) -> list[Float]:
-    """Starts with a solution: the given one, the best others, and the best of each special case."""
+    """Starts with a solution: the given start, the best others, the best of each special case."""
     order = dict.fromkeys([0, *np.argsort(chi2).tolist()])
     solved = [starts[i] for i in order if math.isfinite(chi2[i])]
-    best, others = solved[: _FOLLOWED + 1], solved[_FOLLOWED + 1 :]
+    best, others = solved[: _MINIMISED + 1], solved[_MINIMISED + 1 :]
     for i in _extensions(objective):
         if all(u[i] != _NEARLY_ZERO for u in best):
             best += [u for u in others if u[i] == _NEARLY_ZERO][:1]
     return best
 
 
-def _followed(
+def _minimised_from(
     objective: Objective,
     starts: Sequence[Float],
     progress: Callable[[int, int], None] | None,
@@ -149,7 +152,7 @@ def _followed(
     tolerance: float | None = None,
     evaluations: int = 100,
 ) -> list[Minimum]:
-    """Minima that are reached from the starts, best first."""
+    """Minima reached from the starts, best first."""
     advance = counted(progress, len(starts))
     advance(0)
     minima = []
@@ -165,29 +168,34 @@ def _by_few_rows(
     known: list[Float],
     progress: Callable[[int, int], None] | None,
 ) -> list[Minimum]:
-    """Minima of the coarse objective, and from there those of all rows, best first.
+    """Minima of all rows, started at minima of the coarse objective, best first.
 
-    None is higher than chi-squared at the `known` starts.
+    No minimum is higher than chi-squared at the `known` starts.
     """
     drawn = drawn[:_WITH_SEARCH]
     coarse = _coarse(objective) or objective
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
-    ends = _followed(coarse, starts, progress, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
-    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]
-    ends = _followed(coarse, apart, None, tolerance=_NEARBY, evaluations=_EVALUATIONS)
+    ends = _minimised_from(
+        coarse, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
+    )
+    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED]]
+    ends = _minimised_from(
+        coarse, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
+    )
     minima = _on_all_rows(objective, ends)
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
     if not minima:
-        # Another row may have no orbit there, or none that the coarse search reaches.
+        # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search
+        # reaches.
         again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
     return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
 
 
 def _coarse(objective: Objective) -> Objective | None:
-    """The objective of a few rows of its table; None for other data."""
+    """The objective with a few rows of its table; None for other data."""
     return objective.thinned(_ROWS, _DATA_EACH * len(objective.unknowns))
 
 
@@ -197,23 +205,23 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
     minima: list[Minimum] = []
     coarser = objective.coarser()
     for end in ends:
-        if minima and end.chi2 > ends[0].chi2 + _WORTH:
+        if minima and end.chi2 > ends[0].chi2 + _CONTINUED:
             break
-        near = coarser.minimise(end.u, tolerance=_NEARBY, evaluations=_EVALUATIONS)
-        tolerance = _NEARBY if _far_off(coarser, near) else None
+        near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        tolerance = _COARSE_TOLERANCE if _far_off(coarser, near) else None
         if not math.isfinite(objective.chi2(near.u)):
-            # Motions do not settle on orbits that are hardly stable; branches lead to them.
+            # Transients do not reach orbits that are hardly stable; continuation does.
             objective.search_wholly(near.u)
         minima.append(objective.minimise(near.u, tolerance=tolerance))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
 
 def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Minimum]:
-    """Minima with those at other memory lengths, of tables that the law does not contradict.
+    """Minima, including those at other memory lengths, for tables that agree with the law.
 
-    Where sliding over D0 takes far longer than a period, or far less, the evolution of friction
-    leaves little but a phase in the readings: values of D0 that differ by a factor of ten, with
-    other A and B, may describe them equally well. Intervals that do not know of it are too short.
+    If sliding over D0 takes far longer than a period, or far less, the evolution of friction shows
+    in the readings as a phase only. Values of D0 that differ by a factor of ten may then describe
+    the readings equally well, with other A and B, and intervals must include them.
     """
     if not objective.has_table or not minima or _far_off(objective, minima[0]):
         return minima
@@ -221,7 +229,7 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
     coarse = (_coarse(objective) if objective.searches else None) or objective
     if not math.isfinite(coarse.chi2(best)):
         coarse = objective
-    highest = coarse.chi2(best) + _WORTH
+    highest = coarse.chi2(best) + _CONTINUED
     others = []
     for i, unknown in enumerate(objective.unknowns):
         if not unknown.logarithmic or unknown.nuisance or unknown.parameter.kind != "length":
@@ -229,9 +237,13 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
         ends = []
         for factor in _OTHER_LENGTHS:
             x = float(np.clip(best[i] + math.log(factor), *unknown.bounds))
-            there = coarse.minimise(best, {i: x}, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
+            there = coarse.minimise(
+                best, {i: x}, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
+            )
             if there.chi2 < _HOPELESS * highest:
-                ends.append(coarse.minimise(there.u, tolerance=_NEARBY, evaluations=_EVALUATIONS))
+                ends.append(
+                    coarse.minimise(there.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+                )
         for side in (-1, 1):
             apart = [
                 end
@@ -252,8 +264,8 @@ def _p_value(objective: Objective, minimum: Minimum) -> float:
     return float(chdtrc(max(r.size - minimum.u.size, 1), minimum.chi2))
 
 
-def _as_it_stands(objective: Objective) -> list[Minimum]:
-    """The one point of an objective without free parameters, if the law has a solution there."""
+def _without_free_parameters(objective: Objective) -> list[Minimum]:
+    """The single point of an objective without free parameters, if the law has a solution."""
     nowhere = np.zeros(0)
     chi2 = objective.chi2(nowhere)
     if not math.isfinite(chi2):
@@ -272,10 +284,10 @@ def distinct(minima: list[Minimum], same: float = _SAME) -> list[Minimum]:
 
 
 def _blocked(objective: Objective, end: Minimum) -> bool:
-    """Whether chi-squared still falls where a minimisation has stopped.
+    """Whether chi-squared still falls at the point at which a minimisation has stopped.
 
-    It does where the fast method has no solution farther on: the minimum would be wrong, and a law
-    that describes the data would be excluded.
+    This happens if the fast method has no solution beyond this point. The minimum would be wrong,
+    and a law that describes the data would be excluded.
     """
     if not objective.has_table or not math.isfinite(end.chi2):
         return False
@@ -284,19 +296,19 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
 
 
 def _far_off(objective: Objective, minimum: Minimum) -> bool:
-    """Whether the law does not describe the data there."""
+    """Whether the law is far from describing the data at a minimum."""
     return _p_value(objective, minimum) < FAR_OFF
 
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:
-    """Coordinates of special cases of the law, where a parameter that extends it nearly is zero."""
+    """Coordinates of fits of special cases: extending parameters are nearly zero."""
     result = []
     for values in simpler:
         u = []
         for unknown in objective.unknowns:
             value = values.get(unknown.name, unknown.middle)
             extending = unknown.name in _EXTENSIONS and unknown.name not in values
-            extending &= not unknown.logarithmic  # such as D2, which B2 = 0 leaves without effect
+            extending &= not unknown.logarithmic  # D2 has no effect if B2 = 0
             near = _NEARLY_ZERO if extending else unknown.to_coordinate(value)
             u.append(float(np.clip(near, *unknown.bounds)))
         result.append(np.array(u))
@@ -304,6 +316,6 @@ def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float
 
 
 def extends(law: type[Law], other: type[Law]) -> bool:
-    """Whether a law has the parameters of another and some that extend it, which may be zero."""
+    """Whether a law has the parameters of another law and extending parameters, which may be 0."""
     own, others = set(law_parameters(law)), set(law_parameters(other))
     return others < own and own - others <= set(_EXTENSIONS)

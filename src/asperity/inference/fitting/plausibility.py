@@ -1,7 +1,7 @@
-"""Fits compared with given numbers, with each other and with usual contacts.
+"""Plausibility of fits: contradicted stiffnesses and unusual estimates.
 
-Readings by a lock-in see the stiffness to a few per cent and better: a wrong one makes every law
-fail, or has a wrong law take its place.
+Lock-in readings determine the stiffness to a few per cent or better: with a wrong stiffness all
+laws fail, or a wrong law fits best.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
 
-#: Decrease of AICc with the stiffness of each run free that contradicts a fixed or shared one.
+#: A fixed or shared stiffness is contradicted if AICc falls by more with a free K for each run.
 _CONTRADICTED_AICC = 6.0
-#: Estimates outside are named: of A, of D0 (m), and of the stiffness over the load (1/m).
+#: Usual ranges of A, of D0 (m), and of the stiffness over the load (1/m).
 _FAR: Mapping[str, tuple[float, float]] = {"A": (5e-4, 0.2), "D0": (1e-8, 2e-3)}
 _FAR_STIFFNESS = (1e2, 1e6)
 
@@ -37,7 +37,7 @@ def contradicted_stiffness(
     Parameters
     ----------
     fit, freed : Fit
-        With the stiffness fixed, and the same with it free.
+        Fits with the stiffness fixed and free.
     runs : sequence of RecordedRun
     given : str or float
         The fixed stiffness.
@@ -64,12 +64,12 @@ def contradicted_stiffness(
 
 
 def contradicted_sharing(fit: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
-    """A sentence on a stiffness that is one for several recordings while theirs differ.
+    """A sentence on a stiffness that recordings share although their stiffnesses differ.
 
     Parameters
     ----------
     fit, freed : Fit
-        With one stiffness for all, and the same with one for each.
+        Fits with one stiffness for all recordings, and with one for each.
     runs : sequence of RecordedRun
     """
     if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
@@ -93,7 +93,7 @@ def contradicted_sharing(fit: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> l
 
 
 def _moved(fit: Fit, freed: Fit) -> str:
-    """What the law's parameters are with the stiffness free, and what they were."""
+    """Parameters of the law with the stiffness free, and before, as text."""
     moved = ", ".join(
         f"{n} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
@@ -103,12 +103,12 @@ def _moved(fit: Fit, freed: Fit) -> str:
 
 
 def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
-    """Sentences on estimates far from those of any contact: units are wrong, or the law is.
+    """Sentences on estimates outside the usual ranges: the units or the law may be wrong.
 
     Parameters
     ----------
     fit : Fit
-        Converged.
+        A converged fit.
     runs : sequence of RecordedRun
     """
     determined = fit.values.keys() - {*fit.undetermined}
@@ -132,20 +132,20 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
     return said
 
 
-#: A law does not describe the data below the first probability of chi-squared, and does with the
-#: stiffness free from the second one on.
+#: A law does not describe a table if the probability of chi-squared is below the first number; with
+#: a free stiffness it describes the table from the second number on.
 _FAILS, _DESCRIBES = 1e-3, 0.01
 
 
 def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | None = None) -> str:
-    """A sentence on the stiffness with which the law describes a table after all, or nothing.
+    """A sentence on the stiffness with which the law would describe a table, or an empty text.
 
     Parameters
     ----------
     fit : Fit
-        Converged, to one table; empty for one that describes it, or has K free.
+        A converged fit to one table. The text is empty if it describes the table or has K free.
     progress : callable, optional
-        Called with the number of minimisations done, and of all.
+        Called with the number of minimisations done and of all minimisations.
     """
     freed = _freed(fit, progress)
     if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
@@ -166,7 +166,7 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
 
 
 def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
-    """The fit with K free; None where that is not asked for."""
+    """The fit with K free; None if K is free already or the law describes the table."""
     objective = fit.objective
     given = np.unique(objective.fixed.get("K", ()))
     tables = objective.terms_of(LockInTerm)
@@ -185,7 +185,7 @@ def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
         unknowns=(*objective.unknowns, own),
         fixed=fixed,
     )
-    # Special cases and drawn starts as in any fit, and the estimate with the given stiffness.
+    # Starts: special cases, random starts, and the estimate with the given stiffness.
     minima = minima_of(freed, 0, progress, simpler=[{**fit.values, **start}])
     return described_fit(freed, minima, profile=False) if minima else None
 
@@ -193,12 +193,12 @@ def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
 def shift_of_estimates(
     fit: Fit, high: Mapping[str, float], low: Mapping[str, float]
 ) -> dict[str, float]:
-    """First-order change of the estimates with fixed numbers, half of the way from low to high.
+    """Half the first-order change of the estimates if fixed numbers change from low to high.
 
     Parameters
     ----------
     fit : Fit
-        Of one table of lock-in readings.
+        A fit to one table of lock-in readings.
     high, low : mapping of str to float
         Fixed numbers (SI) that differ from those of the fit, such as a stiffness one standard
         uncertainty above and below.
@@ -206,13 +206,13 @@ def shift_of_estimates(
     Returns
     -------
     dict of str to float
-        In SI, by the names of the free parameters; infinite where the model has no periodic
+        Changes in SI, by the names of the free parameters; infinite if the model has no periodic
         response with the changed numbers.
 
     Raises
     ------
     InputError
-        If the fit is of anything but one table of lock-in readings.
+        If the data of the fit are not one table of lock-in readings.
     """
     tables = fit.objective.terms_of(LockInTerm)
     rule, got = "be of one table of lock-in readings", f"{len(fit.objective.terms)} parts"

@@ -1,4 +1,4 @@
-"""The result of a fit: estimates with intervals, quality and warnings, and all as a record."""
+"""The result of a fit: estimates with intervals, quality and warnings, and its JSON record."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from asperity.units import display_unit
 
 T = TypeVar("T")
 
-#: Of a parameter whose numbers say nothing.
+#: Text in place of an estimate that the data do not determine.
 NOT_DETERMINED = "not determined"
-#: Loads of recordings that differ by less, as a share, are one.
+#: Loads of recordings that differ by less than this share count as equal.
 _ONE_LOAD = 1e-3
-#: Probability of chi-squared below which law or uncertainties are wrong.
+#: p-value of chi-squared below which the law or the uncertainties are wrong.
 MISFIT = 0.01
 #: Standard errors from which the sign of A - B is known.
 _KNOWN_SIGN = 2.0
@@ -45,8 +45,8 @@ class Estimate:
         Estimate and standard error of the normal approximation at the maximum.
     interval_68, interval_95 : (float, float)
         By the normal approximation in the coordinate of the fit, which is the logarithm of a
-        positive parameter, or by profile likelihood if that was asked for. Ends that data do not
-        bound are 0 or infinite.
+        positive parameter, or by profile likelihood if requested. Ends that data do not bound are
+        0 or infinite.
     at_bound : bool
     prior : Prior or None
     """
@@ -62,13 +62,14 @@ class Estimate:
 
 
 class Shown(NamedTuple):
-    """How an estimate is written: in the unit that reads best, with the digits its error bears.
+    """An estimate as text: in a readable unit, with as many digits as its error allows.
 
     Attributes
     ----------
     value, unit : str
+        Text of the value, and its unit.
     power : int
-        Of ten, of the unit over the SI unit.
+        The unit is 10^power times the SI unit.
     number, se : float
         Value and standard error, in that unit.
     """
@@ -81,7 +82,7 @@ class Shown(NamedTuple):
 
     @classmethod
     def of(cls, value: float, se: float, unit: str) -> Shown:
-        """Of a value and its standard error in SI; the larger of the two chooses the unit."""
+        """The text of a value and standard error in SI; the larger of the two sets the unit."""
         shown, power = display_unit(max(abs(value), se) if math.isfinite(se) else value, unit)
         scale = 10.0**-power
         return cls(rounded(value * scale, se * scale)[0], shown, power, value * scale, se * scale)
@@ -91,11 +92,11 @@ class Shown(NamedTuple):
         return two_digits(se * 10.0**-self.power)
 
     def interval(self, ends: Interval) -> str:
-        """An interval in SI in words; one that the data do not bound on either side is none."""
+        """An interval in SI as text; "not determined" if the data bound neither side."""
         low, high = ends
         if not (math.isfinite(high) or (math.isfinite(low) and low > 0)):
             return NOT_DETERMINED
-        # The far end of a skew interval bears fewer digits.
+        # The far end of a skew interval has fewer significant digits.
         low_text, high_text = (
             rounded(end, max(self.se, abs(end - self.number) / 4))[0]
             for end in (low * 10.0**-self.power, high * 10.0**-self.power)
@@ -119,9 +120,9 @@ class RateDependence(NamedTuple):
     Attributes
     ----------
     value, error : float
-        With its standard error, from the errors of A and B and their correlation.
+        A - B and its standard error, from the errors of A and B and their correlation.
     meaning : str
-        Velocity weakening or strengthening, or that the data do not tell.
+        Velocity weakening or strengthening, or that the sign is not determined.
     """
 
     value: float
@@ -135,7 +136,7 @@ class RateDependence(NamedTuple):
 
 
 def with_error(value: float, error: float) -> str:
-    """Both with as many decimals as the error bears: two uncertain digits."""
+    """Value and error as text, rounded to two digits of the error."""
     places = max(0, 1 - math.floor(math.log10(error))) if error else 6
     return f"{value:.{places}f} +- {error:.{places}f}"
 
@@ -149,33 +150,34 @@ class Fit(Drawn):
     law : str
     converged : bool
     message : str
-        "converged", or why not; all numbers are NaN then.
+        "converged", or the reason why not; without convergence all numbers are NaN.
     parameters : mapping of str to Estimate
     objective : Objective
         Data, law and free parameters: the function that was minimised.
     correlation : array, shape (n, n)
-        In the order of `parameters`, of the coordinates of the fit; empty without a fit.
+        Correlation of the coordinates of the fit, in the order of `parameters`; empty if not
+        converged.
     undetermined : tuple of str
-        Parameters of which these data say nothing: their standard error exceeds a factor of e.
+        Parameters that these data do not determine: their standard error exceeds a factor of e.
     chi2 : float
-        Of data and priors.
+        Chi-squared of data and priors.
     dof : int
     p_value : float
         Probability of a larger chi-squared if law and uncertainties are right.
     log_likelihood, aicc, bic : float
     observables : mapping of str to (float, int)
-        chi-squared and number of data of each.
+        Chi-squared and number of data of each observable.
     residuals : tuple of Residuals
-        At the maximum, of each term of the objective, without priors; the Jacobian is the
-        derivative to the coordinates of the fit.
+        Residuals of each term of the objective at the maximum, without priors; the Jacobian is the
+        derivative with respect to the coordinates of the fit.
     optima : tuple of Optimum
         Other minima that the data do not exclude.
     warnings : tuple of str
     because : mapping of str to str
-        Why each parameter that is not determined is not: the warnings on them.
+        The warning that says why a parameter is not determined, by its name.
     outliers : tuple of int
-        Rows of the table without which the law describes it, from 0; at most a tenth of them, or
-        two of eight and more.
+        Rows of the table (from 0) that the law does not describe, while it describes all others; at
+        most a tenth of the rows, or two if there are eight or more.
     """
 
     _drawn_by = "asperity.fit_report.pictures:draw_fit"
@@ -201,13 +203,13 @@ class Fit(Drawn):
     outliers: tuple[int, ...] = ()
 
     def parts(self, kind: type[T]) -> list[tuple[T, Residuals]]:
-        """The sets of data of one kind, tables or recordings, each with its residuals."""
+        """All terms of one kind, tables or recordings, each with its residuals."""
         pairs = zip(self.objective.terms, self.residuals, strict=True)
         return [(term, residuals) for term, residuals in pairs if isinstance(term, kind)]
 
     @property
     def level_change(self) -> LevelChange | None:
-        """D mu/d ln V by the steady friction of the recordings, measured without a law."""
+        """Slope d mu/d ln V of the steady friction of the recordings, measured without a law."""
         runs = [term.run for term in self.objective.terms_of(RunTerm)]
         return level_change([rate for run in runs for rate in run.level_rates])
 
@@ -230,7 +232,7 @@ class Fit(Drawn):
         if not math.isfinite(variance):
             return None
         error = math.sqrt(max(variance, 0.0))
-        # A minimum that the data allow as well may have the other sign.
+        # Another minimum that the data allow may have the opposite sign.
         others = [
             other.values["A"] - other.values["B"]
             for other in self.optima
@@ -255,16 +257,16 @@ class Fit(Drawn):
     def judged_by_chi2(self) -> bool:
         """Whether chi-squared judges the law.
 
-        It does not where all noise is estimated from what the law leaves, as that of recordings is:
-        the likelihood, noise included, then compares laws.
+        It does not if all noise is estimated from the residuals, as with recordings: then laws are
+        compared by the likelihood, which includes the noise.
         """
         return any(term.profiled == 0 for term in self.objective.terms)
 
     @property
     def over_load(self) -> dict[str, Estimate]:
-        """Stiffnesses over the load by name, K/W0 or K[run]/W0, where the load is one number.
+        """Stiffness over load (1/um, as rock laboratories state it), by name: K/W0 or K[run]/W0.
 
-        In 1/um, as rock laboratories give them.
+        Stiffnesses of several loads are left out.
         """
         loads: dict[str, list[float]] = {}
         for term in self.objective.terms_of(RunTerm):
@@ -325,11 +327,11 @@ class Fit(Drawn):
 
 
 def fit_record(fit: Fit) -> dict[str, Any]:
-    """Everything that a fit says; infinite and undefined numbers are None."""
+    """The result of a fit for JSON; infinite and undefined numbers are None."""
     names = ("law", "converged", "message", "undetermined", "warnings")
     numbers = ("chi2", "dof", "p_value", "log_likelihood", "aicc", "bic")
     known = {**point_parameters(fit.objective.law), EPS_RATIO.name: EPS_RATIO}
-    # None for a number that each row of a table has its own of.
+    # A number that differs between the rows of a table is None.
     fixed = {n: np.unique(v) for n, v in fit.objective.fixed.items()}
     record = {name: getattr(fit, name) for name in (*names, *numbers)} | {
         "parameters": {
@@ -362,7 +364,7 @@ def _estimate(result: Estimate) -> dict[str, Any]:
 
 
 def _noise(fit: Fit) -> dict[str, Any]:
-    """Noise of the data together, and of each set of data where there are several."""
+    """Noise of all data, and of each term if there are several."""
     parts = {term.name: dict(term.noise) for term in fit.objective.terms}
     if len(parts) == 1:
         return next(iter(parts.values()))

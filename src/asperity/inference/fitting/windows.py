@@ -1,4 +1,4 @@
-"""A recording fitted in several windows: how much the choice of the window matters."""
+"""Fits of one recording in several windows, to see how much the choice of the window matters."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from asperity.recording.readers import read
 
 #: Share of the first and of the last segment that automatic windows leave out.
 _LEFT_OUT = 1 / 3
-#: Starts that are drawn for windows after the first, which gives them its estimate.
+#: Random starts of the fits of later windows, in addition to the estimate of the first window.
 _STARTS = 8
-#: Standard errors over all windows that a window is far off by.
+#: An estimate further than this many standard errors from the mean over all windows is reported.
 _FAR_OFF = 3.0
 
 
@@ -38,14 +38,14 @@ class WindowEstimate:
     ----------
     name, unit : str
     value : float
-        Mean of the estimates by their precision, of logarithms where the fit has them.
+        Mean of the estimates, weighted by precision; of logarithms where the fit uses them.
     se : float
-        Standard error: that of noise and the spread over the windows.
+        Standard error, from noise and from the spread over the windows.
     se_noise, se_window : float
-        The two parts: the mean standard error, and the spread.
+        Both parts of `se`: the mean standard error, and the spread.
     interval_68, interval_95 : (float, float)
     values : tuple of float
-        Of each window; NaN where the fit failed.
+        Estimate of each window; NaN where the fit failed.
     """
 
     name: str
@@ -66,16 +66,16 @@ class WindowedFit:
     Attributes
     ----------
     windows : tuple of (float, float)
-        First and last time of each (s), in the time of the recording.
+        First and last time of each window (s), in the time of the recording.
     fits : tuple of Fit
-        In the same order.
+        Fits in the same order.
     parameters : mapping of str to WindowEstimate
-        Of the law and the machine, without nuisances.
+        Parameters of the law and the machine, without nuisance parameters.
     undetermined : tuple of str
-        Parameters of which the windows say nothing, or contradict each other.
+        Parameters that the windows do not determine, or on which they contradict each other.
     warnings : tuple of str
     new_warnings : tuple of str
-        Those that the fit in the first window does not have.
+        Warnings that the fit in the first window does not have.
     """
 
     windows: tuple[tuple[float, float], ...]
@@ -112,15 +112,15 @@ def fit_windows(
     recording : Trace or path
     law : str or type of Law
     free : sequence of str, optional
-        As of `fit`, for all windows what the first one may show.
+        As in `fit`. By default the parameters that the first window can determine, for all windows.
     windows : sequence of (float, float), optional
-        First and last times (s), two or more; the first is the one to look at. By default the
-        whole recording, and the same without a third of its first segment, of its last, and of
-        both.
+        First and last times (s) of two or more windows; the first is the main window. By default
+        the whole recording, and the recording without a third of its first segment, without a third
+        of its last, and without both.
     reading : mapping, optional
         Further arguments of `recorded_run`.
     progress : callable, optional
-        Called with the number of windows fitted so far, and of all.
+        Called with the number of windows fitted so far and the number of all windows.
     **options
         Further arguments of `fit`.
 
@@ -131,12 +131,12 @@ def fit_windows(
     Raises
     ------
     InputError
-        As of `recorded_run` and `fit`; if there are fewer than two windows.
+        As in `recorded_run` and `fit`; if there are fewer than two windows.
 
     Notes
     -----
-    Windows overlap: their spread is no second measurement of the noise but what the choice of the
-    window adds to it, such as trends that the model does not have.
+    Windows overlap. Their spread is therefore no second measurement of the noise: it shows errors
+    that depend on the window, such as trends that the model lacks.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     given = dict(reading or {})
@@ -144,48 +144,52 @@ def fit_windows(
         raise InputError("windows", "be two or more", len(windows), "add one")
     first = recorded_run(trace, **given, window=None if windows is None else windows[0])
     spans = (
-        _automatic(first) if windows is None else tuple((float(a), float(b)) for a, b in windows)
+        _automatic_windows(first)
+        if windows is None
+        else tuple((float(a), float(b)) for a, b in windows)
     )
     advance = counted(progress, len(spans))
     fits = [fit(first, law, free, **options)]
     advance(1)
     if fits[0].converged:
-        begun = {k.name: fits[0].values[k.name] for k in _physical(fits[0])}
-        options = {"starts": _STARTS, **options, "start": begun}
+        start = {k.name: fits[0].values[k.name] for k in _without_nuisances(fits[0])}
+        options = {"starts": _STARTS, **options, "start": start}
         if free is None:
-            free = [name for name in law_parameters(fits[0].objective.law) if name in begun]
+            free = [name for name in law_parameters(fits[0].objective.law) if name in start]
     for span in spans[1:]:
         fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
         advance(1)
     failed = [i for i, result in enumerate(fits) if not result.converged]
-    said = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
+    warnings = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
     usable = [result for result in fits if result.converged]
     estimates: dict[str, WindowEstimate] = {}
     undetermined = []
-    for unknown in _physical(usable[0]) if usable else []:
-        estimates[unknown.name], known = _over(unknown, fits)
+    for unknown in _without_nuisances(usable[0]) if usable else []:
+        estimates[unknown.name], known = _window_estimate(unknown, fits)
         far_off = disagreeing(unknown, estimates[unknown.name], spans)
         if far_off or not known:
             undetermined.append(unknown.name)
-        said += far_off
-    new = list(said)
+        warnings += far_off
+    new = list(warnings)
     for span, result in zip(spans, fits, strict=True):
         of_window = {w: f"{_shown(span)}: {w}" for w in result.warnings}
-        said += of_window.values()
+        warnings += of_window.values()
         new += [text for w, text in of_window.items() if w not in fits[0].warnings]
-    return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said), tuple(new))
+    return WindowedFit(
+        spans, tuple(fits), estimates, tuple(undetermined), tuple(warnings), tuple(new)
+    )
 
 
 def _shown(span: tuple[float, float]) -> str:
     return f"window {span[0]:.6g} to {span[1]:.6g} s"
 
 
-def _physical(result: Fit) -> list[Any]:
+def _without_nuisances(result: Fit) -> list[Any]:
     return [k for k in result.objective.unknowns if not k.nuisance]
 
 
-def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
-    """The whole run, and the same without parts of the first and the last segment."""
+def _automatic_windows(run: RecordedRun) -> tuple[tuple[float, float], ...]:
+    """The whole run, and the run without parts of its first and its last segment."""
     rule = f"be given for {run.name}"
     require(run.cuts, "windows", rule, "none: its velocity does not change", "write them")
     begin, end = run.origin, run.origin + float(run.time[-1])
@@ -198,7 +202,7 @@ def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
 def disagreeing(
     unknown: Any, over: WindowEstimate, spans: Sequence[tuple[float, float]]
 ) -> list[str]:
-    """A sentence on a window that is far off: it has another minimum, or is too short."""
+    """Sentences on windows whose estimate is far off: another minimum, or a short window."""
     mean = float(unknown.to_coordinate(over.value))
     total = over.se / abs(float(unknown.slope(over.value)))
     result = []
@@ -211,8 +215,8 @@ def disagreeing(
     return result
 
 
-def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
-    """One parameter over the windows, and whether they say anything about it."""
+def _window_estimate(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
+    """One parameter over the windows, and whether the windows determine it."""
     result = [f.parameters[unknown.name] for f in fits if f.converged]
     u = np.array([float(unknown.to_coordinate(p.value)) for p in result])
     noise = np.array(
@@ -222,8 +226,8 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
     weight /= weight.sum()
     mean = float(weight @ u)
     spread = float(np.sqrt(weight @ (u - mean) ** 2))
-    own = float(weight @ noise)
-    total = float(np.hypot(own, spread))
+    mean_noise = float(weight @ noise)
+    total = float(np.hypot(mean_noise, spread))
     value = float(unknown.to_value(mean))
     slope = abs(float(unknown.slope(value)))
 
@@ -237,7 +241,7 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
         result[0].unit,
         value,
         slope * total,
-        slope * own,
+        slope * mean_noise,
         slope * spread,
         interval(LEVELS[0]),
         interval(LEVELS[1]),

@@ -1,16 +1,16 @@
-"""The posterior density of a fit, as a compiled program needs it.
+"""The posterior density of a fit, in coordinates and in a form for a compiled program.
 
-The sampler walks in z, where the posterior is near a normal density of unit covariance about zero:
-q = mode + root @ z, with unbounded coordinates q and a root of the covariance that the curvature at
-the mode stands for (Laplace).
+The sampler works in z, in which the posterior is nearly normal with unit covariance about zero:
+q = mode + root @ z, with unbounded coordinates q and a root of the covariance from the curvature at
+the mode (Laplace).
 
 The coordinate u of a fit lies in a range, u = low + (high - low) / (1 + exp(-q)). Densities are
 multiplied by du/dq.
 
-The prior is a proper density of u. A parameter with a prior has that normal density, cut off where
-its rule says. Without, its coordinate is uniform over a range: a tenth of the lowest to ten times
-the highest usual value of a positive parameter, whose coordinate is the logarithm; zero to three
-times the highest usual value of others. The range is widened where the data want a value beyond it.
+The prior is a proper density of u. A normal prior of a parameter is cut off by the parameter's
+rule. Without a prior, the coordinate is uniform over a range: for a positive parameter, whose
+coordinate is the logarithm, a tenth of the lowest to ten times the highest usual value; for others,
+zero to three times the highest usual value. The range is widened if the estimate lies beyond it.
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import CompiledResiduals, Objective
 from asperity.inference.unknowns import Unknown
 
-#: The mode is reached where the gradient of the log density is smaller, by standard deviations: a
-#: step gains half its square, near what the accuracy of orbits and motions leaves. Steps at most.
+#: The mode is reached if the gradient of the log density per standard deviation is smaller: a
+#: further step would gain half its square, which is near the accuracy of orbits and motions. The
+#: second number is the largest number of steps.
 _REACHED, _STEPS = 0.05, 20
-#: Standard deviations of q are looked for between these.
+#: Limits of the standard deviations of q.
 _NARROWEST, _WIDEST = 1e-9, 3.0
 
 
@@ -46,13 +47,13 @@ class Coordinates(NamedTuple):
     low, high : array
         Range of u.
     logarithmic : bool array
-        Where u is the logarithm of the parameter.
+        Whether u is the logarithm of the parameter.
     scale : array
-        Parameter over u elsewhere.
+        Ratio of the parameter to u if u is no logarithm.
     mean, precision : array
-        Of normal priors of the parameter, in SI; 0 where there is none.
+        Mean and precision of normal priors of the parameter, in SI; 0 without a prior.
     log_norm : float
-        Logarithm of what normalises the prior.
+        Logarithm of the normalisation of the prior.
     """
 
     low: Any
@@ -65,7 +66,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> Coordinates:
-        """Those of free parameters, with ranges that reach an estimate with its deviations."""
+        """Coordinates of free parameters, with ranges that include an estimate with its errors."""
         ranges = [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
         log_norm = 0.0
         for k, (a, b) in zip(unknowns, ranges, strict=True):
@@ -105,11 +106,11 @@ class Coordinates(NamedTuple):
 
     @property
     def volumes(self) -> Any:
-        """1 where the normal prior is one of exp(u), whose density of u has the factor exp(u)."""
+        """1 for a normal prior of exp(u), whose density in u has a factor exp(u); else 0."""
         return (self.precision > 0) & self.logarithmic
 
     def log_prior(self, u: Any) -> Array:
-        """Logarithm of the prior density of u but for a constant, shape (..., n) to (...)."""
+        """Logarithm of the prior density of u, up to a constant, shape (..., n) to (...)."""
         normal = -0.5 * ((self.values(u) - self.mean) * self.precision) ** 2
         return jnp.sum(normal + jnp.where(self.volumes, u, 0.0), axis=-1)
 
@@ -120,14 +121,14 @@ class Coordinates(NamedTuple):
 
 
 class DensityData(NamedTuple):
-    """Arrays that the density depends on; programs are compiled for their shapes.
+    """Arrays of the density; programs are compiled for their shapes.
 
     Attributes
     ----------
     mode, root : array, shapes (n,) and (n, n)
     coordinates : Coordinates
     terms : tuple
-        Of each set of data, as its residuals read them.
+        Arrays of each data term, for its residuals.
     """
 
     mode: Any
@@ -138,14 +139,14 @@ class DensityData(NamedTuple):
 
 @dataclass(frozen=True)
 class PosteriorDensity:
-    """Logarithm of the posterior density of z, but for a constant.
+    """Logarithm of the posterior density of z, up to a constant.
 
     Attributes
     ----------
     names : tuple of str
         Free parameters.
     residuals : tuple
-        Of each set of data: functions of the parameters by name and of its arrays.
+        For each data term, a function of the parameters by name and of its arrays.
     """
 
     names: tuple[str, ...]
@@ -171,7 +172,7 @@ class Whitened:
     objective : Objective
     coordinates : Coordinates
     mode, root : array
-        As of `DensityData`.
+        As in `DensityData`.
     """
 
     objective: Objective
@@ -192,7 +193,7 @@ class Whitened:
         )
         coordinates = Coordinates.about(objective.unknowns, u, sd)
         low, high, *_ = coordinates
-        # Off the bounds by a tenth of a standard deviation.
+        # At least a tenth of a standard deviation away from the bounds.
         step = 0.1 * np.minimum(sd, high - low)
         start = coordinates.to_q(np.clip(u, low + step, high - step))
         near = cls(objective, coordinates, start, np.eye(len(u)))
@@ -208,11 +209,11 @@ class Whitened:
         return near._rooted(start + near.root @ climbed.x)
 
     def _rooted(self, q: Float) -> Whitened:
-        """The same about another point, with the root of the covariance there."""
+        """The posterior whitened about another point, with the root of its covariance there."""
         return replace(self, mode=q, root=_root(self._evaluated(q)[2]))
 
     def u_of(self, z: Float) -> Float:
-        """Coordinates of the fit at whitened ones, shapes (..., n)."""
+        """Coordinates of the fit for whitened coordinates, shapes (..., n)."""
         return np.asarray(self.coordinates.to_u(self.mode + z @ self.root.T))
 
     def log_density(self, z: Float) -> tuple[float, Float]:
@@ -221,7 +222,7 @@ class Whitened:
         return value, self.root.T @ gradient
 
     def _curvature(self, z: Float) -> Float:
-        """Of minus the log density, as Gauss and Newton have it."""
+        """Curvature of minus the log density, by the Gauss-Newton approximation."""
         information = self._evaluated(self.mode + self.root @ z)[2]
         return np.asarray(self.root.T @ information @ self.root)
 
@@ -233,7 +234,7 @@ class Whitened:
             return -np.inf, np.zeros_like(q), np.eye(q.size)
         log_slope = np.asarray(self.coordinates.log_slope(q))
         slope, share = np.exp(log_slope), 1 / (1 + np.exp(-q))
-        # Derivatives of the logarithm of the slope, first and second.
+        # First and second derivatives of the logarithm of the slope.
         bend, curvature = 1 - 2 * share, 2 * share * (1 - share)
         volume = self.coordinates.volumes.astype(float)
         J = jacobian * slope
@@ -268,6 +269,6 @@ def _root(information: Float) -> Float:
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     sd = np.clip(1 / np.sqrt(np.maximum(values, 1e-30)), _NARROWEST, _WIDEST / np.min(1 / scale))
     root = (vectors * sd) / scale[:, None]
-    # No direction moves a coordinate farther than its widest.
+    # No direction moves a coordinate by more than the largest standard deviation.
     longest = np.sqrt((root**2).sum(0))
     return np.asarray(root * np.minimum(1.0, _WIDEST / longest))

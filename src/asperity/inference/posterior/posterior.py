@@ -20,28 +20,28 @@ from asperity.inference.posterior.density import Whitened
 from asperity.outputs.json import plain
 
 #: Chains agree below this R-hat (Vehtari et al., 2021).
-_AGREE = 1.01
-#: Effective draws below which quantiles are not to be believed, for each chain (the same).
-_ENOUGH = 100.0
-#: Share of trajectories without a solution at an end from which a warning says so.
+_LARGEST_R_HAT = 1.01
+#: Quantiles are reliable from this number of effective draws per chain on (same source).
+_EFFECTIVE_DRAWS = 100.0
+#: A warning is given if a larger share of trajectories ends without a solution.
 _FEW_FAILED = 1e-3
 
 
 class Transitions(NamedTuple):
-    """What is kept of each draw of a chain.
+    """Draws of a chain with their statistics.
 
     Attributes
     ----------
     z : array, shape (draws, n)
     log_density : array, shape (draws,)
     acceptance : array, shape (draws,)
-        Mean over the trajectory.
+        Mean acceptance over the trajectory.
     steps : int array, shape (draws,)
-        Evaluations of the gradient.
+        Number of evaluations of the gradient.
     diverging : bool array, shape (draws,)
         Whether the energy rose by more than 1000.
     failed : bool array, shape (draws,)
-        Whether the trajectory ended where the density could not be computed.
+        Whether the trajectory ended at a point without a density.
     energy : array, shape (draws,)
     """
 
@@ -87,18 +87,18 @@ class Posterior:
     Attributes
     ----------
     fit : Fit
-        Whose posterior it is.
+        The fit.
     parameters : mapping of str to Marginal
     draws : mapping of str to array, shape (chains, draws)
-        In SI.
+        Draws in SI.
     log_density : array, shape (chains, draws)
-        But for a constant.
+        Logarithm of the density, up to a constant.
     acceptance, energy : array, shape (chains, draws)
     steps : int array, shape (chains, draws)
         Evaluations of the gradient.
     diverging, failed : bool array, shape (chains, draws)
-        Whether the energy of the trajectory was lost; whether it ended where the law has no
-        solution.
+        Whether the energy of the trajectory was not conserved; whether the trajectory ended at
+        values at which the law has no solution.
     seed : int
     prior : mapping
         Prior of each parameter, as plain numbers.
@@ -120,10 +120,10 @@ class Posterior:
 
     @property
     def converged(self) -> bool:
-        """Whether chains agree and there are effective draws enough."""
+        """Whether the chains agree and have enough effective draws."""
         chains = self.log_density.shape[0]
         return all(
-            p.r_hat <= _AGREE and min(p.ess_bulk, p.ess_tail) >= _ENOUGH * chains
+            p.r_hat <= _LARGEST_R_HAT and min(p.ess_bulk, p.ess_tail) >= _EFFECTIVE_DRAWS * chains
             for p in self.parameters.values()
         )
 
@@ -148,7 +148,7 @@ class Posterior:
         }
 
     def to_datatree(self) -> Any:
-        """Groups posterior, sample_stats and observed_data, as ArviZ names and reads them."""
+        """Groups posterior, sample_stats and observed_data, in the format of ArviZ."""
         from arviz_base import from_dict
 
         tree = from_dict(
@@ -188,7 +188,7 @@ def posterior_of(
     fit: Fit, whitened: Whitened, runs: Sequence[Sequence[Transitions]], *, seed: int
 ) -> Posterior:
     """The posterior from the blocks of all chains, without their warm-up."""
-    # Untyped, and only there with the extra.
+    # Untyped, and installed only with the extra.
     array_stats: Any = import_module("arviz_stats.base").array_stats
     chains = [jax.tree.map(lambda *blocks: np.concatenate(blocks), *run) for run in runs]
     stats: Transitions = jax.tree.map(lambda *whole: np.stack(whole), *chains)
@@ -223,12 +223,12 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
     warnings = []
     chains = stats.log_density.shape[0]
     for name, p in marginals.items():
-        if not p.r_hat <= _AGREE:
+        if not p.r_hat <= _LARGEST_R_HAT:
             warnings.append(
                 f"chains disagree about {name} (R-hat {p.r_hat:.3f}); sample more draws, and look "
                 "for more than one maximum"
             )
-        elif min(p.ess_bulk, p.ess_tail) < _ENOUGH * chains:
+        elif min(p.ess_bulk, p.ess_tail) < _EFFECTIVE_DRAWS * chains:
             warnings.append(
                 f"draws of {name} say as much as {p.ess_bulk:.0f} independent ones (in the tails "
                 f"{p.ess_tail:.0f}), which is too few; sample more"
@@ -250,7 +250,7 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
 
 
 def _observed(fit: Fit) -> dict[str, Float]:
-    """Columns of all data; those of recordings have the name of theirs where there are several."""
+    """Columns of all data; with several recordings, names end in the name of the recording."""
     terms = fit.objective.terms
     return {
         f"{name}[{term.name}]" if term.profiled and len(terms) > 1 else name: column

@@ -1,7 +1,7 @@
-"""Draws from the posterior of a fit by the No-U-Turn sampler, a process to each chain.
+"""Draws from the posterior of a fit by the No-U-Turn sampler, with one process for each chain.
 
 Sampler and warm-up are blackjax's (Hoffman and Gelman, 2014; the windows of Stan), on the whitened
-density. Every chain has a key of its own: the draws do not depend on the number of processes.
+density. Every chain has a separate key: the draws do not depend on the number of processes.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.outputs import Interrupted
 
-#: Logarithm of a density, of z and of arrays.
+#: Logarithm of a density as a function of z and of arrays.
 LogDensity = Callable[[Array, Any], Array]
 
-#: Draws of the warm-up, and of each block between two reports of progress.
+#: Draws of the warm-up, and of each block; progress is reported after a block.
 WARM_UP, BLOCK = 300, 50
 #: Spread of the first positions, in standard deviations of the normal approximation.
 _OVERDISPERSED = 2.0
-#: Tries for a first position at which the law has a solution.
+#: Number of random positions that are tried until the law has a solution.
 _TRIES = 100
-#: Most draws of all chains, warm-up included: of ten parameters they take 320 MB.
+#: Largest number of draws of all chains, including the warm-up: 320 MB for ten parameters.
 _MOST_DRAWS = 4_000_000
 #: Time (s) between two calls of `progress` while no block ends.
-_ASK = 0.5
+_REPORT_INTERVAL = 0.5
 
-#: Where a chain is, all as arrays: data of the key of the next block, position with its density and
-#: gradient, step size, and inverse mass matrix.
+#: State of a chain as arrays: key data of the next block, position with density and gradient, step
+#: size, and inverse mass matrix.
 ChainState = tuple[Any, Any, Any, Any]
 
 
@@ -59,17 +59,18 @@ def sample_posterior(
     Parameters
     ----------
     fit : Fit
-        Converged. Its priors hold; parameters without one are uniform as `Coordinates` says.
+        A converged fit. Its priors are used; parameters without a prior are uniform as in
+        `Coordinates`.
     chains, draws : int
         At least 2 chains, for R-hat, and 100 draws each after the warm-up; draws are rounded up
         to whole blocks of 50.
     seed : int
         The same seed gives the same draws, whatever `jobs`.
     jobs : int, optional
-        Processes; by default one a chain, at most the cores of this machine.
+        Number of processes; by default one per chain, at most the number of cores.
     progress : callable, optional
-        Called with finished and all draws, those of the warm-up included, at each block and twice
-        a second; an exception of it ends the sampling.
+        Called with the numbers of finished and of all draws, including the warm-up, after each
+        block and twice a second; an exception in it ends the sampling.
 
     Returns
     -------
@@ -96,14 +97,16 @@ def sample_posterior(
     report = progress or (lambda done, total: None)
     try:
         report(done, total)
-        # One thread each: the order of sums depends on threads.
+        # One thread per process: the order of sums depends on the number of threads.
         with process_pool(min(jobs or available_cores(), chains), "jobs") as pool:
             waiting = {
-                pool.submit(warmed_up, density, data, *_beginning(whitened, seed, chain)): chain
+                pool.submit(
+                    warmed_up, density, data, *_first_position(whitened, seed, chain)
+                ): chain
                 for chain in range(chains)
             }
             while waiting:
-                finished = wait(waiting, timeout=_ASK, return_when=FIRST_COMPLETED).done
+                finished = wait(waiting, timeout=_REPORT_INTERVAL, return_when=FIRST_COMPLETED).done
                 for future in finished:
                     chain = waiting.pop(future)
                     state, transitions = future.result()
@@ -119,7 +122,7 @@ def sample_posterior(
 
 
 def require_sizes(chains: int, draws: int) -> None:
-    """Refuse too few chains and draws, and more than can be computed and kept.
+    """Refuse too few chains and draws, and more draws than fit into memory.
 
     Raises
     ------
@@ -133,8 +136,8 @@ def require_sizes(chains: int, draws: int) -> None:
     require(not chains * each > _MOST_DRAWS, "chains times draws", rule, got, "ask for fewer")
 
 
-def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
-    """Key of a chain, and its first position, drawn wider than the posterior."""
+def _first_position(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
+    """Key of a chain, and its first position, from a density wider than the posterior."""
     key = jax.random.fold_in(jax.random.key(seed), chain)
     rng = np.random.default_rng([seed, chain])
     spread = _OVERDISPERSED
@@ -149,15 +152,15 @@ def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
 
 
 def warmed_up(log_density: LogDensity, data: Any, key: Any, z: Float) -> tuple[ChainState, None]:
-    """State of a chain after the warm-up, which no draw is kept of.
+    """State of a chain after the warm-up, whose draws are discarded.
 
     Parameters
     ----------
     log_density : callable
-        The same object for the same program.
+        The density; the same object is compiled once.
     data : pytree of arrays
     key : uint32 array
-        Data of the key of the chain.
+        Key data of the chain.
     z : array, shape (n,)
         First position.
     """
@@ -232,12 +235,12 @@ def finite_density(log_density: LogDensity, data: Any) -> Callable[[Array], Arra
 
 
 def require_bayes() -> None:
-    """Refuse to go on without the packages that sample and diagnose.
+    """Refuse to sample without the packages of the extra ``bayes``.
 
     Raises
     ------
     InputError
-        Naming what is missing.
+        If a package is missing; the message names it.
     """
     missing = [name for name in ("blackjax", "arviz_stats", "arviz_base") if not find_spec(name)]
     rule, got = "have the extra 'bayes' installed", f"no {', '.join(missing)}"

@@ -1,1 +1,1 @@
-"""Recordings in the likelihood: motion through a whole run, and noise as it is."""
+"""Recordings in the likelihood: the motion through a whole run, and coloured noise."""

@@ -1,7 +1,7 @@
-"""Terms and free parameters of recorded runs, from what a user asks for.
+"""Terms and free parameters of recorded runs, from the arguments of a fit.
 
-A gain of the gauge multiplies F/W. Under a constant load A, B, mu0 and K over 1/gain give the same
-recording, so that it is known from a calibration alone, which is its prior. Recordings that hold
+A gain of the gauge multiplies F/W. Under a constant load a recording determines only the products
+of the gain with A, B, mu0 and K: the gain needs a prior from a calibration. Recordings that contain
 the same samples would count twice, and are refused.
 """
 
@@ -27,38 +27,37 @@ from asperity.parameters.arguments import typed
 
 #: Kind of quantity of K, by the unit of the load.
 _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
-#: Where the stiffness over the load is looked for (1/m): what deformation apparatus and
-#: tribometers show.
+#: Search range of the stiffness over the load (1/m): deformation apparatus and tribometers.
 USUAL_STIFFNESS = (5e2, 5e4)
-#: Samples that a run needs, per free parameter.
+#: Smallest number of samples of a run per free parameter.
 _SAMPLES_PER_PARAMETER = 8
-#: Of an air layer: its gap, the radius of the patch and the pressure, as users call them.
+#: Names of parameters of an air layer: its gap, the radius of the patch and the pressure.
 _LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
 Linear = Literal["offset", "trend", "bend", "drift"]
-#: Standard deviations of the departures of the initial friction and states from steady sliding.
+#: Prior standard deviations of the departures of initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
 
 
 @typed
 @dataclass(frozen=True)
 class RunOptions:
-    """How recorded runs are compared with the motion.
+    """Options of the comparison of recorded runs with the motion.
 
     Attributes
     ----------
     linear : tuple of str
-        Linear nuisances of each run, of "offset", "trend" (over slip), "bend" (over the square of
-        the slip) and "drift" (over time).
+        Linear nuisances of each run: "offset", "trend" (over slip), "bend" (over the square of the
+        slip) or "drift" (over time).
     initial : {"steady", "free"}
         Whether runs begin in steady sliding.
     gauge : (int, float), optional
         Order and corner frequency (Hz) of the low-pass of the force gauge.
     order : int, optional
-        Of the noise; chosen by the data by default.
+        Order of the autoregressive noise; by default the data choose it.
     fit_rate : float or str, optional
-        Means a second (Hz) that stand for the samples, or "full" for every sample. By default
-        recordings of up to 20,000 samples are compared sample by sample, and longer ones by means
-        over blocks as short as their changes need.
+        Number of block means per second (Hz) that replace the samples, or "full" for every sample.
+        By default recordings of up to 20,000 samples are compared sample by sample, and longer ones
+        by means over blocks that are short enough to resolve their changes.
     """
 
     linear: tuple[Linear, ...] = ("offset", "trend")
@@ -77,13 +76,13 @@ def stiffness(run: RecordedRun) -> Parameter:
 
 
 def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
-    """A stiffness, or one over the load as ``"0.003 1/um"``, in the unit of the run."""
+    """A stiffness, which may be given over the load (``"0.003 1/um"``), in the unit of the run."""
     over = over_load(value, label) if run.load_unit else None
     return float(stiffness(run).check(value, label)) if over is None else over * run.W0
 
 
 def over_load(value: Any, label: str = "K") -> float | None:
-    """A stiffness over the load (1/m) as rock laboratories give it; None of another text."""
+    """A stiffness over the load (1/m), as rock laboratories give it; None for other values."""
     if not isinstance(value, str):
         return None
     try:
@@ -93,7 +92,7 @@ def over_load(value: Any, label: str = "K") -> float | None:
 
 
 def usual_ranges(runs: Sequence[RecordedRun]) -> dict[str, tuple[float, float]]:
-    """Where the memory length is looked for: what sampling and slip of the runs can show."""
+    """Search range of the memory length, from the sampling and the slip of the runs."""
     shortest, longest = np.inf, 0.0
     for run in runs:
         slips = np.abs(np.diff(np.interp(run.drive.edges, run.time, run.slip)))
@@ -105,13 +104,13 @@ def usual_ranges(runs: Sequence[RecordedRun]) -> dict[str, tuple[float, float]]:
 
 
 def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
-    """Refuse parameters that none of the runs can show.
+    """Refuse parameters that have no influence in any of the runs.
 
     Raises
     ------
     InputError
-        If a parameter of load changes is free and the load is constant, one of velocity changes is
-        free and there is none, or there are too few samples.
+        If a free parameter acts on load changes only and the load is constant, if one acts on
+        velocity changes only and the velocity is constant, or if there are too few samples.
     """
     names = ", ".join(run.name for run in runs)
     for name in ("alpha", "eps_ratio"):
@@ -134,14 +133,14 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
 
 
 def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
-    """Refuse priors of what is not free, under the name of no run, or of a misspelt one.
+    """Refuse priors of parameters that are not free, and of unknown names or runs.
 
     Raises
     ------
     InputError
     """
     known = [unknown.name for unknown in unknowns]
-    # Of every run by itself.
+    # Names without a run stand for the parameter of each run.
     shared = {name.partition("[")[0] for name in known}
     for name in priors:
         rule = f"be of free parameters ({', '.join(known)})"
@@ -150,7 +149,7 @@ def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior])
 
 
 def require_no_layer(free: Sequence[str]) -> None:
-    """Refuse an air layer's numbers as free parameters of recordings.
+    """Refuse parameters of an air layer as free parameters of recordings.
 
     Raises
     ------
@@ -180,22 +179,22 @@ def run_terms(
     inertia: bool,
     radiation_damping: bool,
 ) -> tuple[list[RunTerm], list[Unknown]]:
-    """Terms of the runs, and their own free parameters.
+    """Terms of the runs, and free parameters of single runs.
 
     Parameters
     ----------
     runs : sequence of RecordedRun
     law : type of Law
     constants : mapping of str to float
-        Parameters that are not free, without those of a run.
+        Parameters that are not free, except those of single runs.
     beside_table : bool
-        Whether lock-in readings are fitted together with the runs, whose K is that of the readings.
+        Whether lock-in readings are fitted together with the runs and share their K.
     shared_stiffness : bool
         Whether K is one parameter of all runs, which the caller has freed.
     fixed_stiffness : str or float, optional
-        K where it is not free.
+        K if it is not free.
     start, priors : mapping
-        By names of the nuisances, or K for that of every run.
+        Start values and priors, by names of the nuisances; K stands for the K of each run.
     options : RunOptions
     inertia, radiation_damping : bool
     """
@@ -283,7 +282,7 @@ def shared_stiffness(
 
 
 def require_newtons(runs: Sequence[RecordedRun]) -> None:
-    """Refuse a stiffness that recordings share with a table where it has another unit.
+    """Refuse a stiffness that recordings share with a table if their units differ.
 
     Raises
     ------
@@ -324,9 +323,9 @@ def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
     Parameters
     ----------
     suffix : str
-        "[name of the run]" where there are several sets of data.
+        "[name of the run]" if there are several data sets.
     priors : mapping of str to Prior
-        ``gain`` for that of every run by itself, or ``gain[name]``.
+        Priors; ``gain`` stands for the gain of each run, ``gain[name]`` for that of one run.
     """
     name = GAIN + suffix
     prior = priors.get(name, priors.get(GAIN))
@@ -343,7 +342,7 @@ def require_calibrated(
     mu0_given: bool,
     beside_table: bool,
 ) -> None:
-    """Refuse a gain without a prior, and one that a load change would seem to measure.
+    """Refuse a gain without a prior, and a gain that a load change would falsely determine.
 
     Parameters
     ----------
@@ -351,7 +350,7 @@ def require_calibrated(
     free : sequence of str
     priors : mapping of str to Prior
     mu0_given : bool
-        Whether mu0 is free or has a number that is not taken from the recording.
+        Whether mu0 is free, or fixed to a number that is not from the recording.
     beside_table : bool
         Whether lock-in readings are fitted together with the runs.
 
@@ -379,17 +378,17 @@ def require_calibrated(
         raise InputError("mu0", rule, got, "free mu0, or fix it")
 
 
-#: Equal samples in a row that chance does not make, if they have so many different values.
+#: So many equal samples in a row, with so many different values, are not equal by chance.
 _EQUAL, _DIFFERENT = 64, 16
 
 
 def require_own_samples(runs: Sequence[RecordedRun]) -> None:
-    """Refuse recordings of which two hold the same samples, at whatever times.
+    """Refuse recordings of which two contain the same samples, at any times.
 
     Raises
     ------
     InputError
-        If 64 samples in a row of one, with 16 different values among them, are in another.
+        If 64 successive samples, with at least 16 different values, occur in two recordings.
     """
     for first, second in combinations(runs, 2):
         shared = _shared(first.friction, second.friction)
@@ -402,7 +401,7 @@ def require_own_samples(runs: Sequence[RecordedRun]) -> None:
 
 
 def _shared(x: Float, y: Float) -> tuple[int, int] | None:
-    """Where the first samples of x that are also in y begin in both."""
+    """Indices in x and y of the first run of samples that both contain; None without."""
     rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
     various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT
     places = {rows[k].tobytes(): k for k in np.flatnonzero(various)[::-1]}

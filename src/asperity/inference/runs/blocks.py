@@ -1,14 +1,13 @@
-"""Long recordings as means over blocks of samples.
+"""Averaging of long recordings over blocks of samples.
 
-A recording of millions of samples is compared with the means of the computed motion over blocks of
-equal duration. Nothing is approximated by that: the motion is averaged over the same blocks, steps
-of the drive within a block included, and the noise is estimated from the means themselves. What is
-lost is what changes within a block. Blocks are therefore as short as the changes of friction after
-each change of the drive need: the difference of the two halves of a block (a Haar coefficient) is
-compared there with its scatter elsewhere.
+The block means of a recording of millions of samples are compared with means of the computed motion
+over the same blocks. This is exact: steps of the drive within a block are included, and the noise
+is estimated from the means. Only changes within a block are lost. Blocks are therefore short enough
+for the changes of friction after each change of the drive: the difference between the halves of a
+block (a Haar coefficient) must not exceed its scatter in other blocks.
 
-Mains and other lines far above the blocks' rate would come down as lines of other frequencies. They
-are taken off before, piece by piece, since mains wander.
+The mains and other spectral lines far above the block rate would be aliased. They are subtracted
+before, in short pieces, because the frequency of the mains varies.
 """
 
 from __future__ import annotations
@@ -28,39 +27,39 @@ from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
 from asperity.recording.defects.lines import find_lines, take_off
 from asperity.units import to_si
 
-#: Blocks of a recording, at least and at most.
+#: Smallest and largest number of blocks of a recording.
 _FEWEST, _MOST = 2_000, 100_000
-#: Readings with which starts are looked for.
+#: Number of block means for the search for starts.
 _SEARCHED = 2_000
-#: Blocks of a stretch of one sampling rate, at least.
+#: Smallest number of blocks of a stretch with one sampling rate.
 _SHORTEST = 16
-#: Blocks after a change of the drive in which what is quick is looked for.
+#: Quick changes are searched in these blocks after a change of the drive.
 _AFTER = (1, 2, 4, 8, 16, 32)
-#: Chance of differences within blocks that are noise, over all changes; what they may be of the
-#: differences within all longer blocks, both squared over the noise; and how many the longest are.
+#: Probability that noise alone makes the differences within blocks, over all changes; largest share
+#: of these differences in those of all longer blocks (squared, over the noise); number of lengths.
 _CHANCE, _LEFT_OUT, _LEVELS = 1e-4, 0.02, 64
-#: A block whose samples do not cover it, by this share, is left out.
+#: A block is left out if its samples lack more than this share of its duration.
 _GAP = 0.05
-#: Least frequency of a line (Hz), and pieces of the drive during a period of it, at most: it may be
-#: the modulation otherwise.
+#: Lowest frequency of a line (Hz), and largest number of segments of the drive in one of its
+#: periods: with more segments the line may be the modulation.
 _LOWEST, _PIECES_PER_PERIOD = 5.0, 0.1
 
 
 def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
-    """A long recording as means over blocks; a short one as it is.
+    """A long recording as means over blocks; a short recording unchanged.
 
     Parameters
     ----------
     run : RecordedRun
     rate : float, str or None
-        Blocks a second (Hz, or a text with a unit), or "full" for every sample. By default
-        recordings of up to 20,000 samples are left as they are, and others get blocks as short as
-        they need, 100,000 at most.
+        Blocks per second (Hz, or a text with a unit), or "full" for every sample. By default
+        recordings of up to 20,000 samples are unchanged, and others get blocks that resolve their
+        changes, at most 100,000.
 
     Returns
     -------
     RecordedRun
-        The same run if it is left as it is, or has blocks already.
+        The same object if it is unchanged, or has blocks already.
 
     Raises
     ------
@@ -80,7 +79,7 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
     clean, lines = _without_lines(run)
     doubts = list(run.doubts)
     if length is None:
-        length, complete = _needed(clean)
+        length, complete = _needed_length(clean)
         if not complete:
             doubts.append(
                 f"friction changes within the blocks of {1e3 * length:.3g} ms that it is averaged "
@@ -103,7 +102,7 @@ def _require_blocks(run: RecordedRun, length: float) -> None:
 
 
 def coarser(runs: Sequence[RecordedRun]) -> list[RecordedRun]:
-    """Long recordings as few means, for a first search; empty where all are short."""
+    """Long recordings as few means, for a first search; empty if all are short."""
     if all(run.time.size <= LONGEST for run in runs):
         return []
     return [
@@ -113,12 +112,12 @@ def coarser(runs: Sequence[RecordedRun]) -> list[RecordedRun]:
 
 
 def checked_rate(rate: Any) -> float | None:
-    """Blocks a second; infinite for every sample, None for what the data need.
+    """Blocks per second; infinite for every sample, None if the data decide.
 
     Raises
     ------
     InputError
-        If it is neither positive nor "full".
+        If the rate is neither positive nor "full".
     """
     if rate is None:
         return None
@@ -174,7 +173,7 @@ def _counts(run: RecordedRun, length: float) -> list[int]:
 
 
 def _cells(run: RecordedRun) -> Float:
-    """Beginning and end of what each sample stands for (s): half the way to its neighbours."""
+    """Beginning and end of the cell of each sample (s), halfway to its neighbours."""
     if run.blocks is not None:
         return run.blocks.edges
     t = run.time
@@ -188,47 +187,48 @@ def _cells(run: RecordedRun) -> Float:
     return np.clip(np.stack([begin, end], axis=1), 0.0, t[-1])
 
 
-def _needed(run: RecordedRun) -> tuple[float, bool]:
-    """Longest blocks that keep what friction does after changes of the drive (s).
+def _needed_length(run: RecordedRun) -> tuple[float, bool]:
+    """Longest blocks (s) that resolve the friction after changes of the drive.
 
-    Besides, whether nothing is lost within the shortest blocks that are allowed.
+    The second result says whether the shortest allowed blocks resolve it completely.
     """
     duration = float(run.time[-1])
     finest = max(min(_intervals(run)), duration / _MOST)
-    # The force, which a step of the load leaves continuous: what friction does then is known.
+    # The force is used: a step of the load leaves it continuous, while F/W jumps.
     series = averaged(replace(run, friction=run.friction * run.drive.load_at(run.time)), finest / 2)
     result, lengths = [], [finest]
     while lengths[-1] <= duration / _LEVELS:
-        result.append(_within(series, lengths[-1]))
+        result.append(_excess_within(series, lengths[-1]))
         series = averaged(series, lengths[-1])
         lengths.append(2 * lengths[-1])
     small = np.cumsum(result) <= _LEFT_OUT * np.sum(result)
-    # The first level is what the shortest blocks lose.
+    # The first level is the loss within the shortest blocks.
     allowed = small & (np.array(lengths[:-1]) <= duration / _FEWEST)
     kept = int(np.argmin(np.append(allowed, False)))
     return lengths[max(kept - 1, 0)], bool(small[0])
 
 
-def _within(run: RecordedRun, length: float) -> float:
-    """Differences of the halves of blocks in excess of noise, after changes of the drive.
+def _excess_within(run: RecordedRun, length: float) -> float:
+    """Differences between the halves of blocks after changes of the drive, in excess of noise.
 
     Parameters
     ----------
     run : RecordedRun
-        Of the halves.
+        The recording, averaged over the halves.
     length : float
-        Of the blocks (s).
+        Length of the blocks (s).
 
     Returns
     -------
     float
-        Sum of squares over that of noise, less what noise has; 0 if noise may be all.
+        Sum of squares over the variance of noise, less its expected value for noise; 0 if noise
+        alone may explain the differences.
     """
     changes = run.drive.edges[1:-1]
     after: list[Float] = []
     for (a, b), step in zip(run.stretches, _intervals(run), strict=True):
         if step > 0.75 * length:
-            continue  # of a slower sampling rate
+            continue  # a stretch with a slower sampling rate
         halves = run.friction[a : a + (b - a) // 2 * 2].reshape(-1, 2)
         d = halves[:, 1] - halves[:, 0]
         d = d - np.median(d)
@@ -236,7 +236,7 @@ def _within(run: RecordedRun, length: float) -> float:
         here = changes[(changes >= run.time[a]) & (changes <= run.time[b - 1])]
         if noise == 0 or not here.size:
             continue
-        # From the block before: the time of a change is not quite known.
+        # Start one block before: the time of a change is uncertain.
         first = (np.searchsorted(run.time[a:b], here) // 2) - 1
         at = first[:, None] + np.arange(_AFTER[-1])
         inside = (at >= 0) & (at < d.size)
@@ -254,7 +254,7 @@ def _within(run: RecordedRun, length: float) -> float:
 
 
 def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
-    """The recording without lines of the mains and the like, and their frequencies (Hz)."""
+    """The recording without spectral lines such as the mains, and their frequencies (Hz)."""
     pieces = np.sort(np.diff(run.drive.edges))
     typical = float(pieces[np.searchsorted(np.cumsum(pieces), pieces.sum() / 2)])
     lowest = max(_LOWEST, 1 / (_PIECES_PER_PERIOD * typical))

@@ -1,9 +1,9 @@
-"""A recorded run without its defects, which are removed once, before the fit, and reported by it.
+"""Removal of defects of a recorded run before the fit, which reports them.
 
 Spikes are replaced by the line between their neighbours, long recordings are averaged over blocks,
-and the level after a jump of the gauge is a nuisance of the fit. Changes of the drive are known
-here: friction itself changes quickly after them. Spikes that could be friction are left to the fit,
-which knows the motion, and begins again without them.
+and the level after a jump of the gauge is a nuisance parameter of the fit. Samples after changes of
+the drive, where friction changes quickly, are not touched: spikes among them are found by the fit,
+which knows the motion, and which is repeated without them.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from asperity.recording.defects.jumps import find_jumps
 from asperity.recording.defects.sampling import gap_rows
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
-#: Changes of the load are few if there are so many samples to each.
+#: Changes of the load are few if there are at least this many samples for each.
 _FEW_CHANGES = 100
-#: Share of samples, and one more, that may be spikes: noise with more of them is not normal.
+#: Largest share of spikes among the samples (plus one spike): with more, the noise is not normal.
 _MOST_SPIKES = 0.01
-#: Samples that a fit may leave out: each is a nuisance, and costs time at each step.
+#: Largest number of samples that a fit leaves out: each is a nuisance, which takes time.
 _MOST_WRONG = 50
-#: Share of the segments next to a change of the drive, and samples about it, in which friction
-#: changes too quickly to recognise a jump.
+#: No jump is searched within this share of a segment, and within this many samples, from a change
+#: of the drive: friction changes too quickly there.
 _NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
 
 
 def cleaned(run: RecordedRun, rate: Any = None) -> RecordedRun:
-    """The run as it is compared with the motion, with its spikes and jumps.
+    """The run for comparison with the motion: without spikes, averaged if long, with its jumps.
 
     Parameters
     ----------
     run : RecordedRun
-        As recorded; one that was cleaned stays as it is.
+        The recording; a cleaned run is returned unchanged.
     rate : float, str or None
         As in `reduced`.
     """
@@ -46,7 +46,7 @@ def cleaned(run: RecordedRun, rate: Any = None) -> RecordedRun:
 
 
 def first_after_changes(run: RecordedRun) -> list[int]:
-    """First samples after changes of the velocity, and of the load where they are few."""
+    """First samples after changes of the velocity, and of the load if these are few."""
     inner = run.drive.edges[1:-1]
     few = inner.size * _FEW_CHANGES <= run.time.size
     edges = inner if few else run.drive.edges[list(run.cuts)]
@@ -54,12 +54,12 @@ def first_after_changes(run: RecordedRun) -> list[int]:
 
 
 def without_spikes(run: RecordedRun) -> RecordedRun:
-    """The run with lines between the neighbours in place of spikes.
+    """The run with spikes replaced by the lines between their neighbours.
 
     Parameters
     ----------
     run : RecordedRun
-        With the spikes that its user has named, or none yet.
+        A run with spikes that the user has named, or without known spikes.
     """
     if run.blocks is not None:
         return run
@@ -68,7 +68,7 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
         if wrong.size > 1 + _MOST_SPIKES * run.time.size:
             doubt = (
                 f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
-                "normal, and intervals may not hold"
+                "normal, and intervals may be wrong"
             )
             return replace(run, spikes=(), doubts=(*run.doubts, doubt))
     else:
@@ -81,18 +81,18 @@ def without_spikes(run: RecordedRun) -> RecordedRun:
 
 
 def most_wrong(run: RecordedRun) -> int:
-    """Samples besides the spikes that a fit may leave out."""
+    """Largest number of samples, in addition to the spikes, that a fit may leave out."""
     return min(int(1 + _MOST_SPIKES * run.time.size) - len(run.spikes or ()), _MOST_WRONG)
 
 
 def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
-    """The run with samples that a fit cannot explain; without any where they are too many.
+    """The run with wrong samples, which a fit cannot explain; without any if there are too many.
 
     Parameters
     ----------
     run : RecordedRun
     times : sequence of float
-        Of the samples (s).
+        Times of the samples (s).
     """
     if len(times) <= most_wrong(run):
         return replace(run, wrong=tuple(times))
@@ -104,9 +104,9 @@ def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
 
 
 def with_jumps(run: RecordedRun) -> RecordedRun:
-    """The run with the times at which its level jumps by itself; as it is where they are known.
+    """The run with the times of jumps of its level; unchanged if the jumps are known already.
 
-    None is looked for next to a change of the drive, where friction itself is quick, or to a gap.
+    Jumps are not searched near gaps and changes of the drive, after which friction is quick.
 
     Parameters
     ----------

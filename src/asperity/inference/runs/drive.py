@@ -1,7 +1,7 @@
 """Drive of a recording: pulling velocity and load over time.
 
-Both are linear in each of a few pieces. Derivatives to the delays of the changes are exact: a
-change moves the pieces on either side of it. The velocities are measured, or those of the caller.
+Both are piecewise linear. Derivatives with respect to the delays of changes are exact: a delay
+moves the pieces on both sides. The velocities are measured or given.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class Drive(NamedTuple):
 
 
 def filled_up(drive: Drive) -> Drive:
-    """The drive with empty pieces at its end, to one of a few lengths."""
+    """The drive padded with empty pieces at its end, to one of a few lengths."""
     pieces = len(drive.pull)
     size = 8
     while size < pieces:
         size *= 2
     extra = size - pieces
     edges = np.concatenate([drive.edges, np.full(extra, drive.edges[-1])])
-    # Their values are those at the end, where a sample may lie.
+    # The empty pieces have the final values, because a sample may lie at the end.
     last = float(drive.edges[-1] - drive.edges[-2])
 
     def padded(values: Float, slopes: Float) -> tuple[Float, Float]:
@@ -74,13 +74,13 @@ def filled_up(drive: Drive) -> Drive:
 
 
 def shifted(drive: Drive, values: Mapping[str, Array]) -> Drive:
-    """The drive whose edges are later by the values `shift` (s)."""
+    """The drive with edges delayed by the values `shift` (s)."""
     drive = Drive(*map(jnp.asarray, drive))
     return drive._replace(edges=drive.edges + values["shift"])
 
 
 def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array) -> Excitation:
-    """What acts on the slider at a time of a piece; `eps_ratio` of the load's change reaches it."""
+    """Excitation at a time of a piece; the slider feels `eps_ratio` of the change of the load."""
     since = t - drive.edges[piece]
     ratio = values.get("eps_ratio", 1.0)
     load = drive.load[piece] + drive.load_slope[piece] * since
@@ -91,21 +91,21 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
     )
 
 
-#: Fewest samples between two steps, or a step and an end: a velocity needs them.
+#: Smallest number of samples of a segment, for its velocity.
 _SAMPLES = 3
 
 
 class ConstantVelocities(NamedTuple):
-    """Segments of a recording in which the drive moves steadily, or rests.
+    """Segments of a recording in which the drive has a constant velocity or rests.
 
     Attributes
     ----------
     cuts : list of Cut
-        Between the segments.
+        Times between the segments.
     speeds : list of float
         m/s, positive, 0 in a hold; one more than cuts.
     doubts : list of str
-        Sentences on other ways to cut the recording, or on velocities that it contradicts.
+        Sentences on other possible segments, or on velocities that the recording contradicts.
     """
 
     cuts: list[Cut]
@@ -124,8 +124,8 @@ def constant_velocities(
     Raises
     ------
     InputError
-        If there are not as many velocities as segments, nothing says how the drive moves, the
-        recording begins with a hold, or the direction turns.
+        If the numbers of velocities and segments differ, if the motion of the drive is neither
+        recorded nor given, if the recording begins with a hold, or if the direction reverses.
     """
     result, speeds, holds = _given_or_measured(signals, name, steps, velocities)
     moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
@@ -142,7 +142,7 @@ def constant_velocities(
             f"{name} must slide in one direction, got a reversal; give a window without"
         )
     speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
-    # A hold that was cut in two is one.
+    # Two neighbouring holds are joined.
     kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
     return ConstantVelocities(
         [result.cuts[k] for k in kept],

@@ -1,8 +1,8 @@
-"""What the steady friction of a recorded run says of its rate dependence without a law.
+"""Rate dependence of a recorded run from its steady friction, without a law.
 
-A fit of a law uses the whole motion, transients included. The levels before and after each velocity
-step, which `asperity.measure` reads, are another estimate of d mu/d ln V from the same samples: the
-two belong next to each other, and no test decides between them.
+A fit of a law uses the whole motion with its transients. The levels before and after each velocity
+step, as `asperity.measure` reads them, are another estimate of d mu/d ln V from the same samples.
+Reports show both; no test decides between them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class LevelChange(NamedTuple):
 
 
 def level_change(rates: Sequence[LevelRate]) -> LevelChange | None:
-    """Of several steps; None of none."""
+    """Weighted mean over the steps; None without steps."""
     if not rates:
         return None
     values, errors = np.array(rates).T
@@ -53,16 +53,16 @@ def level_change(rates: Sequence[LevelRate]) -> LevelChange | None:
 def level_rates(
     time: Float, friction: Float, load: Float, steps: Sequence[float], velocities: Sequence[float]
 ) -> tuple[LevelRate, ...]:
-    """Of each velocity step whose levels can be read; none under a load that is not steady.
+    """Rates of all velocity steps with measurable levels; empty if the load varies.
 
     Parameters
     ----------
     time, friction, load : array, shape (n,)
-        Seconds; F/W; the load in any unit.
+        Time (s), F/W, and the load in any unit.
     steps : sequence of float
         Times (s) at which the pulling velocity changes.
     velocities : sequence of float
-        Between them (m/s), 0 in a hold.
+        Pulling velocities between the steps (m/s), 0 in a hold.
     """
     channels = {"mu": Channel(friction, "dimensionless"), "load": Channel(load, "dimensionless")}
     trace = Trace(time, channels, roles={"friction": "mu", "W": "load"})
@@ -71,7 +71,7 @@ def level_rates(
             trace, Question(steps=tuple(steps), velocities=tuple(velocities))
         )
     except InputError:
-        # The levels are an addition to the fit: what they lack is no mistake of the user.
+        # The levels are an addition to the fit: a step without levels is no error.
         return ()
     if any(check.name == "load" and check.verdict != "ok" for check in measured.checks):
         return ()

@@ -1,9 +1,9 @@
-"""Recorded friction of a motion, with derivatives, and the likelihood of a recording.
+"""Friction of a motion as recorded, with derivatives, and the likelihood of a recording.
 
-The states are carried from one piece of the drive to the next: velocity steps, holds, ramps and
+The states are continuous from one piece of the drive to the next: velocity steps, holds, ramps and
 load changes follow each other as in the experiment. The continuous extension of the integrator
-gives the friction between its steps. A fit takes the friction and its derivatives, differentiated
-forwards; a sampler the logarithm of the likelihood and its gradient.
+gives the friction between its steps. A fit uses the friction and its forward derivatives; a sampler
+uses the logarithm of the likelihood and its gradient.
 """
 
 from __future__ import annotations
@@ -36,10 +36,11 @@ from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
 
-#: Room for steps: the last where no start is computed in the first. A motion that needs more is
-#: taken to slip in events that no fit of smooth sliding can follow.
+#: Numbers of steps that programs have room for: the second is used if no start can be computed with
+#: the first. A motion with more steps is taken for stick-slip, which a fit of sliding cannot
+#: follow.
 ROOMS = (2048, 32768)
-#: Derivatives beyond this, whose squares overflow, are those of a motion that runs away.
+#: Larger derivatives belong to a motion that runs away; their squares would overflow.
 _STEEPEST = 1e100
 #: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
 _GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
@@ -53,24 +54,24 @@ def run_equations(
     inertia: bool = False,
     radiation_damping: bool = False,
 ) -> Motion:
-    """Equation of motion of a recording, whose numbers are those that `through` is given.
+    """Equation of motion of a recording, without numbers: `through` sets them.
 
     Parameters
     ----------
     law : type of Law
     velocity : float
-        Pulling velocity of the first piece (m/s), which is sliding.
+        Pulling velocity of the first piece (m/s), positive.
     fixed : mapping of str to float, optional
-        Numbers that stay: asperities are not elastic where lambda is fixed to 0.
+        Fixed parameters: with lambda fixed to 0 the asperities are not elastic.
     inertia, radiation_damping : bool
-        What counts in the equation of motion.
+        Whether mass and damping count in the equation of motion.
 
     Raises
     ------
     InputError
-        If what counts is fixed to 0.
+        If a mass or damping that counts is fixed to 0.
     """
-    # Arrays: as numbers they would be part of the compiled program.
+    # Arrays, because plain numbers would be constants of the compiled program.
     names = (*law_parameters(law), "M", "eta")
     numbers = {n: jnp.asarray((fixed or {}).get(n, 1.0), float) for n in names}
     slider = slider_from(law, numbers | {"K": 1.0, "W0": 1.0})
@@ -86,7 +87,7 @@ def recorded_friction(
     reading: Reading,
     room: int = ROOMS[0],
 ) -> tuple[Float, Float] | None:
-    """Friction at the samples of a run; None where the motion runs away or cannot be computed.
+    """Friction at the samples of a run; None if the motion runs away or cannot be computed.
 
     Parameters
     ----------
@@ -97,11 +98,11 @@ def recorded_friction(
         `start_state_i`, departures of the initial states from steady sliding (0 where not given);
         `shift_j`, delay of the j-th edge of the drive (s).
     free : tuple of str
-        Names for derivatives, of those.
+        Names in `values` for derivatives.
     drive : Drive
     reading : Reading
     room : int
-        Steps of the integrator at most.
+        Largest number of steps of the integrator.
 
     Returns
     -------
@@ -115,7 +116,7 @@ def recorded_friction(
     friction, slopes, done = through(motion, wanted, arrays, drive, reading.filled_up(), room=room)
     n = len(reading.index)
     f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
-    # NaN and infinity are not below it either.
+    # NaN and infinity also fail this comparison.
     good = bool(done) and np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()
     return (f, jacobian) if good else None
 
@@ -130,21 +131,21 @@ def through(
     *,
     room: int,
 ) -> tuple[Array, Array, Array]:
-    """Friction as recorded under given numbers, differentiated forwards.
+    """Friction as recorded with the given numbers, and its forward derivatives.
 
     Parameters
     ----------
     motion : Motion
-        Whose numbers are replaced by `given`.
+        Equation of motion; `given` replaces its numbers.
     free : Free
-        What derivatives are taken to.
+        Parameters of the derivatives.
     given : dict of str to array
         All parameters, as `arranged` returns them.
     drive : Drive
     reading : Reading
-        Of n samples.
+        A reading of n samples.
     room : int
-        Steps at most.
+        Largest number of steps.
 
     Returns
     -------
@@ -207,17 +208,17 @@ def _averaged(
     steps: Array,
     edges: Array,
 ) -> Array:
-    """Mean F/W between neighbouring edges; 0 where there is no time between them."""
+    """Mean F/W between neighbouring edges; 0 between equal edges."""
     numbers = jnp.arange(curve.begin.size)
     taken = numbers < steps
     begin = jnp.where(taken, curve.begin, 0.0)
-    # Means are differences of an integral: of what is small, they keep more digits.
+    # Means are differences of an integral; integrating small numbers keeps more digits.
     level = jax.lax.stop_gradient(
         _friction(motion, drive, values, curve, numbers[:1], jnp.zeros(1), begin[:1])
     )
 
     def integral(step: Array, share: Array) -> Array:
-        """Of F/W from the beginning of a step to a share of its length."""
+        """Integral of F/W from the beginning of a step to a share of its length."""
         total = jnp.zeros(share.shape)
         for node, weight in _GAUSS:
             at = begin[step] + node * share * curve.length[step]
@@ -234,7 +235,7 @@ def _averaged(
 
 
 def _step_of(curve: Curve, steps: Array, times: Array) -> Array:
-    """Step of the integrator that each time lies in."""
+    """Index of the integrator's step that contains each time."""
     begin = jax.lax.stop_gradient(curve.begin)
     i = jnp.clip(jnp.searchsorted(begin, times, side="right") - 1, 0)
     return jnp.minimum(i, steps - 1)
@@ -253,7 +254,7 @@ def _friction(
     x = share
 
     def state(i: int) -> Array:
-        # Each state by itself: those that the force does not depend on are not computed.
+        # State by state: states without influence on the force are then not computed.
         c = [curve.coefficients[:, j, i][step] for j in range(5)]
         return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + (1 - x) * c[4])))
 
@@ -278,7 +279,7 @@ class RunArrays(NamedTuple):
     reading : Reading
     recorded : array, shape (n,)
     noise : tuple of Whitening
-        Of each stretch.
+        Noise of each stretch.
     basis : array, shape (n, columns)
         Whitened linear nuisances, orthonormal.
     """
@@ -302,13 +303,13 @@ class RunResiduals:
     Attributes
     ----------
     equation : Motion
-        What of the equation of motion is no number.
+        The equation of motion without its numbers.
     inner : tuple of (str, str)
-        Free parameters that this recording depends on, and their names in the motion.
+        Free parameters of this recording, and their names in the motion.
     stretches : tuple of (int, int)
         First sample and the one after the last of each stretch of noise.
     room : int
-        Steps of the integrator at most.
+        Largest number of steps of the integrator.
     """
 
     equation: Any
@@ -317,7 +318,7 @@ class RunResiduals:
     room: int
 
     def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
-        """Of parameters by name, shape (n,); NaN where the motion cannot be computed."""
+        """Residuals for parameters by name, shape (n,); NaN if the motion cannot be computed."""
         motion = eqx.combine(data.motion, self.equation)
         names = tuple(inner for _, inner in self.inner)
 

@@ -1,14 +1,14 @@
-"""Innovations of a recording's noise, tests of them, and what estimating the noise costs.
+"""Innovations of the noise of a recording, tests of them, and the uncertainty of the noise.
 
-Innovations are independent and normal with unit variance if law and noise are right. A law, a gauge
-or a drive that is not that of the recording shows in the samples after the changes of the drive,
-and a wrong sample in the innovations that it has a part in.
+Innovations are independent and normal with unit variance if law and noise are right. A wrong law,
+gauge or drive shows in the samples after changes of the drive, and a wrong sample in all
+innovations that contain it.
 
-The covariance of generalised least squares is that under known noise. The coefficients of the noise
-are estimated from the same samples: estimates vary with them (Kackar and Harville, J. Am. Stat.
-Assoc. 79, 853, 1984), and so does the covariance itself, whose degrees of freedom (Satterthwaite,
-Biometrics Bull. 2, 110, 1946) Student's t needs; both as Kenward and Roger (Biometrics 53, 983,
-1997) put them together, for noise that is autoregressive.
+The covariance of generalised least squares holds for known noise. The coefficients of the noise are
+estimated from the same samples. The estimates vary with these coefficients (Kackar and Harville, J.
+Am. Stat. Assoc. 79, 853, 1984), and so does the covariance, whose degrees of freedom
+(Satterthwaite, Biometrics Bull. 2, 110, 1946) enter Student's t. Both effects are combined as by
+Kenward and Roger (Biometrics 53, 983, 1997), for autoregressive noise.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy.special import chdtrc, ndtri
 from asperity.arrays import Float
 from asperity.recording.defects.autoregression import Autoregression, LaggedProducts, Whitening
 
-#: Lags of the test of whiteness, at least.
+#: Smallest number of lags in the test of whiteness.
 _LAGS = 20
 
 
@@ -35,14 +35,14 @@ def innovations(
     basis: Any = None,
     module: Any = np,
 ) -> Any:
-    """Innovations of unit variance, without what linear nuisances take of them.
+    """Innovations of unit variance, with linear nuisances projected out.
 
     Parameters
     ----------
     columns : array, shape (n,) or (n, columns)
-        Computed less recorded friction, and its derivatives; of NumPy or of JAX.
+        Computed less recorded friction, and its derivatives; NumPy or JAX arrays.
     noise : sequence of Whitening
-        Of each stretch.
+        Noise of each stretch.
     stretches : sequence of (int, int)
     basis : array, shape (n, nuisances), optional
         Whitened linear nuisances, orthonormal.
@@ -61,7 +61,7 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> float:
     ----------
     innovations : sequence of array
     fitted_order : int
-        Coefficients that were estimated from the same samples.
+        Number of coefficients that were estimated from the same samples.
     """
     n = sum(x.size for x in innovations)
     lags = min(max(_LAGS, 2 * fitted_order), n // 4)
@@ -71,17 +71,18 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> float:
     return float(chdtrc(max(lags - fitted_order, 1), n * (n + 2) * q))
 
 
-#: Probability that noise is taken for a wrong sample, anywhere in a recording.
+#: Probability that noise is mistaken for a wrong sample, anywhere in a recording.
 _CHANCE = 1e-3
-#: Samples in a row that may be wrong. More are a motion that the law does not have: a gauge's lag
-#: of up to 4 samples that is not given leaves 6 to 9 in a row in 5 of 10 recordings of load steps.
+#: Largest number of successive wrong samples. More are a motion that the law does not describe: an
+#: unstated lag of the gauge of up to 4 samples leaves 6 to 9 successive wrong samples in 5 of 10
+#: recordings of load steps.
 _IN_A_ROW = 3
-#: Share of a sample's innovations that is left by curves which may explain any value of it.
+#: A sample has no influence if the fitted curves leave a smaller share of its innovations.
 _EXPLAINED = 1e-6
 
 
 def largest_departure(n: int) -> float:
-    """The departure, in standard deviations, that noise makes in one of 1,000 sets of n samples."""
+    """Departure (standard deviations) that noise exceeds in one of 1,000 sets of n samples."""
     return -float(ndtri(_CHANCE / (2 * n)))
 
 
@@ -92,7 +93,7 @@ def wrong_samples(
     stretches: Sequence[tuple[int, int]],
     most: int,
 ) -> list[int]:
-    """Single samples that neither the motion nor its noise explains, in rising order.
+    """Indices of single samples that neither the motion nor its noise explains, in rising order.
 
     Parameters
     ----------
@@ -101,18 +102,19 @@ def wrong_samples(
     curves : array, shape (n, columns)
         Innovations of the derivatives of the motion, and of linear nuisances.
     noise : sequence of Whitening
-        Of each stretch.
+        Noise of each stretch.
     stretches : sequence of (int, int)
     most : int
-        Where there are more, the search ends at one more, and those in a row are among them.
+        The search ends with one more than this number; successive samples are then included.
 
     Notes
     -----
-    The size of an impulse at each sample over its standard error (an additive outlier of Fox, J. R.
-    Stat. Soc. B 34, 350, 1972), while all curves follow it and it does not count for the scale of
-    the noise. The largest is removed before the next is looked for: it hides others.
-    Innovations with the tails of Student's t would not do: a wrong sample has a part in those of as
-    many samples as the order of the noise.
+    The test statistic is the size of an impulse at each sample over its standard error (an additive
+    outlier of Fox, J. R. Stat. Soc. B 34, 350, 1972). All curves are refitted with the impulse, and
+    the sample does not count for the scale of the noise. The largest impulse is removed before the
+    next is searched, because it hides others.
+    Student's t in place of normal innovations would not help: a wrong sample changes as many
+    innovations as the order of the noise.
     """
     basis = np.linalg.qr(curves)[0]
     white = white - basis @ (basis.T @ white)
@@ -142,18 +144,18 @@ def wrong_samples(
 def _at_samples(
     white: Float, noise: Sequence[Whitening], stretches: Sequence[tuple[int, int]]
 ) -> Float:
-    """Products with the innovations of an impulse at each sample."""
+    """Inner products with the innovations of an impulse at each sample."""
     return np.concatenate(
         [w.transposed(white[a:b]) for w, (a, b) in zip(noise, stretches, strict=True)]
     )
 
 
-#: Samples after a change in which a misfit is looked for, and before it: its time is uncertain.
+#: A misfit is searched in so many samples after a change, and before it: its time is uncertain.
 _AFTER, _BEFORE = (5, 20, 80), 5
 
 
 def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, float]:
-    """Probability of innovations as large as those after the changes, and their size.
+    """Probability of innovations as large as those after changes of the drive, and their size.
 
     Parameters
     ----------
@@ -164,8 +166,8 @@ def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, flo
     Returns
     -------
     (float, float)
-        Probability by chi-squared, over the spans that are looked at; root mean square of the
-        innovations in the span of the lowest one, over that of the others.
+        Lowest probability of chi-squared over the tested spans; root mean square of the innovations
+        in that span, over that of all other innovations.
     """
     lowest, size = 1.0, 1.0
     for span in _AFTER:
@@ -182,31 +184,31 @@ def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, flo
     return min(1.0, len(_AFTER) * lowest), size
 
 
-#: Samples whose derivatives are held at once.
+#: Number of samples whose derivatives are computed at once.
 _CHUNK = 4096
 
 
 def added_by_noise(
     model: Autoregression, curves: Float, nuisances: Float, covariance: Float
 ) -> tuple[Float, Float]:
-    """Covariance that estimated coefficients add, and the variance of the one without it.
+    """Covariance added by estimated noise coefficients, and variance of the covariance itself.
 
     Parameters
     ----------
     model : Autoregression
-        Estimated from a stretch of n samples.
+        Noise estimated from a stretch of n samples.
     curves : array, shape (n, parameters)
-        Derivatives of the signal to the parameters, less what linear nuisances take of them.
+        Derivatives of the signal in the parameters, with linear nuisances projected out.
     nuisances : array, shape (n, columns)
         Whitened linear nuisances, orthonormal over all samples of the recording.
     covariance : array, shape (parameters, parameters)
-        Of the parameters under known noise, by all data and priors.
+        Covariance of the parameters under known noise, by all data and priors.
 
     Returns
     -------
     added : array, shape (parameters, parameters)
     variance : array, shape (parameters,)
-        Of the diagonal of `covariance`, as the noise of this stretch is estimated.
+        Variance of the diagonal of `covariance`, due to the estimated noise of this stretch.
 
     Notes
     -----
@@ -217,7 +219,7 @@ def added_by_noise(
     n, p = curves.shape[0], model.order
     white = model.whiten(curves)
     weights = white @ covariance
-    # The scale of the noise, with so many samples left to estimate it.
+    # The variance of the scale, from the remaining degrees of freedom.
     left = max(n - curves.shape[1] - nuisances.shape[1] - p, 1)
     variance = 2 / left * np.einsum("ij,ij->j", weights, weights) ** 2
     if not p:

@@ -1,4 +1,4 @@
-"""What a force gauge records of a motion: samples or means over blocks, behind its low-pass.
+"""The recording of a motion by a force gauge: samples or block means, after its low-pass.
 
 A linear function of the friction at computed times, in JAX. The low-pass is a convolution with its
 response to one sample, by fast Fourier transforms.
@@ -19,39 +19,39 @@ from scipy.fft import next_fast_len
 from asperity.arrays import Float
 from asperity.tribometer.sensors import between, filtered, low_pass
 
-#: Name of the gauge's gain in the motion of a run, and of that of every run in priors.
+#: Name of the gauge's gain: in the motion of a run, and for all runs in priors.
 GAIN = "gain"
-#: Computed times, and samples, are filled up to this times a power of two, or 3/2 of it.
+#: Computed times, and samples, are padded to this number times a power of two, or 3/2 of that.
 _ROUNDED = 1024
-#: Samples ahead that the filter of evenly spaced samples reads.
-_AHEAD = 2
-#: Samples that the quickest part of the gauge's response is resolved by.
+#: Number of later samples that the filter of evenly spaced samples uses.
+_LATER_SAMPLES = 2
+#: Number of computed samples in the quickest part of the gauge's response.
 _FILTER_SAMPLES = 8.0
-#: Samples of the filtered motion in a block.
+#: Computed samples of the filtered motion in a block.
 _BLOCK_SAMPLES = 4
 
 
 class Reading(eqx.Module):
-    """Numbers of a gauge that records samples, or means over blocks.
+    """Arrays that turn a computed motion into recorded samples, or means over blocks.
 
     Attributes
     ----------
     times : array, shape (m,)
-        At which the motion is computed (s), in order, filled up by the last.
+        Times at which the motion is computed (s), in order, padded with the last time.
     index : array of int, shape (n, k)
-        Computed values, or filtered ones, that each sample is read from; for means behind a
-        low-pass, those before the edges of the block.
+        Indices of the computed or filtered values for each sample; for means after a low-pass, of
+        the values before the edges of the block.
     weight : array, shape (n, k)
-        Of those values; for means behind a low-pass, the share of an interval from there to the
-        edge.
+        Weights of these values; for means after a low-pass, the distance from the value to the
+        edge, as a share of the interval.
     response : array, shape (size,)
-        Of the low-pass to one sample, from two samples before it on, filled up by zeros; empty
+        Response of the low-pass to one sample, from two samples before it, padded with zeros; empty
         without a low-pass.
     per_length : array, shape (n,)
-        1 over the length of each block, in intervals; empty where there are no means behind a
+        1 over the length of each block, in intervals; empty unless there are means after a
         low-pass.
     means : bool
-        Whether the motion is averaged between each two of the times, for blocks without a low-pass.
+        Whether the motion is averaged between successive times: blocks without a low-pass.
     """
 
     times: Any
@@ -62,8 +62,8 @@ class Reading(eqx.Module):
     means: bool = eqx.field(static=True)
 
     def filled_up(self) -> Reading:
-        """The same with the last sample repeated, up to one of a few lengths."""
-        extra = _filling(len(self.index))
+        """The reading padded with its last sample, to one of a few lengths."""
+        extra = _padding(len(self.index))
 
         def filled(rows: Float) -> Float:
             return np.concatenate([rows, np.repeat(rows[-1:], extra, axis=0)])
@@ -81,8 +81,8 @@ class Reading(eqx.Module):
         Parameters
         ----------
         friction : array
-            At the times, or means between each two of them; steady before the first, and as the
-            last afterwards.
+            Friction at the times, or means between successive times; assumed constant before the
+            first and after the last.
         """
         if not self.response.size:
             return jnp.sum(self.weight * friction[self.index], axis=1)
@@ -97,21 +97,21 @@ class Reading(eqx.Module):
         return first + (at_edges[:, 1] - at_edges[:, 0]) * self.per_length
 
     def _filtered(self, values: Array) -> Array:
-        """Values at evenly spaced times, the first 0, behind the low-pass."""
+        """Values at evenly spaced times, the first of which is 0, after the low-pass."""
         m, size = values.size, self.response.size
-        moved = jnp.append(values, jnp.full(_AHEAD, values[-1]))
+        moved = jnp.append(values, jnp.full(_LATER_SAMPLES, values[-1]))
         transfer = jnp.fft.rfft(self.response)
         whole = jnp.fft.irfft(jnp.fft.rfft(moved, size) * transfer, size)
-        return whole[_AHEAD : _AHEAD + m]
+        return whole[_LATER_SAMPLES : _LATER_SAMPLES + m]
 
 
 def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
-    """The reading of samples at some times, or of means between them.
+    """The reading of samples at the given times, or of means over the given blocks.
 
     Parameters
     ----------
     times : array, shape (n,) or (n, 2)
-        Of recorded samples, or beginning and end of each block (s); the last is the latest.
+        Times of samples, or beginning and end of each block (s); the last is the latest.
     gauge : (int, float), optional
         Order, and corner frequency (Hz), of a Butterworth low-pass.
     """
@@ -120,18 +120,18 @@ def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
         at = times if times.ndim == 1 else np.unique(times)
         index = np.arange(at.size) if times.ndim == 1 else np.searchsorted(at, times[:, 0])
         weight = np.ones((index.size, 1))
-        return Reading(_filled(at), index[:, None], weight, nothing, nothing, times.ndim == 2)
+        return Reading(_padded(at), index[:, None], weight, nothing, nothing, times.ndim == 2)
     apart = np.median(np.diff(times if times.ndim == 1 else times.mean(axis=1)))
     inside = 1 if times.ndim == 1 else _BLOCK_SAMPLES
     rate = max(inside / float(apart), _FILTER_SAMPLES * gauge[1])
     end = float(times.flat[-1])
     count = math.ceil(end * rate) + 1
-    at = _filled(np.minimum(np.arange(count) / rate, end))
-    impulse = np.zeros(at.size + 3 * _AHEAD)
-    impulse[2 * _AHEAD] = 1.0
-    response = filtered(impulse, rate, *low_pass(*gauge))[_AHEAD:]
-    # Longer than the two together, so that the end does not reach the beginning.
-    length = next_fast_len(2 * at.size + 2 * _AHEAD, real=True)
+    at = _padded(np.minimum(np.arange(count) / rate, end))
+    impulse = np.zeros(at.size + 3 * _LATER_SAMPLES)
+    impulse[2 * _LATER_SAMPLES] = 1.0
+    response = filtered(impulse, rate, *low_pass(*gauge))[_LATER_SAMPLES:]
+    # Longer than signal and response together: the circular convolution does not wrap around.
+    length = next_fast_len(2 * at.size + 2 * _LATER_SAMPLES, real=True)
     response = np.append(response, np.zeros(length - response.size))
     position = np.clip(times * rate, 0, count - 1)
     if times.ndim == 1:
@@ -145,12 +145,12 @@ def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
     return Reading(at, index, position - index, response, per_length, False)
 
 
-def _filled(times: Float) -> Float:
-    """Times with the last one repeated, up to one of a few lengths."""
-    return np.concatenate([times, np.full(_filling(times.size), times[-1])])
+def _padded(times: Float) -> Float:
+    """Times padded with the last time, to one of a few lengths."""
+    return np.concatenate([times, np.full(_padding(times.size), times[-1])])
 
 
-def _filling(size: int) -> int:
-    """How many are missing to one of a few lengths."""
+def _padding(size: int) -> int:
+    """Number of elements that are missing to the next of a few lengths."""
     power = _ROUNDED << max(math.ceil(math.log2(size / _ROUNDED)), 0)
     return (power * 3 // 4 if power > _ROUNDED and size <= power * 3 // 4 else power) - size

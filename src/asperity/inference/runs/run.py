@@ -1,4 +1,4 @@
-"""A recording as data of a fit: friction over time, and the drive that it was recorded under."""
+"""A recording as data of a fit: friction over time, and the drive."""
 
 from __future__ import annotations
 
@@ -29,16 +29,17 @@ from asperity.units import quantity_text
 
 #: A load that varies by less than this share of its mean is taken as constant.
 _CONSTANT_LOAD = 1e-3
-#: The load is followed to this many standard deviations of its noise.
+#: The piecewise linear load follows the recorded load to this many standard deviations of its
+#: noise.
 _LOAD_NOISE = 5.0
-#: Samples between two corners that may be one.
-_AT_CORNER = 5
-#: Samples on either side of a corner that place it.
-_BESIDE_CORNER = 50
-#: Samples up to which a recording is compared sample by sample.
+#: Two corners of the load closer than this many samples may be one.
+_CORNERS_MERGE = 5
+#: Number of samples on each side of a corner from which its time is computed.
+_SAMPLES_NEAR_CORNER = 50
+#: Largest number of samples that are compared one by one.
 LONGEST = 20_000
-#: Of longer ones: parts into which the load between its quick
-#: changes is averaged, and the chance of a sample that noise puts beyond the limit.
+#: For longer recordings: number of blocks over which the load between its quick changes is
+#: averaged, and probability that noise moves a sample beyond the limit.
 _LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
 #: Friction above this is a mistake of units.
 _LARGEST_FRICTION = 5.0
@@ -46,18 +47,18 @@ _LARGEST_FRICTION = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Blocks of samples whose means stand for a long recording.
+    """Blocks of samples whose means replace the samples of a long recording.
 
     Attributes
     ----------
     edges : array, shape (n, 2)
-        Beginning and end of each (s).
+        Beginning and end of each block (s).
     samples : tuple of int
-        Samples in a block, of each stretch of one sampling rate.
+        Number of samples in a block, for each stretch with one sampling rate.
     recorded : int
-        Samples of the recording.
+        Number of samples of the recording.
     lines : tuple of float
-        Lines (Hz) that were taken off the friction before.
+        Spectral lines (Hz) that were subtracted from the friction before.
     """
 
     edges: Float
@@ -67,7 +68,7 @@ class Blocks:
 
     @property
     def sentence(self) -> str:
-        """What was averaged, for readers."""
+        """A sentence on the averaging."""
         lengths = np.unique(np.round(np.diff(self.edges, axis=1)[:, 0], 9))
         spread = [f"{1e3 * x:.4g}" for x in (lengths[0], lengths[-1])]
         lines = ", ".join(f"{hertz:.4g}" for hertz in self.lines)
@@ -75,7 +76,7 @@ class Blocks:
             f"{self.recorded} samples are compared as {len(self.edges)} means over blocks of "
             + (" or ".join(map(str, sorted(set(self.samples)))))
             + f" ({' to '.join(dict.fromkeys(spread))} ms)"
-            + (f", after lines at {lines} Hz were taken off" if lines else "")
+            + (f", after lines at {lines} Hz were subtracted" if lines else "")
         )
 
 
@@ -86,42 +87,42 @@ class RecordedRun:
     Attributes
     ----------
     name : str
-        What messages and names of nuisances call the run.
+        Name of the run in messages and in names of nuisances.
     time, friction : array, shape (n,)
-        Seconds from the first sample, and F/W; means over blocks if there are any.
+        Time from the first sample (s), and F/W; block means if `blocks` is set.
     slip : array, shape (n,)
-        Displacement of the load point from the first sample (m), of the drive.
+        Displacement of the load point from the first sample (m).
     drive : Drive
     cuts : tuple of int
         Edges of the drive at which the pulling velocity changes.
     cut_uncertainty : tuple of float
-        Standard uncertainty of the time of each (s).
+        Standard uncertainty of the time of each cut (s).
     velocity : float
         Pulling velocity of the first segment (m/s).
     velocities : tuple of float
-        Of all segments (m/s); 0 in a hold.
+        Pulling velocities of all segments (m/s); 0 in a hold.
     origin : float
         Time of the first sample in the recording (s).
     W0 : float
         Load at the first sample, in `load_unit`.
     load_unit : str
-        "N", "Pa", or "" where no load was recorded: K then is the stiffness over the load (1/m).
+        "N", "Pa", or "" if no load was recorded: K is then the stiffness over the load (1/m).
     load_varies : bool
     stretches : tuple of (int, int)
-        First sample and the one after the last of each stretch of one sampling rate.
+        First sample, and sample after the last, of each stretch with one sampling rate.
     doubts : tuple of str
-        Sentences on what about the drive is open.
+        Sentences on uncertainties of the drive.
     spikes, jumps : tuple of float, or None
-        Times (s) of single samples that are wrong, and times from which on the level of the gauge
-        is another one; None where they have not been looked for.
+        Times (s) of single wrong samples, and times from which on the level of the gauge differs;
+        None before they are searched.
     wrong : tuple of float, or None
         Times (s) of samples, or means, that neither a fitted motion nor its noise explains; None
-        where they have not been looked for.
+        before they are searched.
     blocks : Blocks or None
-        None where `friction` is that of single samples.
+        None if `friction` has single samples.
     level_rates : tuple of (float, float)
-        d mu/d ln V by the steady friction before and after each velocity step, measured without a
-        law, and its standard uncertainty; none where it cannot be read.
+        d mu/d ln V with its standard uncertainty, from the steady friction before and after each
+        velocity step, without a law; steps without steady friction are left out.
     """
 
     name: str
@@ -147,17 +148,17 @@ class RecordedRun:
 
     @property
     def at(self) -> Float:
-        """Where the motion is compared: times (n,), or edges of blocks (n, 2), in seconds."""
+        """Times (n,) of the samples, or edges (n, 2) of the blocks, in seconds."""
         return self.time if self.blocks is None else self.blocks.edges
 
     def rows_at(self, times: Sequence[float]) -> Index:
-        """Samples, or means over blocks, that hold times (s) of samples."""
+        """Indices of the samples, or of the blocks, at given times (s) of samples."""
         begin = self.time if self.blocks is None else self.blocks.edges[:, 0]
         return np.searchsorted(begin, times, side="right") - 1
 
     @property
     def stiffness_unit(self) -> str:
-        """Unit of K: that of the load over a length."""
+        """Unit of K: the unit of the load over a length."""
         return {"N": "N/m", "Pa": "Pa/m"}.get(self.load_unit, "1/m")
 
 
@@ -178,21 +179,21 @@ def recorded_run(
     Parameters
     ----------
     recording : Trace or path
-        What `asperity.read` returns, or a file that it reads without further arguments.
+        Result of `asperity.read`, or a file that it reads without further arguments.
     name : str, optional
-        By default the name of the file.
+        Name of the run; by default that of the file.
     window : (float, float), optional
-        First and last time (s).
+        First and last time of the fit (s).
     steps : sequence of float, optional
-        Times (s) at which the pulling velocity changes; found in the displacement by default.
+        Times (s) at which the pulling velocity changes; by default detected in the displacement.
     velocities : sequence of float, optional
-        Pulling velocities (m/s) of the segments, one more than `steps`, 0 in a hold; measured by
-        default.
+        Pulling velocities (m/s) of the segments, one more than `steps`, 0 in a hold; by default
+        measured.
     load, force : str
         Channels, by name or role.
     spikes, jumps : sequence of float, optional
-        Times (s) of single wrong samples, and of jumps of the gauge's level, in place of those that
-        the program finds; empty for none.
+        Times (s) of single wrong samples, and of jumps of the gauge's level. They replace the
+        automatic search; an empty sequence means none.
 
     Returns
     -------
@@ -201,8 +202,8 @@ def recorded_run(
     Raises
     ------
     InputError
-        If channels are missing, the friction never changes, the recording begins with a hold, the
-        direction turns, or the load is not positive.
+        If channels are missing, the friction is constant, the recording begins with a hold, the
+        direction reverses, or the load is not positive.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
@@ -234,8 +235,8 @@ def recorded_run(
     doubts += strange_friction(friction)
     if signals.left_out:
         doubts.append(
-            f"{signals.left_out} samples are left out, where a value is no number or time does not "
-            "go on"
+            f"{signals.left_out} samples are left out, because a value is no number or time does "
+            "not increase"
         )
     return RecordedRun(
         name=shown,
@@ -253,17 +254,17 @@ def recorded_run(
         load_varies=varies,
         stretches=rate_stretches(times),
         doubts=tuple(doubts),
-        spikes=_of_the_user(spikes, origin, times, "spikes"),
-        jumps=_of_the_user(jumps, origin, times, "jumps"),
+        spikes=_named_times(spikes, origin, times, "spikes"),
+        jumps=_named_times(jumps, origin, times, "jumps"),
         wrong=None if spikes is None else (),
         level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
     )
 
 
-def _of_the_user(
+def _named_times(
     given: Sequence[float] | None, origin: float, times: Float, name: str
 ) -> tuple[float, ...] | None:
-    """Times from the first sample on of samples that a user has named; None if none were."""
+    """Times, from the first sample on, of samples that the user has named; None by default."""
     if given is None:
         return None
     result = []
@@ -287,7 +288,7 @@ def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
 
 
 def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | None) -> list[str]:
-    """Sentences on a gauge at the end of its range."""
+    """Sentences on samples at the end of the gauge's range."""
     values = shear_channel(trace, force, load_channel(trace, load))[0].values
     low, high = window or (-np.inf, np.inf)
     use = (trace.time >= low) & (trace.time <= high) & np.isfinite(values)
@@ -297,13 +298,13 @@ def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | N
         f"value, {level.value:.6g}: the gauge seems to be at the end of its range, and a fit to "
         "clipped friction is wrong; give a window without"
         for level in saturated(values)
-        # A recording that begins or ends at its extreme is at rest.
+        # Extreme samples at the beginning or end of a recording are at rest, not clipped.
         if level.rows[0] > 0 and level.rows[-1] < values.size - 1
     ]
 
 
 def strange_friction(friction: Float) -> list[str]:
-    """Sentences on friction of no usual size, and on friction whose digits are too coarse.
+    """Sentences on friction of unusual size, and on friction that was rounded too coarsely.
 
     Parameters
     ----------
@@ -313,7 +314,7 @@ def strange_friction(friction: Float) -> list[str]:
     usual = float(np.median(np.abs(friction)))
     if usual > _LARGEST_FRICTION:
         said.append(
-            f"friction is {usual:.4g} as a rule, more than contacts have: correct the units of "
+            f"the median friction is {usual:.4g}, more than contacts have: correct the units of "
             "force and load, or the column"
         )
     rounded = coarsely_rounded(friction)
@@ -321,7 +322,7 @@ def strange_friction(friction: Float) -> list[str]:
         said.append(
             f"{rounded[0]:.0%} of the values of friction repeat the one before, and others differ "
             f"from it by {rounded[1]:.2g}: it was rounded more coarsely than its noise, which may "
-            "bend parameters by more than the intervals say; record or write more digits"
+            "change parameters by more than the intervals say; record or write more digits"
         )
     return said
 
@@ -331,12 +332,12 @@ def recorded_load(
 ) -> tuple[Float, Float] | None:
     """Times and load, positive in compression, of the samples within the span of `time`.
 
-    None where no load is recorded.
+    None if no load is recorded.
 
     Raises
     ------
     InputError
-        If it is not positive.
+        If the load is not positive.
     """
     try:
         channel = trace.channel(load)
@@ -359,7 +360,7 @@ def recorded_load(
 def _load(
     trace: Trace, load: str, name: str, time: Float, unit: str
 ) -> tuple[float, str, bool, Float, Float]:
-    """Load at the first sample, its unit, whether it varies, and its line over time."""
+    """Load at the first sample, its unit, whether it varies, and its piecewise linear course."""
     ends = time[[0, -1]]
     recorded = recorded_load(
         trace, load, time, name, "give a window in which the slider is in contact"
@@ -372,7 +373,7 @@ def _load(
     knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
-    at = _between_samples(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
+    at = _corner_times(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
     at = _placed(t, W, at)
     values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
@@ -380,14 +381,14 @@ def _load(
 
 
 def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
-    """Samples at the corners of a line that follows the load within its noise.
+    """Samples at the corners of a piecewise linear load that follows the recorded load.
 
-    Of very many samples some are farther off by chance than the noise seems to be: what is quick is
-    found within a wider limit, and what is slow between, in means over blocks.
+    Among very many samples, noise alone moves some beyond the limit. Quick changes are therefore
+    detected with a wider limit, and slow changes between them in block means.
     """
     if t.size <= LONGEST:
         knots = _line_knots(t, W, max(_LOAD_NOISE * noise, least))
-        return _needed(t, W, knots, noise, least)
+        return _needed_knots(t, W, knots, noise, least)
     chance = -float(ndtri(_LOAD_BY_CHANCE / t.size))
     knots = _line_knots(t, W, max(2 * chance * noise, least))
     result = set(knots)
@@ -399,15 +400,15 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
         means = [x[a : a + whole].reshape(-1, q).mean(1) for x in (t, W)]
         limit = max(_LOAD_NOISE * noise / np.sqrt(q), least)
         result |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
-    return _needed(t, W, sorted(result), noise, least)
+    return _needed_knots(t, W, sorted(result), noise, least)
 
 
-def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
-    """Times of the corners at samples; one where two lines meet between samples is put there.
+def _corner_times(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
+    """Times of the corners; a corner between two samples is placed where the lines meet.
 
-    A corner between two samples seems to be one at each, or at samples some way off, since the line
-    is followed within a tolerance only. Friction follows the load within a fraction of a sampling
-    interval, so that the difference shows.
+    A corner between two samples may appear as two corners at these samples, or at samples further
+    away, because the line follows the load within a tolerance only. Friction responds to the load
+    within a fraction of a sampling interval, so that the exact time matters.
     """
     at = t[list(knots)]
     values = _line_through(t, y, at)
@@ -416,7 +417,7 @@ def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float)
     kept = list(at[:1])
     k = 1
     while k < at.size:
-        if k + 2 < at.size and size[k] <= min(_AT_CORNER, size[k - 1] - 1, size[k + 1] - 1):
+        if k + 2 < at.size and size[k] <= min(_CORNERS_MERGE, size[k - 1] - 1, size[k + 1] - 1):
             before, after = slope[k - 1], slope[k + 1]
             gap = values[k + 1] - after * at[k + 1] - (values[k] - before * at[k])
             meeting = gap / (before - after) if before != after else np.nan
@@ -436,12 +437,12 @@ def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float)
 
 
 def _placed(t: Float, y: Float, at: Float) -> Float:
-    """Corners moved by up to an interval to where the lines on either side are nearest to y."""
+    """Corners moved by up to an interval, to the best fit of the lines on both sides to y."""
     placed = at.copy()
     for k in range(1, at.size - 1):
         middle = int(np.searchsorted(t, at[k]))
-        first = max(middle - _BESIDE_CORNER, int(np.searchsorted(t, placed[k - 1])))
-        last = min(middle + _BESIDE_CORNER, int(np.searchsorted(t, at[k + 1], side="right")))
+        first = max(middle - _SAMPLES_NEAR_CORNER, int(np.searchsorted(t, placed[k - 1])))
+        last = min(middle + _SAMPLES_NEAR_CORNER, int(np.searchsorted(t, at[k + 1], side="right")))
         near, values = t[first:last], y[first:last]
         if not first + 1 < middle < last - 2:
             continue
@@ -459,10 +460,10 @@ def _placed(t: Float, y: Float, at: Float) -> Float:
 
 
 def _line_through(t: Float, y: Float, at: Float) -> Float:
-    """Values at the knots of the line, linear between them, that is nearest to y."""
+    """Values at the knots of the piecewise linear function that fits y best."""
     i = np.clip(np.searchsorted(at, t, side="right") - 1, 0, at.size - 2)
     share = (t - at[i]) / (at[i + 1] - at[i])
-    # Normal equations of the hat functions, each of which has a sample at its knot or beside it.
+    # Normal equations of the hat functions; each has a sample at its knot or next to it.
     bands = np.zeros((2, at.size))
     bands[1] = np.bincount(i, (1 - share) ** 2, at.size) + np.bincount(i + 1, share**2, at.size)
     bands[0, 1:] = np.bincount(i, share * (1 - share), at.size)[:-1]
@@ -471,7 +472,7 @@ def _line_through(t: Float, y: Float, at: Float) -> Float:
 
 
 def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
-    """Samples at the corners of a line through y within a tolerance (Ramer, Douglas, Peucker)."""
+    """Corners of a polyline through y within a tolerance (Ramer, Douglas, Peucker)."""
 
     def away(a: int, b: int) -> Float:
         """Distances from the chord."""
@@ -492,13 +493,14 @@ def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
     return sorted(kept)
 
 
-def _needed(t: Float, y: Float, knots: Sequence[int], noise: float, least: float) -> list[int]:
-    """Knots without which the line that is nearest to y would miss more than noise.
+def _needed_knots(
+    t: Float, y: Float, knots: Sequence[int], noise: float, least: float
+) -> list[int]:
+    """Knots that are needed: without them, the best piecewise linear fit to y is too poor.
 
-    A chord goes through noisy samples: some of the corners that it misses, and their neighbours,
-    are no corners of the load. Without a corner, the line between its neighbours leaves a larger
-    sum of squares; the increase is compared with the penalty of the Bayesian information criterion
-    for a corner's time and value.
+    The corners come from chords through noisy samples, and some of them are no corners of the load.
+    Without a corner, the line between its neighbours has a larger sum of squares; the increase is
+    compared with the penalty of the Bayesian information criterion for a corner's time and value.
     """
     at = np.asarray(knots)
     span = float(t[-1] - t[0])
@@ -511,7 +513,7 @@ def _needed(t: Float, y: Float, knots: Sequence[int], noise: float, least: float
         n, x1, x2, v1, xv = sums[:, b + 1] - sums[:, a]
         m, h1, h2, hv1, hxv = sums[:, b + 1] - sums[:, k]
         here = x[k]
-        # The hinge (x - here)+ less the line that is nearest to it.
+        # The hinge function (x - here)+ less its best linear fit.
         h, hx = h1 - here * m, h2 - here * h1
         hh, hv = hx - here * h, hxv - here * hv1
         spread = x2 - x1 * x1 / n
@@ -521,7 +523,7 @@ def _needed(t: Float, y: Float, knots: Sequence[int], noise: float, least: float
         gain = bend * bend * size
         high = np.abs(bend) * (here - x[a]) * (x[b] - here) / (x[b] - x[a])
         worth = np.minimum(gain / (penalty * noise**2), high / least) if noise else high / least
-        # Of neighbours that nothing needs the less needed goes first.
+        # Among neighbours that are not needed, the less needed corner is removed first.
         lower = np.concatenate([[np.inf], worth, [np.inf]])
         gone = (worth < 1) & (worth <= lower[:-2]) & (worth < lower[2:])
         if not gone.any():
@@ -531,10 +533,11 @@ def _needed(t: Float, y: Float, knots: Sequence[int], noise: float, least: float
 
 
 def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
-    """Times of velocity changes, those within a sampling interval of a corner of the load there.
+    """Times of velocity changes; those within a sampling interval of a load corner move to it.
 
-    The drive then changes both at once. A corner is known to a fraction of the interval, a change
-    of the velocity is not, and the piece between them would leave its delay no room.
+    The drive then changes velocity and load at once. The time of a corner is known to a fraction of
+    the interval, that of a velocity change is not; a short piece between them would leave no room
+    for the delay of the change.
     """
     moved = []
     for cut in cut_times:
@@ -548,7 +551,7 @@ def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> lis
 def _drive(
     times: Float, cut_times: Sequence[float], speeds: Sequence[float], knots: Float, load: Float
 ) -> tuple[Drive, list[int]]:
-    """Pieces between all changes, and the edges at which the velocity changes."""
+    """The drive, and the indices of its edges at which the velocity changes."""
     edges = np.unique(np.concatenate([[0.0, times[-1]], cut_times, knots]))
     middle = (edges[1:] + edges[:-1]) / 2
     piece = np.searchsorted(np.asarray(cut_times), middle)
@@ -560,5 +563,5 @@ def _drive(
 
 
 def run_of(data: Any) -> RecordedRun:
-    """A run from what a user may give: a run, a trace or a path."""
+    """A run from a run, a trace or a path."""
     return data if isinstance(data, RecordedRun) else recorded_run(data)

@@ -1,9 +1,9 @@
-"""Steps of the motion through a recording, and their derivatives.
+"""Integration of the motion through a recording, with derivatives.
 
 The integrator is the pair of Dormand and Prince (J. Comput. Appl. Math. 6, 19, 1980) of orders 5
 and 4 with adaptive steps that end at every change of the drive, and its continuous extension.
-Derivatives are those of the computed solution at its steps; step ends move with the changes of the
-drive.
+Derivatives are those of the discrete solution at its steps; the ends of steps move with the changes
+of the drive.
 """
 
 from __future__ import annotations
@@ -26,48 +26,48 @@ from asperity.inference.runs.reading import GAIN
 from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
 
-#: Relative and absolute local error of a step, of states of order 1.
+#: Relative and absolute local error of a step, for states of order 1.
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-9
-#: Squarings towards the largest eigenvalue, which they leave within 2 %.
+#: Number of squarings that give the largest eigenvalue within 2 %.
 _SQUARINGS = 8
-#: Steps in the first piece take this share of the room at most, as its inverse.
+#: Steps in the first piece take at most 1 over this number of the room.
 _SHARE_STEADY = 4.0
-#: Steps that are differentiated side by side.
-_SIDE_BY_SIDE = 64
+#: Number of steps that are differentiated in parallel.
+_IN_PARALLEL = 64
 #: Keys of the departures of the initial states, and of the delays of the edges of the drive.
 START, SHIFT = "start", "shift"
-#: Parameters that programs can always differentiate to, so that few differ in their names.
-_EVER_FREE = ("K", GAIN)
-#: Numbers of derivatives are filled up to a multiple of this.
-_TOGETHER = 4
+#: All programs can differentiate in these parameters, so that fewer programs are compiled.
+_ALWAYS_FREE = ("K", GAIN)
+#: Numbers of derivatives are padded to a multiple of this.
+_DERIVATIVES_PADDED = 4
 
 
 class Free(eqx.Module):
-    """What derivatives are taken to.
+    """Parameters of the derivatives.
 
-    Compiled programs know the names of laws, machine and gauge. Which of the initial states and of
-    the changes of the drive are free, and how many derivatives there are, is in numbers: recordings
-    of few and many changes share a program.
+    Names of parameters of law, machine and gauge are constants of a compiled program. Free initial
+    states and changes of the drive, and the number of derivatives, are given by arrays: recordings
+    with few and with many changes share a program.
 
     Attributes
     ----------
     names : tuple of str
         Free parameters of law, machine and gauge.
     directions : array, shape (derivatives, names + states + edges)
-        In the space of these parameters, the initial states and the edges of the drive; filled up
-        by zeros.
+        Directions in the space of these parameters, the initial states and the edges of the drive;
+        padded with zeros.
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
     directions: Any
 
     def numbers(self, given: Mapping[str, Any]) -> Array:
-        """All that may be differentiated to: parameters, initial states, edges."""
+        """All numbers that derivatives may refer to: parameters, initial states, edges."""
         named = jnp.array([given[name] for name in self.names], float)
         return jnp.concatenate([named, given[START], given[SHIFT]])
 
     def values(self, given: Mapping[str, Any], x: Array) -> dict[str, Array]:
-        """The given numbers with `x` in place of those of `numbers`."""
+        """The given numbers, with those of `numbers` replaced by `x`."""
         edges = x.size - given[SHIFT].size
         named = dict(zip(self.names, x, strict=False))
         return {**given, **named, START: x[len(self.names) : edges], SHIFT: x[edges:]}
@@ -76,28 +76,30 @@ class Free(eqx.Module):
 def arranged(
     values: Mapping[str, Any], wanted: Sequence[str], states: int, edges: int, module: Any = np
 ) -> tuple[dict[str, Any], Free]:
-    """Numbers with those of initial states and edges as arrays, and the derivatives to some.
+    """All numbers of a motion, with initial states and edges as arrays, and the wanted derivatives.
 
     Parameters
     ----------
     values : mapping of str to float or array, shape ()
-        By name; `start_force` and `start_state_i` are departures of the initial states, `shift_j`
-        the delay of the j-th edge of the drive, 0 where not given.
+        Numbers by name; `start_force` and `start_state_i` are departures of the initial states,
+        `shift_j` is the delay of the j-th edge of the drive, 0 by default.
     wanted : sequence of str
         Names for derivatives.
     states, edges : int
     module : module
-        NumPy, or JAX where values are traced.
+        NumPy, or JAX if values are traced.
     """
     starts = ("start_force", *(f"start_state_{i}" for i in range(states - 1)))
     shifts = tuple(f"shift_{j}" for j in range(edges))
     in_arrays = {*starts, *shifts}
-    names = tuple(sorted({*wanted, *_EVER_FREE} - in_arrays))
+    names = tuple(sorted({*wanted, *_ALWAYS_FREE} - in_arrays))
     place = {name: i for i, name in enumerate((*names, *starts, *shifts))}
-    directions = np.zeros((-(-len(wanted) // _TOGETHER) * _TOGETHER, len(place)))
+    directions = np.zeros(
+        (-(-len(wanted) // _DERIVATIVES_PADDED) * _DERIVATIVES_PADDED, len(place))
+    )
     for row, name in enumerate(wanted):
         directions[row, place[name]] = 1.0
-    # As an array: a plain number would be part of the program.
+    # As an array: a plain number would be a constant of the program.
     given = {n: v for n, v in {GAIN: np.ones(()), **values}.items() if n not in in_arrays}
     for key, members in ((START, starts), (SHIFT, shifts)):
         given[key] = module.stack([module.asarray(values.get(n, 0.0), float) for n in members])
@@ -105,7 +107,7 @@ def arranged(
 
 
 class Curve(NamedTuple):
-    """Steps with the coefficients of the continuous extension, filled up to the room for them."""
+    """Steps with the coefficients of the continuous extension, padded to the room for steps."""
 
     begin: Array
     length: Array
@@ -117,9 +119,9 @@ def integrated(
 ) -> tuple[Curve, Curve, Array, Array]:
     """The motion, its derivatives, its number of steps, and whether the end was reached.
 
-    Of a step the derivatives depend on those of the steps before it only through the states at its
-    beginning: they are computed for many steps side by side, and then added up along them. Their
-    first axis is that of the directions.
+    The derivatives of a step depend on earlier steps only through the states at its beginning. They
+    are computed for many steps in parallel and then accumulated. The first axis of derivatives is
+    that of the directions.
     """
 
     def begun(x: Array) -> tuple[Motion, Drive, Mapping[str, Array]]:
@@ -139,10 +141,10 @@ def integrated(
     ahead = jax.scipy.linalg.block_diag(free.directions, jnp.eye(m))
 
     def slopes_of(part: _Step, change: Array) -> tuple[Array, Curve]:
-        """Of the states after a part of the steps, and of the motion at these."""
+        """Derivatives of the states after a part of the steps, and of the motion at these steps."""
 
         def one(step: _Step, direction: Array) -> tuple[Array, Curve]:
-            """Along one direction of the parameters, or of the states."""
+            """Derivatives along one direction of the parameters, or of the states."""
 
             def moved(x: Array, y: Array) -> tuple[Array, Curve]:
                 now, drawn, values = begun(x)
@@ -170,7 +172,7 @@ def integrated(
     def body(carry: Any) -> Any:
         first, change, slopes = carry
         part = jax.tree.map(
-            lambda all_: jax.lax.dynamic_slice_in_dim(all_, first, _SIDE_BY_SIDE), taken
+            lambda all_: jax.lax.dynamic_slice_in_dim(all_, first, _IN_PARALLEL), taken
         )
         change, result = slopes_of(part, change)
         slopes = jax.tree.map(
@@ -178,7 +180,7 @@ def integrated(
             slopes,
             result,
         )
-        return first + _SIDE_BY_SIDE, change, slopes
+        return first + _IN_PARALLEL, change, slopes
 
     def begin(direction: Array) -> Array:
         return jax.jvp(first_states, (x,), (direction,))[1]
@@ -189,16 +191,16 @@ def integrated(
 
 
 class _Step(NamedTuple):
-    """What a step begins with.
+    """The beginning of a step.
 
     Attributes
     ----------
     piece : int array
-        Of the drive.
+        Piece of the drive.
     since, length : array
         Time since the beginning of the piece, and length of the step (s).
     last : bool array
-        Whether it ends with the piece.
+        Whether the step ends with the piece.
     states : array
     """
 
@@ -210,7 +212,7 @@ class _Step(NamedTuple):
 
 
 def _first_states(motion: Motion, values: Mapping[str, Array]) -> Array:
-    """States at the beginning: those of steady sliding and the departures from it."""
+    """Initial states: steady sliding plus the departures from it."""
     return motion.steady() + values[START]
 
 
@@ -229,7 +231,7 @@ def _stepped(
     def rates(at: Array, state: Array) -> Array:
         return motion.rates(state, excitation(drive, values, piece, at))
 
-    # Sums written out: products of such small matrices take longer than all else.
+    # Explicit sums: products of such small matrices would take most of the time.
     table, new = dormand_prince_5(), y
     k: list[Array] = []
     for node, row in zip(table.C, table.A, strict=True):
@@ -250,8 +252,8 @@ def _steps_taken(
     pieces = drive.pull.shape[0]
     y0 = _first_states(motion, values)
     end = drive.edges[-1]
-    # Steady sliding has no error that would limit a step. Where steps are beyond the region of
-    # stability, derivatives grow from their rounding.
+    # In steady sliding no error limits the step. Beyond the region of stability of the method,
+    # derivatives would grow from rounding errors.
     longest = jnp.maximum(
         1 / _fastest_rate(motion, drive, values, y0),
         _SHARE_STEADY * (drive.edges[1] - drive.edges[0]) / room,
@@ -267,7 +269,7 @@ def _steps_taken(
         scale = _ABSOLUTE + _RELATIVE * jnp.maximum(jnp.abs(y), jnp.abs(new))
         norm = jnp.sqrt(jnp.mean((error / scale) ** 2))
         norm = jnp.where(jnp.isfinite(norm), norm, 1e10)
-        # A piece without length is passed.
+        # A piece without length is skipped.
         accepted = (norm <= 1.0) | (step <= 1e-14 * end)
         this = _Step(piece, t - drive.edges[piece], step, last, y)
         kept = jax.tree.map(lambda all_, one: all_.at[n].set(one), kept, this)
@@ -291,7 +293,7 @@ def _steps_taken(
         jnp.zeros(room),
         jnp.zeros(room),
         jnp.zeros(room, bool),
-        # Those that fill up are computed with the others.
+        # The padding is computed with the other steps.
         jnp.zeros((room, *y0.shape)) + y0,
     )
     curve = Curve(jnp.full(room, jnp.inf), jnp.ones(room), jnp.zeros((room, 5, *y0.shape)))
@@ -314,13 +316,13 @@ def _fastest_rate(motion: Motion, drive: Drive, values: Mapping[str, Array], y: 
 
 
 def _combined(weights: Float, rates: Sequence[Array]) -> Array:
-    """Sum of the rates by their weights, those of zero left out."""
+    """Weighted sum of the rates; zero weights are skipped."""
     return functools.reduce(
         jnp.add, [w * k for w, k in zip(weights, rates, strict=False) if w != 0.0]
     )
 
 
 def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
-    """The equation of motion with other numbers of the law and the slider."""
+    """The equation of motion with new numbers of the law and the slider."""
     damping: dict[str, Any] = {name: values[name] for name in ("eta",) if name in values}
     return replace(motion, slider=slider_from(type(motion.slider.law), values), **damping)

@@ -38,25 +38,26 @@ from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
-#: Below this probability the innovations are not white: the model of the noise fails.
+#: The model of the noise fails if white innovations have a lower probability.
 _NOT_WHITE = 1e-3
-#: Correlation of neighbouring samples of a slow drift.
+#: Correlation of neighbouring samples under a slow drift.
 _SLOW = 0.999
-#: Steps towards the noise at given parameters, and what of the fitted curve counts as seen.
+#: Iterations for the noise at given parameters, and smallest relative eigenvalue of the fitted
+#: curve that counts.
 _NOISE_STEPS, _SEEN = 3, 1e-10
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
-#: Below this probability innovations after the changes are too large for the law.
+#: The law fails if such large innovations after changes have a lower probability.
 _LAW_FAILS = 1e-4
-#: Spikes, or other samples, that a warning names.
+#: Largest number of spikes, or other samples, that a warning names.
 _NAMED = 5
 
 
 class RunTerm(DataTerm):
     """A recorded run as a `DataTerm` of an objective.
 
-    Nuisances that enter linearly, such as the offset of the gauge and a trend over slip, are
-    eliminated by projection: residuals are those of their best values, under flat priors.
+    Linear nuisances, such as the offset of the gauge and a trend over slip, are eliminated by
+    projection: the residuals are those at their best values, under flat priors.
 
     Parameters
     ----------
@@ -73,12 +74,12 @@ class RunTerm(DataTerm):
         Order and corner frequency (Hz) of the low-pass of the force gauge.
     inertia, radiation_damping : bool
     order : int, optional
-        Of the noise; chosen by the data by default.
+        Order of the noise; by default the data choose it.
 
     Attributes
     ----------
     models : list of Autoregression
-        Noise of each stretch of one sampling rate.
+        Noise of each stretch with one sampling rate.
     basis : array, shape (n, columns)
         Whitened linear nuisances, orthonormal.
     """
@@ -110,7 +111,7 @@ class RunTerm(DataTerm):
         self.linear, self.nuisances = linear, nuisances
         self._own = dict(own or {})
         self._order = order
-        # In a list, which copies share: whatever the noise, the motion takes as many steps.
+        # In a list that copies share: the number of steps does not depend on the noise.
         self._room = [ROOMS[0]]
         self.motion = run_equations(
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
@@ -126,7 +127,7 @@ class RunTerm(DataTerm):
 
     @property
     def profiled(self) -> int:
-        """Parameters beyond the coordinates: linear nuisances and the noise."""
+        """Number of fitted parameters other than coordinates: linear nuisances and the noise."""
         return self._linear + sum(m.order + 1 for m in self.models)
 
     @property
@@ -149,10 +150,10 @@ class RunTerm(DataTerm):
         }
 
     def under_drift(self) -> RunTerm:
-        """The same under noise that is a slow drift, nearly a random walk.
+        """The term with a slow drift, nearly a random walk, as its noise.
 
-        Under white noise a drift looks like slow evolution of friction, and the true minimum may
-        vanish. The order of the noise, where the user has chosen it to be 0, stays.
+        Under white noise a drift looks like a slow evolution of friction, and the true minimum may
+        vanish. If the user has chosen the order 0, the noise stays white.
         """
         if self._order == 0:
             return self
@@ -174,13 +175,13 @@ class RunTerm(DataTerm):
         return tuple(self.run.time[rows].tolist())
 
     def use_search(self, always: bool) -> None:
-        """Let the motion take as many steps as there is memory for, from now on."""
+        """As in `DataTerm`: allow the motion the largest number of steps from now on."""
         self._room[:] = [ROOMS[-1]] if always else self._room
 
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
-        """Innovations of the noise; None where the motion cannot be computed."""
+        """Innovations of the noise; None if the motion cannot be computed."""
         raw = self.departures(values)
         if raw is None:
             return None
@@ -190,7 +191,7 @@ class RunTerm(DataTerm):
         scale = sum(
             m.log_scale(b - a) for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
         )
-        # A wrong sample is as likely as a departure that makes it one.
+        # A wrong sample has the density of the smallest departure that makes a sample wrong.
         scale += len(self.run.wrong or ()) * largest_departure(n) ** 2 / 2
         return Residuals(
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
@@ -201,8 +202,8 @@ class RunTerm(DataTerm):
     ) -> Float:
         """Sums of the squared innovations; see `DataTerm`.
 
-        Near an estimate, where an integral takes hundreds, by a program without derivatives, which
-        is ten times as fast; a search has not enough of them to compile it.
+        Near an estimate, an integral needs hundreds of sums: they come from a program without
+        derivatives, which is ten times as fast. A search needs too few sums to compile it.
         """
         result = []
         for numbers in values:
@@ -220,7 +221,7 @@ class RunTerm(DataTerm):
     ) -> tuple[Float, Float] | None:
         """Computed less recorded friction without linear nuisances, and the derivatives.
 
-        Those are zero without `slopes`.
+        Without `slopes` the derivatives are zero.
         """
         inner = self._inner_names(values)
         given = self.fixed | {inside: values[name] for name, inside in inner.items()}
@@ -249,7 +250,7 @@ class RunTerm(DataTerm):
         )
 
     def update_noise(self, values: Mapping[str, float]) -> bool:
-        """Estimate the noise from the residual at `values`; False if there is no motion."""
+        """Estimate the noise from the residuals at `values`; False without a motion."""
         raw = self.departures(values)
         if raw is None:
             return False
@@ -263,12 +264,12 @@ class RunTerm(DataTerm):
         return True
 
     def _estimate_noise(self, difference: Float, jacobian: Float) -> None:
-        """One step towards the noise of the residual, corrected for what the fit takes off it."""
+        """One iteration for the noise of the residual, corrected for the fitted parameters."""
         left = difference + self._columns @ self._coefficients(difference)
         curves = np.column_stack([jacobian[:, np.any(jacobian, axis=0)], self._columns])
         white = self._whitened(curves)
         size = np.sqrt(np.einsum("ij,ij->j", white, white))
-        # A root of the covariance of the fitted curve: its columns are orthonormal when whitened.
+        # A root of the covariance of the fitted curve; its whitened columns are orthonormal.
         values, vectors = np.linalg.eigh(white.T @ white / np.outer(size, size))
         seen = values > _SEEN * values[-1]
         root = (curves / size) @ (vectors[:, seen] / np.sqrt(values[seen]))
@@ -285,16 +286,16 @@ class RunTerm(DataTerm):
 
     @property
     def law_fails_after_changes(self) -> bool:
-        """Whether innovations after changes of the drive are too large for the law."""
+        """Whether the innovations after changes of the drive are too large for the law."""
         return self._after_changes[0] < _LAW_FAILS
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Why intervals of this recording do not hold, in a few words each."""
+        """Short reasons why intervals from this recording are wrong."""
         doubts = []
         if self.law_fails_after_changes:
             doubts.append(
-                f"the computed motion misses what follows the velocity changes of {self.name}"
+                f"the computed motion does not fit {self.name} after its velocity changes"
             )
         if self._whiteness < _NOT_WHITE:
             doubts.append(f"the noise of {self.name} is not the process that was fitted")
@@ -317,7 +318,7 @@ class RunTerm(DataTerm):
         return added, variance
 
     def fitted_friction(self, values: Mapping[str, float]) -> Float:
-        """Friction at the samples by the law with linear nuisances; NaN without motion.
+        """Friction at the samples by the law with linear nuisances; NaN without a motion.
 
         Parameters
         ----------
@@ -334,31 +335,31 @@ class RunTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
-        """What the residual says about the noise."""
+        """Warnings about the noise, wrong samples, jumps, and misfit after changes."""
         said = []
         if self._whiteness < _NOT_WHITE:
             said.append(
                 f"the noise of {self.name} is not the autoregressive process that was fitted (p = "
-                f"{self._whiteness:.2g} of its innovations being white): the intervals may be too "
-                "narrow; look at the residual, leave out stretches, or give a window"
+                f"{self._whiteness:.2g} for white innovations): the intervals may be too narrow; "
+                "look at the residual, leave out stretches, or give a window"
             )
         effective = float(self.noise["effective_samples"])
         if effective < 3 * (len(self.linear) + 4):
             said.append(
-                f"the noise of {self.name} is so slow that its {self.run.time.size} samples say as "
-                f"much as {max(effective, 1):.2g} with white noise: the intervals are rough; a "
-                f"longer window would help, or {Argument('drift')} if friction drifts with time"
+                f"the noise of {self.name} is so slow that its {self.run.time.size} samples are "
+                f"worth {max(effective, 1):.2g} samples with white noise: the intervals are rough; "
+                f"give a longer window, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:
             said.append(
-                self._said_of(self.run.spikes, "sample", "is a spike", "are spikes")
+                self._sentence_on(self.run.spikes, "sample", "is a spike", "are spikes")
                 + ", which no motion of the slider makes; replaced by the line between the "
                 "neighbours"
             )
         if self.run.wrong:
             what = "sample" if self.run.blocks is None else "mean"
             said.append(
-                self._said_of(self.run.wrong, what, "is", "are")
+                self._sentence_on(self.run.wrong, what, "is", "are")
                 + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
                 "if friction itself is so, the law or the drive is not that of the recording"
             )
@@ -380,7 +381,7 @@ class RunTerm(DataTerm):
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
-    def _said_of(self, times: Sequence[float], what: str, one: str, several: str) -> str:
+    def _sentence_on(self, times: Sequence[float], what: str, one: str, several: str) -> str:
         shown = ", ".join(f"{time:.6g}" for time in times[:_NAMED])
         shown += ", ..." if len(times) > _NAMED else ""
         those, are = (f"{len(times)} {what}s", several) if len(times) > 1 else (f"a {what}", one)
@@ -388,11 +389,11 @@ class RunTerm(DataTerm):
 
     @property
     def _linear(self) -> int:
-        """Linear nuisances, which come before the columns of wrong samples."""
+        """Number of linear nuisances, whose columns come before those of wrong samples."""
         return len(self.linear) + len(self.run.jumps or ())
 
     def _inner_names(self, names: Iterable[str]) -> dict[str, str]:
-        """Names in the motion of those parameters that this run depends on."""
+        """Parameters that this run depends on, with their names in the motion."""
         shared = self._known - set(self._own.values())
         return {n: self._own.get(n, n) for n in names if n in self._own or n in shared}
 
@@ -420,7 +421,7 @@ def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
 
 
 def _impulses(run: RecordedRun) -> Float:
-    """A column for each wrong sample, of which nothing is known."""
+    """A column for each wrong sample, whose value is then free."""
     rows = np.unique(run.rows_at(run.wrong or ()))
     columns = np.zeros((run.time.size, rows.size))
     columns[rows, np.arange(rows.size)] = 1.0
@@ -428,7 +429,7 @@ def _impulses(run: RecordedRun) -> Float:
 
 
 def _behind(run: RecordedRun, at: float) -> Float:
-    """Share of each sample, or block, that lies at a time or behind it."""
+    """Share of each sample, or block, that lies at or after a time."""
     if run.blocks is None:
         return np.asarray(run.time >= at, float)
     begin, end = run.blocks.edges.T
@@ -450,6 +451,6 @@ def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict
 
 
 def about_zero(parameter: Parameter, sd: float, limit: float, source: str) -> Unknown:
-    """A nuisance that is zero within a standard deviation, and below a limit."""
+    """A nuisance with mean zero and a standard deviation, bounded by plus and minus a limit."""
     prior, start = Prior(0.0, sd, source), (0.0, 0.0)
     return Unknown(parameter, False, sd, -limit, limit, start, 0.0, prior, nuisance=True)

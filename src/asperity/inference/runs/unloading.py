@@ -1,7 +1,7 @@
-"""Stiffness of a machine from a stretch in which the contact sticks: force over drive.
+"""Stiffness of a machine from a stretch of time in which the contact sticks.
 
-While the slider is unloaded, reloaded or loaded for the first time, it does not slide: the force
-follows the load point along a line of slope K. Near the onset of sliding the line bends.
+During unloading, reloading or first loading the slider does not slide: the force follows the load
+point along a line of slope K. Near the onset of sliding the line bends.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from asperity.recording.defects.autoregression import fitted
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.readers import read
 
-#: Samples that a line needs, and to which longer spans are averaged.
+#: Smallest number of samples of a line; longer spans are averaged to the second number.
 _FEWEST, _MOST = 32, 2000
 #: Rounds between the line and its noise.
 _ROUNDS = 3
-#: A slope is seen that is so many standard errors off zero.
+#: A slope is significant if it differs from zero by this many standard errors.
 _SEEN = 5.0
-#: Change of the friction over the span, over the friction of the recording, at least: a trend of
+#: Smallest change of the friction over the span, over the friction of the recording: a trend of
 #: sliding friction over slip is a line too.
 _CHANGES = 0.05
-#: The force is no line whose slope changes by so many standard errors and this share of itself, or
-#: by the larger share, whatever the noise: part of what bends passes for noise.
-_BENT, _BENT_SHARE, _BENT_ANYHOW = 2.6, 0.05, 0.25
-#: A column that others explain to this share tells nothing of its own.
-_OWN = 0.05
-#: The displacement spreads by at least so many standard deviations of its noise.
+#: The force is no line if its slope changes by this many standard errors and by this share of the
+#: slope, or by the larger share at any noise: part of a bend is mistaken for noise.
+_BENT, _BENT_SHARE, _BENT_AT_ANY_NOISE = 2.6, 0.05, 0.25
+#: A column has no information if the other columns leave a smaller share of it.
+_INDEPENDENT_SHARE = 0.05
+#: Smallest spread of the displacement in standard deviations of its noise.
 _MOVES = 5.0
 
 
@@ -51,14 +51,14 @@ class MeasuredStiffness:
     over_load, over_load_se : float
         K over the mean load of the span, and its standard uncertainty (1/m).
     value, se : float
-        K in `unit`; the same as over the load where no load is recorded.
+        K in `unit` and its standard uncertainty; over the load if no load is recorded.
     unit : str
         "N/m", "Pa/m" or "1/m".
     span : (float, float)
-        Seconds.
+        First and last time (s).
     samples : int
     bend, bend_se : float
-        Change of the slope from one end to the other over the slope, and its standard uncertainty.
+        Change of the slope from one end to the other, over the slope, and its standard uncertainty.
     """
 
     over_load: float
@@ -73,7 +73,7 @@ class MeasuredStiffness:
 
     @property
     def prior(self) -> Prior:
-        """Prior of K for a fit of a window that leaves the span out."""
+        """Prior of K for a fit of a window without the span."""
         low, high = self.span
         source = f"slope of the force from {low:g} to {high:g} s"
         return Prior(self.value, self.se, source, self.unit)
@@ -91,7 +91,7 @@ def measured_stiffness(
     Parameters
     ----------
     recording : Trace or path
-        What `asperity.read` returns, or a file that it reads without further arguments.
+        Result of `asperity.read`, or a file that it reads without further arguments.
     span : (float, float)
         First and last time (s).
     load, force : str
@@ -104,19 +104,20 @@ def measured_stiffness(
     Raises
     ------
     InputError
-        If the load point does not move there, the force does not rise with it, or its slope is not
-        the same over the whole span: then the contact slides.
+        If the load point does not move in the span, if the force does not rise with it, or if the
+        slope varies over the span: then the contact slides.
 
     Notes
     -----
-    The line is that of least squares, which for a slope is as good as any under stationary noise
-    (Grenander and Rosenblatt, 1957); its uncertainty is that under an autoregression fitted to the
-    residual with what the line takes off it. Noise of the displacement lowers a slope by its
-    variance over that of the displacement: that is put back, and added to the uncertainty. So is
-    the bend, or what noise hides of it: the slope without creep lies anywhere between that of the
-    line and that of the steeper end, half a bend away. A contact that creeps along with the drive
-    at a constant rate cannot be told from a softer machine, nor can elastic asperities: the
-    compliance that is measured is 1/K + lambda/W, machine and contact in series.
+    The line is fitted by least squares, which is efficient for a slope under stationary noise
+    (Grenander and Rosenblatt, 1957). Its uncertainty is that under an autoregression fitted to the
+    residual. Noise of the displacement lowers the slope by the ratio of its variance to that of the
+    displacement: the slope is corrected for this, and the correction is added to the uncertainty.
+    The bend, or its uncertainty, is added too: the slope without creep lies between that of the
+    line and that of the steeper end, half a bend away.
+
+    A contact that creeps with the drive at a constant rate looks like a softer machine, and so do
+    elastic asperities: the measured compliance is 1/K + lambda/W, machine and contact in series.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
@@ -159,7 +160,7 @@ def measured_stiffness(
             f"{low:g} to {high:g} s; give a stretch of unloading or reloading"
         )
     bend, bend_se = _bend(u, t, F, slope, low, high)
-    # Of the slope over the attenuated one: noise of the displacement has no part in the force.
+    # Ratio of the true to the attenuated slope: noise of the displacement is not in the force.
     attenuation = (noise / spread) ** 2
     bending = max(abs(bend), bend_se) / (2 * math.sqrt(3))
     K = slope / half / (1 - attenuation)
@@ -179,7 +180,7 @@ def measured_stiffness(
 
 
 def _direction(x: Float, here: Bool, length: float) -> float:
-    """Sign of the displacement in which the slider is pulled outside the span; 0 if unknown."""
+    """Sign of the displacement in the pulling direction, from outside the span; 0 if unknown."""
     outside = ~(here[1:] & here[:-1])
     net = float(np.diff(x)[outside].sum())
     return float(np.sign(net)) if abs(net) > length else 0.0
@@ -188,18 +189,18 @@ def _direction(x: Float, here: Bool, length: float) -> float:
 def _bend(
     u: Float, t: Float, F: Float, slope: float, low: float, high: float
 ) -> tuple[float, float]:
-    """Change of the slope over the span over the slope, and its standard error.
+    """Relative change of the slope over the span, and its standard error.
 
     Raises
     ------
     InputError
-        If the force is no line over the displacement, or another one on the way back.
+        If the force is no line over the displacement, or a different line on the way back.
     """
     line = np.stack([np.ones_like(u), u], axis=1)
     square = np.column_stack([line, u * u])
     coefficients, covariance = _least_squares(square, F)
     bend, bend_se = 4 * coefficients[2] / slope, 4 * math.sqrt(covariance[2, 2]) / slope
-    if abs(bend) > min(max(_BENT * bend_se, _BENT_SHARE), _BENT_ANYHOW):
+    if abs(bend) > min(max(_BENT * bend_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
         raise InputError(
             f"span must have one slope of the force over the displacement, got one that changes by "
             f"{abs(bend):.1%} ({bend_se:.1%} standard error) from {low:g} to {high:g} s: the "
@@ -207,13 +208,13 @@ def _bend(
         )
     clock = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     own = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
-    if own.std() > _OWN * clock.std():
+    if own.std() > _INDEPENDENT_SHARE * clock.std():
         coefficients, covariance = _least_squares(np.column_stack([square, own]), F)
         apart, apart_se = (
             abs(v) * float(np.ptp(own)) / (2 * slope)
             for v in (coefficients[3], math.sqrt(covariance[3, 3]))
         )
-        if apart > min(max(_BENT * apart_se, _BENT_SHARE), _BENT_ANYHOW):
+        if apart > min(max(_BENT * apart_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
             raise InputError(
                 f"span must have one line of the force on the ways back and forth, got lines that "
                 f"are {apart:.1%} of the force apart ({apart_se:.1%} standard error) from {low:g} "

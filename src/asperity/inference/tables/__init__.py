@@ -1,1 +1,1 @@
-"""Tables of lock-in readings, what laws predict for them, and how far the data are from that."""
+"""Tables of lock-in readings, the predictions of laws, and residuals."""

@@ -1,16 +1,16 @@
 """Residuals of a table of lock-in readings, in standard uncertainties, and their derivatives.
 
 Harmonics with a phase are compared as complex numbers, turned by the measured phase: the radial
-part over the uncertainty of the amplitude, the tangential part over amplitude times the uncertainty
-of the phase. A harmonic below its uncertainty then does not bias the fit, as its amplitude, which
-is never negative, would.
+part is divided by the uncertainty of the amplitude, the tangential part by amplitude times the
+uncertainty of the phase. A harmonic below its uncertainty then does not bias the fit; its
+amplitude, which is never negative, would.
 
-Every residual is a linear function of what a law predicts at its row. Where the observables of a
-row are correlated, C = S R S with the uncertainties S and the correlations R, the residuals are
-multiplied by R^-1/2, so that each stays as close to its own observable as can be (Kessy, Lewin and
-Strimmer, 2018).
+Every residual is a linear function of the prediction at its row. If the observables of a row are
+correlated, with the covariance C = S R S of uncertainties S and correlations R, the residuals are
+multiplied by R^-1/2, which keeps each residual as close to its observable as possible (Kessy, Lewin
+and Strimmer, 2018).
 
-Outliers are rows that a fit does not describe, although it describes the others.
+Outliers are rows that a fit does not describe, while it describes all other rows.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from asperity.inference.tables.table import OBSERVABLES, LockInTable
 
 #: Columns of `Prediction.columns`.
 _MEAN, _STEADY, _HARMONICS, _AMPLITUDES, _COLUMNS = 0, 1, (2, 4), (6, 7), 8
-#: A phase with a larger uncertainty (rad) may be any; tables often cap what they report there.
+#: A phase with a larger uncertainty (rad) is unknown; tables often cap such uncertainties.
 _ANY_PHASE = 0.5
 
 
 class Prediction(NamedTuple):
-    """What a law predicts at the rows of a table.
+    """Predictions of a law at the rows of a table.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Weights(NamedTuple):
     target : array, shape (rows, slots)
     reported : bool array, shape (rows, slots)
     log_scales : array, shape (rows,)
-        As `log_scale` of `Residuals`, of each row.
+        The `log_scale` of `Residuals` of each row.
     """
 
     matrix: Any
@@ -69,7 +69,7 @@ class Weights(NamedTuple):
     def compared(self, columns: Any) -> Any:
         """Residuals of predictions, shape (..., rows, columns) to (..., rows, slots).
 
-        0 in slots that a row does not report. Of NumPy and of JAX arrays.
+        0 in slots that a row does not report. Works with NumPy and JAX arrays.
         """
         return self.along(columns) - self.target
 
@@ -79,7 +79,7 @@ class Weights(NamedTuple):
 
     @property
     def log_scale(self) -> float:
-        """Of all rows."""
+        """Sum over all rows."""
         return float(self.log_scales.sum())
 
 
@@ -90,8 +90,8 @@ def weights_of(table: LockInTable, slopes: Float | None = None) -> Weights:
     ----------
     table : LockInTable
     slopes : array, shape (rows, columns), optional
-        Derivatives of the predictions to the measured epsilon, whose errors then count as errors
-        of the readings (effective variance; Orear, Am. J. Phys. 50, 912, 1982). Without them
+        Derivatives of the predictions in the measured epsilon. Its errors then count as errors of
+        the readings (effective variance; Orear, Am. J. Phys. 50, 912, 1982). Without slopes,
         epsilon is exact.
     """
     rows, slots = table.rows, len(OBSERVABLES)
@@ -115,7 +115,7 @@ def weights_of(table: LockInTable, slopes: Float | None = None) -> Weights:
         matrix[:, radial, real + 1] = np.where(known, sine, 0.0)
         matrix[:, radial, amplitude] = np.where(known, 0.0, 1.0)
         matrix[:, across, real], matrix[:, across, real + 1] = -sine, cosine
-        # The phase of an amplitude that reads as zero says nothing about the direction.
+        # The phase of an amplitude of zero has no meaning.
         width = data[:, radial] * error[:, across]
         floor = np.where(error[:, across] > _ANY_PHASE, 1.0, 1e-3) * error[:, radial]
         error[:, across] = np.where(known, np.maximum(width, floor), 1.0)
@@ -137,7 +137,7 @@ def weights_of(table: LockInTable, slopes: Float | None = None) -> Weights:
 
 
 def _inverse_root(table: LockInTable) -> Float:
-    """R^-1/2 of the correlations of each row, of shape (rows, slots, slots)."""
+    """R^-1/2 of the correlations R of each row, shape (rows, slots, slots)."""
     if not table.covariances:
         slots = len(OBSERVABLES)
         return np.broadcast_to(np.eye(slots), (table.rows, slots, slots))
@@ -146,7 +146,7 @@ def _inverse_root(table: LockInTable) -> Float:
 
 
 def columns_of(predicted: Prediction, module: Any = np) -> Any:
-    """A prediction as columns that residuals are linear in, of shape (rows, columns).
+    """A prediction as columns in which residuals are linear, shape (rows, columns).
 
     Parameters
     ----------
@@ -186,10 +186,10 @@ def residuals_of(
     Parameters
     ----------
     weights : Weights
-        Of the table.
+        Weights of the table.
     predicted : Prediction
     derivatives : mapping of str to Prediction
-        Derivative of the prediction at each row, by free parameter.
+        Derivatives of the prediction at each row, by free parameter.
     """
     reported = weights.reported.T
     slots, rows = np.nonzero(reported)
@@ -204,45 +204,47 @@ def residuals_of(
     )
 
 
-#: Probability, over all rows, that a row so far off is chance.
+#: A row is an outlier if such a departure, in any of the rows, has a lower probability by chance.
 _CHANCE = 1e-4
-#: Most rows that may be outliers, as a share of the rows; two in any case where each leaves so many
-#: others.
+#: Largest share of outliers among the rows; two are always allowed if there are this many other
+#: rows for each.
 _SHARE, _OTHERS_EACH = 0.1, 3
-#: chi-squared of the other rows must have at least this probability.
+#: Chi-squared of the other rows must have at least this probability.
 _DESCRIBED = 0.01
-#: Largest change of a coordinate over which predictions count as linear.
+#: Largest change of a coordinate for which predictions count as linear.
 _FARTHEST = 0.3
-#: Reweighted fits towards the sum of distances, and fits to the rows that are nearest, at most.
+#: Largest numbers of reweighted fits (for the sum of distances) and of fits to the nearest rows.
 _REWEIGHTED, _CONCENTRATED = 6, 8
 
-#: Share that chi-squared of the nearest rows must fall to in a reweighted fit while its probability
-#: is below the second number.
+#: While the probability of chi-squared of the nearest rows is below the second number, a reweighted
+#: fit must reduce this chi-squared to the first share.
 _FALLING, _FAR_OFF = 0.8, 1e-12
 
-#: Residuals of a table at the minimum of chi-squared of its rows with weights; residuals of priors
-#: follow as row -1. None without a solution. Weights multiply the residuals, shape (rows,).
+#: Function of weights, shape (rows,), that multiply the residuals of a table: the residuals at the
+#: minimum of the weighted chi-squared, followed by those of priors as row -1; None without a
+#: solution.
 Refit = Callable[[Float], Residuals | None]
 
 
 def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]:
-    """Rows whose removal makes the fit good, worst first; none if there are no such few.
+    """Outliers, worst first: a few rows without which the law describes the table; else empty.
 
     Parameters
     ----------
     residuals : Residuals
-        At the minimum, with the Jacobian to the coordinates of the fit.
+        Residuals at the minimum, with the Jacobian in the coordinates of the fit.
     refit : callable, optional
-        By default with predictions that are linear in the coordinates.
+        Function that fits again; by default with predictions linear in the coordinates.
 
     Notes
     -----
-    Outliers hide each other from a search that removes one row at a time: each pulls the fit to
-    itself. Here the fit is first one to the sum of the distances of the rows, in which an outlier
-    pulls no more than any other row, and then, until they stay the same, to the rows that are
-    nearest to it, as many as there may be without outliers (least trimmed squares; Rousseeuw and
-    Van Driessen, Data Min. Knowl. Discov. 12, 29, 2006). Of the others those are outliers that the
-    fit without them predicts far off, r^T (1 + H)^-1 r with its uncertainty H.
+    A search that removes one row at a time fails, because several outliers hide each other. Here
+    the first fit minimises the sum of the distances of the rows, in which an outlier has no more
+    influence than any other row. The next fits minimise chi-squared of the nearest rows, as many as
+    remain without the largest number of outliers, until these rows stay the same (least trimmed
+    squares; Rousseeuw and Van Driessen, Data Min. Knowl. Discov. 12, 29, 2006). Among the remaining
+    rows, outliers are those whose residuals r from the fit without them are too large, by r^T (1 +
+    H)^-1 r with the uncertainty H of the fit.
     """
     rows = np.unique(residuals.row[residuals.row >= 0])
     most = max(1, int(_SHARE * rows.size), min(2, rows.size // (1 + _OTHERS_EACH)))
@@ -265,7 +267,7 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
             now = fitted(np.maximum(row_distances(now), 1.0) ** -0.5)
             before, apart = apart, _chi2(now, farthest_of(now))
             if apart > _FALLING * before and _p_value(now, farthest_of(now)) < _FAR_OFF:
-                # The law is wrong for most rows, and comes no nearer to them.
+                # The law is wrong for most rows, and further fits do not improve this.
                 return []
         out: set[int] = set()
         for _ in range(_CONCENTRATED):
@@ -285,12 +287,12 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
 
 
 class _NoFitError(Exception):
-    """The law has no solution with the rows that are left."""
+    """The law has no solution with the remaining rows."""
 
 
 def _linear_refit(residuals: Residuals, weights: Float) -> Residuals | None:
-    """Residuals where predictions are linear in the coordinates; None too far for that."""
-    # Coordinates of other data are none of the table's.
+    """Residuals of a refit with linear predictions; None if coordinates change too much."""
+    # Coordinates without influence on the table are left out.
     J = residuals.jacobian[:, residuals.jacobian.any(0)]
     w = weights[residuals.row]
     shift = -np.linalg.lstsq(w[:, None] * J, w * residuals.values, rcond=1e-12)[0]
@@ -300,7 +302,7 @@ def _linear_refit(residuals: Residuals, weights: Float) -> Residuals | None:
 
 
 def row_distances(residuals: Residuals) -> Float:
-    """Root mean square of the residuals of each row; 0 of one without any."""
+    """Root mean square of the residuals of each row; 0 for a row without residuals."""
     of_rows = residuals.row >= 0
     row = residuals.row[of_rows]
     squares = np.bincount(row, residuals.values[of_rows] ** 2)
@@ -308,26 +310,26 @@ def row_distances(residuals: Residuals) -> Float:
 
 
 def _without(residuals: Residuals, out: Collection[int]) -> Float:
-    """Weights that leave rows out."""
+    """Weights without the rows in `out`."""
     weights = np.ones(residuals.row.max() + 1)
     weights[list(out)] = 0.0
     return weights
 
 
 def _p_value(residuals: Residuals, out: Collection[int]) -> float:
-    """Probability of chi-squared of the rows that are kept; NaN without degrees of freedom."""
+    """Probability of chi-squared of the kept rows; NaN without degrees of freedom."""
     kept = ~np.isin(residuals.row, list(out))
     dof = int(kept.sum()) - int(residuals.jacobian.any(0).sum())
     return float(chdtrc(dof, _chi2(residuals, out))) if dof > 0 else math.nan
 
 
 def _chi2(residuals: Residuals, out: Collection[int]) -> float:
-    """chi-squared of the rows that are kept."""
+    """Chi-squared of the kept rows."""
     return float(np.sum(residuals.values[~np.isin(residuals.row, list(out))] ** 2))
 
 
 def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
-    """Probability that a row is as far from what those that are kept predict."""
+    """Probability that a row departs as far from the prediction by the kept rows."""
     kept, here = ~np.isin(residuals.row, list(out)), residuals.row == row
     J = residuals.jacobian
     size = np.sqrt(np.sum(J**2, axis=0))
@@ -339,15 +341,16 @@ def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
 
 
 def standardised(residuals: Residuals, information: Float) -> Float:
-    """Residuals over their own standard deviations at the minimum, shape (n,).
+    """Residuals over their standard deviations at the minimum, shape (n,).
 
-    A reading that the fit follows has a small residual; over sqrt(1 - leverage) it shows.
+    A reading with a large influence on the fit has a small residual, which is divided by
+    sqrt(1 - leverage).
 
     Parameters
     ----------
     residuals : Residuals
     information : array, shape (coordinates, coordinates)
-        Of all data and priors of the fit: what other data know, the fit does not follow here.
+        Information matrix of all data and priors of the fit; other data reduce the leverage.
     """
     J = residuals.jacobian
     size = np.sqrt(np.diag(information))

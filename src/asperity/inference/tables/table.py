@@ -1,7 +1,7 @@
-"""Tables of lock-in readings: what was measured at each operating point, and how surely.
+"""Tables of lock-in readings: observables with uncertainties at each operating point.
 
-A table is a text file of one operating point a row, what ``asperity measure`` writes for many
-recordings, or what ``asperity measure --json`` prints for one.
+A table is a text file with one operating point in each row, as ``asperity measure`` writes it for
+many recordings, or the JSON that ``asperity measure --json`` prints for one recording.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from asperity.parameters.columns import csv_rows, headings, readable
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_radians, to_si
 
-#: What a row may report, in the order of residuals. Convention: F/W0 = mean_friction + sum of
+#: Observables of a row, in the order of residuals. Convention: F/W0 = mean_friction + sum of
 #: mu_n cos(n w t + phase_n), delta_mu = mean_friction - mu_ss(V).
 OBSERVABLES = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
 #: Columns of a table of responses that say nothing about the measurement.
@@ -34,43 +34,44 @@ _OF_RESPONSES = ("floquet_max", "stable", "converged", "result", "law")
 _OPERATING = ("V", "epsilon", "frequency")
 #: Columns of the standard uncertainty of epsilon.
 _OF_EPSILON = ("epsilon_err", "epsilon_uncertainty")
-#: Columns of texts: which run a row belongs to, the first of them that is there; what a campaign
-#: says of a row; the unit of its loads.
+#: Columns of texts: the run of a row (the first of these columns that exists); the kind of a row of
+#: a campaign and the reason without a reading; the unit of the loads.
 _RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
 _TEXTS = (*_RUN, _KIND, _REASON, _UNIT)
-#: Smallest eigenvalue of the correlations of a row.
+#: Smallest allowed eigenvalue of the correlations of a row.
 _SMALLEST_EIGENVALUE = 1e-9
-#: Smallest standard uncertainty of a reading, and one over the largest.
+#: Smallest standard uncertainty of a reading; the largest is 1 over this.
 _SMALLEST_ERROR = 1e-15
-#: Forces over the load beyond this are in per cent or not divided by the load.
+#: Larger friction values are in per cent or not divided by the load.
 _LARGEST_FRICTION = 10.0
-#: Probability below which mean_friction and delta_mu are too alike to have errors of their own.
+#: mean_friction and delta_mu have the same errors if their agreement has a lower probability.
 _SAME_NOISE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class LockInTable:
-    """Observables with standard uncertainties, one operating point a row.
+    """Observables with standard uncertainties, one operating point in each row.
 
     Attributes
     ----------
     name : str
-        What messages call the table.
+        Name of the table in messages.
     points : mapping of str to array, shape (rows,)
         Parameters of the rows by name, in SI: at least V, epsilon and frequency. `epsilon` is
         the amplitude that was applied; contacts carry ``eps_ratio`` of it.
     values : mapping of str to array, shape (rows,)
-        Observables by name; NaN where a row does not report one.
+        Observables by name; NaN if a row does not report an observable.
     errors : mapping of str to array, shape (rows,)
-        Standard uncertainties of the same, phases in rad; and of `epsilon` where it was measured.
+        Standard uncertainties of the observables (phases in rad), and of `epsilon` if it was
+        measured.
     covariances : mapping of (str, str) to array, shape (rows,)
-        Of pairs of observables of a row, in SI and rad; NaN where there is none.
+        Covariances of pairs of observables of a row, in SI and rad; NaN where unknown.
     run : array of str, shape (rows,)
-        Run that each row was measured in: its file, or what a column `run` says.
+        Run of each row: its file, or the entry of a column `run`.
     remarks : tuple of str
-        What a reader must know of how the table was read.
+        Sentences on the reading of the table, for reports.
     row_names : array of str, shape (rows,)
-        What messages call the rows, such as "row 3" of the file.
+        Names of the rows in messages, such as "row 3" of the file.
     """
 
     name: str
@@ -96,7 +97,7 @@ class LockInTable:
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """What the table reports."""
+        """Names of the observables of the table."""
         return tuple(self.values)
 
     def correlations(self) -> Float:
@@ -131,17 +132,17 @@ class LockInTable:
         )
 
     def disturbed(self, exact: Mapping[str, Float], normal: Float) -> LockInTable:
-        """The table with simulated readings: exact ones and errors in units of the uncertainties.
+        """The table with simulated readings: exact readings plus errors.
 
-        Those of a harmonic with a phase are added in the complex plane. The uncertainty across the
-        phasor is that of this table, whatever amplitude was simulated.
+        Errors of a harmonic with a phase are added in the complex plane. The uncertainty across the
+        phasor is that of this table, at any simulated amplitude.
 
         Parameters
         ----------
         exact : mapping of str to array, shape (rows,)
             Observables without noise.
         normal : array, shape (rows, len(OBSERVABLES))
-            Errors, of unit variance for one reading.
+            Errors in units of the uncertainties.
         """
         values = {n: np.where(np.isfinite(self.values[n]), exact[n], np.nan) for n in self.values}
         errors, units = dict(self.errors), dict(zip(OBSERVABLES, normal.T, strict=True))
@@ -183,7 +184,7 @@ def read_table(
         V, epsilon and frequency of all rows, in SI or as texts with units, where the table has
         no such column.
     name : str
-        What messages call the table; the file's name by default.
+        Name of the table in messages; by default that of the file.
 
     Raises
     ------
@@ -203,7 +204,7 @@ def read_table(
     texts, units = _columns(shown, header, cells)
     blank = np.full(len(cells), "")
     kind, failed = texts.get(_KIND, blank), texts.get(_REASON, blank) != ""
-    # Of a campaign, a level without modulation is a reading too.
+    # A row of a campaign without modulation is a reading too.
     level = (kind == "level") & np.isin(texts.get("epsilon", blank), ("0", "0.0"))
     kept = ~failed & (np.isin(kind, ("", "amplitude")) | level)
     remarks = []
@@ -235,7 +236,7 @@ def read_table(
 def _columns(
     shown: str, header: Sequence[str], rows: Sequence[Sequence[str]]
 ) -> tuple[dict[str, NDArray[np.str_]], dict[str, str]]:
-    """Columns by name, as texts without space about them, and the units in their headings."""
+    """Columns by name, as stripped texts, and the units in their headings."""
     rule = "have a header and rows"
     require(rows, shown, rule, "no rows", "give one operating point a row")
     for number, row in enumerate(rows, start=1):
@@ -250,7 +251,7 @@ def _columns(
 
 
 def _is_read(name: str) -> bool:
-    """Whether a column says something of the measurement; others are the user's own."""
+    """Whether the reader knows a column; other columns are ignored."""
     said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
     return name in (*_TEXTS, *_OF_EPSILON) or (bool(said) and name not in _OF_RESPONSES)
 
@@ -266,7 +267,7 @@ def _unit_in_si(shown: str, name: str, unit: str) -> float:
 
 
 def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
-    """W0 in N of a campaign, whose loads are in the unit of the channels."""
+    """W0 of a campaign in N, from loads in the unit of the channels."""
     return np.array(
         [
             to_si(f"{load!r} {unit}", "force", f"{table}.W0") if unit else load
@@ -276,7 +277,7 @@ def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
 
 
 def _given(columns: dict[str, Any], given: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Columns with what is given for all rows where the table has no such column."""
+    """Columns, completed by numbers that hold for all rows."""
     known = _known()
     have = {canonical_name(name, known) for name in columns}
     more = {n: known[n].check(v) for n, v in (given or {}).items() if n not in have}
@@ -339,9 +340,9 @@ def table_of(
     name : str
         What messages call the table.
     run : sequence of str, shape (rows,), optional
-        Run that each row was measured in; by default all in one.
+        Run of each row; by default one run.
     remarks : sequence of str
-        What is known of the table already, for its readers.
+        Sentences on the reading of the table so far.
 
     Raises
     ------
@@ -370,7 +371,7 @@ def table_of(
         parameter = canonical_name(key, known)
         pair = _pair_of(key)
         if parameter in MODULATION:
-            # An empty cell says that the load is harmonic, as 0 does.
+            # An empty cell means 0: a harmonic load.
             rule = "be 0, since fits are to a harmonic load"
             zero = np.nan_to_num(column) == 0
             _require(zero, name, key, column, rule, "leave those rows out")
@@ -386,7 +387,7 @@ def table_of(
                 f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
             )
         elif key in _OF_EPSILON:
-            # An empty cell, or none, says that it is exact.
+            # Without a column or cell, epsilon is exact.
             spread = np.nan_to_num(column)
             good = np.isfinite(spread) & (spread >= 0)
             _require(good, name, key, column, "be finite and not negative", "correct it")
@@ -415,7 +416,7 @@ def table_of(
 
 
 def _fill_frequency(arrays: dict[str, Float]) -> None:
-    """Give rows without modulation a frequency, on which nothing depends."""
+    """Set a frequency in rows without modulation, which has no influence."""
     names = {canonical_name(key, _known()): key for key in arrays}
     epsilon = arrays.get(names.get("epsilon", ""), np.empty(0))
     if np.any(epsilon == 0):
@@ -426,7 +427,7 @@ def _fill_frequency(arrays: dict[str, Float]) -> None:
 
 
 def _observable_of(column: str) -> str | None:
-    """``mu1`` and ``mu1_err`` as they are, ``mu1_uncertainty`` as ``mu1_err``; else None."""
+    """The name of a column of observables, with ``_uncertainty`` as ``_err``; else None."""
     stem = column.removesuffix("_err").removesuffix("_uncertainty")
     if stem not in OBSERVABLES:
         return None
@@ -477,7 +478,8 @@ def _observables(
         advice = "give the standard uncertainty"
         good = absent | (np.isfinite(error) & (error > 0))
         _require(good, table, f"{name}_err", error, "be a finite positive number", advice)
-        # Values are of order 1: below the spacing of doubles there, or as far above, none is known.
+        # Values are of order 1: no uncertainty lies below the spacing of doubles, or as far above
+        # 1.
         good = absent | ((error >= _SMALLEST_ERROR) & (error <= 1 / _SMALLEST_ERROR))
         rule = f"be from {_SMALLEST_ERROR:g} to {1 / _SMALLEST_ERROR:g}"
         _require(good, table, f"{name}_err", error, rule, advice)
@@ -516,7 +518,7 @@ def _require_possible(table: str, name: str, column: Float) -> None:
 
 
 def _refuse_impossible(table: LockInTable) -> None:
-    """Refuse covariances of pairs that are not there, or that no measurement can have."""
+    """Refuse covariances of missing observables, and impossible covariances."""
     if not table.covariances:
         return
     for pair in table.covariances:
@@ -540,10 +542,10 @@ def _refuse_impossible(table: LockInTable) -> None:
 
 
 def _without_copies(table: LockInTable) -> LockInTable:
-    """The table without readings of delta_mu that repeat those of mean_friction.
+    """The table without readings of delta_mu that only repeat mean_friction.
 
-    Their difference is mu_ss(V). If both have errors of their own, it scatters about a smooth
-    function of ln V by those errors; if one was computed from the other, it does not scatter.
+    Their difference is mu_ss(V). If both have independent errors, it scatters about a smooth
+    function of ln V; if one was computed from the other, it does not scatter.
     """
     if not {"mean_friction", "delta_mu"} <= set(table.values):
         return table
@@ -568,16 +570,16 @@ def _without_copies(table: LockInTable) -> LockInTable:
         del values["delta_mu"]
     remark = (
         f"mean_friction and delta_mu of {table.name} differ by a smooth mu_ss(V) without scatter: "
-        "they are one measurement; delta_mu is left out where both are given"
+        "they are one measurement; delta_mu is left out in rows that have both"
     )
     return replace(table, values=values, remarks=(*table.remarks, remark))
 
 
 def _refuse_copies(first: LockInTable, second: LockInTable, sentence: str) -> None:
-    """Refuse a reading that two tables hold, or one twice: columns that both have are equal.
+    """Refuse a reading that occurs twice: all columns that both rows have are equal.
 
-    One may have columns that the other has not, such as the load or another observable. `sentence`
-    has places for the name of the second table and those of the two rows.
+    One row may have further columns, such as the load or another observable. `sentence` has places
+    for the name of the second table and those of the two rows.
     """
     inputs = [n for n in first.points if n in second.points]
     observed = [n for n in first.values if n in second.values]
@@ -602,13 +604,12 @@ def _refuse_copies(first: LockInTable, second: LockInTable, sentence: str) -> No
 def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, Index]:
     """Several tables as one, and the number of the table of each row.
 
-    A parameter that only some tables have must have a fixed value for the others, which is not
-    known here: it is NaN there.
+    A parameter that a table lacks is NaN in its rows; the caller must fix its value.
 
     Raises
     ------
     InputError
-        If two tables hold the same reading.
+        If two tables contain the same reading.
     """
     tables = list(tables)
     for j, second in enumerate(tables):

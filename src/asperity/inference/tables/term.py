@@ -1,4 +1,4 @@
-"""Lock-in readings in the likelihood: predictions at the rows of a table, exact derivatives."""
+"""Lock-in readings in the likelihood: predictions at the rows of a table, with derivatives."""
 
 from __future__ import annotations
 
@@ -38,17 +38,18 @@ from asperity.orbit import (
 from asperity.parameters import law_parameters
 from asperity.slider.named import law_from
 
-#: Rows whose orbits are remembered, of some ten kilobytes each.
+#: Largest number of rows whose orbits are remembered, about ten kilobytes each.
 _REMEMBERED = 2048
-#: Root sum square of the relative changes of the parameters, below which a row whose known orbit
-#: Newton's method loses has none: of 1,900 such rows of six tables 50 had one.
+#: Root of the sum of the squared relative changes of the parameters. Where they changed by less and
+#: Newton's method fails from the known orbit of a row, a coarse search tries no other initial guess:
+#: of 1,900 such rows of six tables, the other guesses found an orbit of 50.
 _NEAR = 0.1
-#: Share of the rows of the coarse model that must have an orbit: slip events, which it does not
-#: find, are the orbits of some rows at the minimum itself.
-_LEAST = 0.5
+#: Smallest share of rows with an orbit in the coarse model: some rows may have slip events, whose
+#: orbits this model does not reach, even at the minimum.
+_LEAST_SHARE = 0.5
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
-#: Evaluations of an integral, and where searched orbits take a hundred times as long.
+#: Evaluations of an integral; fewer with searched orbits, which take a hundred times as long.
 _SAMPLES, _SEARCHED_SAMPLES = 1024, 80
 
 
@@ -62,17 +63,17 @@ class LockInTerm(DataTerm):
     fixed : mapping of str to array, shape () or (rows,)
         All parameters that are not free, in SI.
     inertia, radiation_damping : bool
-        What counts in the equation of motion.
+        Whether mass and damping count in the equation of motion.
 
     Attributes
     ----------
     searches : bool
-        Whether every call searches for the orbits that the fast method does not find.
+        Whether every call searches for orbits that the fast method does not reach.
     coarse : bool
-        Whether orbits are of the coarse model of `response_function`, to look for minima with.
+        Whether orbits are computed on the coarse mesh of `response_function`, for searches.
     least : float
-        Share of the rows that must have a periodic orbit; with some, chi-squared is that of these
-        rows, scaled to all.
+        Smallest share of rows with a periodic orbit. If other rows lack an orbit, chi-squared is
+        that of the rows with an orbit, scaled to all rows.
     """
 
     searches: bool = False
@@ -97,7 +98,7 @@ class LockInTerm(DataTerm):
         self.fixed = {
             n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
         }
-        # Whatever rows are asked for, the programs are those of the whole table.
+        # Programs are compiled for the whole table, and used for any of its rows.
         function = partial(response_function, law, **self.motion, least_points=table.rows)
         self._functions: dict[bool | str, ResponseFunction] = {
             way: function(search=way) for way in (False, "direct", "coarse", True)
@@ -109,7 +110,7 @@ class LockInTerm(DataTerm):
 
     @property
     def noise(self) -> dict[str, Any]:
-        """Independent normal errors, as the table gives them."""
+        """Normal errors as in the table."""
         kind = "correlated within a row" if self.table.covariances else "independent"
         return {"model": f"{kind}, normal, as given", "effective_samples": self._count}
 
@@ -122,11 +123,11 @@ class LockInTerm(DataTerm):
 
     @property
     def measured_epsilon(self) -> bool:
-        """Whether the table says how uncertain epsilon is."""
+        """Whether the table has uncertainties of epsilon."""
         return bool(np.nan_to_num(self.table.errors.get("epsilon", 0.0)).any())
 
     def estimate_error(self, values: Mapping[str, float]) -> None:
-        """Count the errors of epsilon, as predictions at these parameters depend on it."""
+        """Include the errors of epsilon, by the slopes of the predictions at these parameters."""
         function = self._function(search=self.searches, coarse=self.coarse)
         given = parameters_at(self.fixed, values, function)
         known = self._nearest(values) if self.searches else None
@@ -134,7 +135,7 @@ class LockInTerm(DataTerm):
         slope, none = derivatives["epsilon"], np.zeros(self.table.rows)
         at = Prediction(response.mean_friction, none, np.asarray(response.harmonics))
         change = Prediction(slope.mean_friction, none, np.asarray(slope.harmonics))
-        # The contacts carry eps_ratio of what was measured.
+        # The contacts carry eps_ratio times the measured amplitude.
         ratio = np.broadcast_to(
             values.get("eps_ratio", self.fixed.get("eps_ratio", 1.0)), none.shape
         )
@@ -158,7 +159,7 @@ class LockInTerm(DataTerm):
                 values=scale * np.where(there, result.values, 0.0),
                 jacobian=scale * np.where(there[:, None], result.jacobian, 0.0),
             )
-        # Derivatives may overflow far from all data, where an orbit still converges.
+        # Far from all data derivatives may overflow although the orbit converges.
         finite = np.isfinite(result.values).all() and np.isfinite(result.jacobian).all()
         return result if finite else None
 
@@ -170,22 +171,22 @@ class LockInTerm(DataTerm):
         return _CompiledResiduals(self.law, way, self.searches), (self.fixed, self.weights)
 
     def with_rows(self, kept: Bool, *, coarse: bool = False) -> LockInTerm:
-        """The same for some of the rows with their orbits, by the coarse model on request."""
+        """The term for some of its rows, with their orbits, optionally on the coarse mesh."""
         part, rows = self.with_table(self.table.without(~kept)), np.flatnonzero(kept)
         part.fixed = {n: v[kept] for n, v in self.fixed.items()}
         part._slopes = None if self._slopes is None else self._slopes[kept]
         part._visited = [(free, known.picked(rows)) for free, known in self._visited]
-        part.coarse, part.least = coarse, _LEAST if coarse else self.least
+        part.coarse, part.least = coarse, _LEAST_SHARE if coarse else self.least
         return part
 
     def with_table(self, table: LockInTable) -> LockInTerm:
-        """The same with other readings at the same operating points."""
+        """The term with other readings at the same operating points."""
         result = copy(self)
         result.table, result._weights = table, None
         return result
 
     def weighted(self, weights: Float) -> LockInTerm:
-        """The same with the residuals of each row multiplied by a weight, shape (rows,)."""
+        """The term with the residuals of each row multiplied by a weight, shape (rows,)."""
         result, own = copy(self), self.weights
         result._weights = own._replace(
             matrix=own.matrix * weights[:, None, None], target=own.target * weights[:, None]
@@ -193,7 +194,7 @@ class LockInTerm(DataTerm):
         return result
 
     def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
-        """chi-squared at many sets of parameters, by one call; see `DataTerm`."""
+        """Chi-squared at many sets of parameters, by one call; see `DataTerm`."""
         weights, rows, sets = self.weights, self.table.rows, len(values)
         free = {n: np.repeat([v[n] for v in values], rows) for n in values[0]}
         predicted, outcome = self.predicted_at_many(free, repeats=sets, near=near)
@@ -204,7 +205,7 @@ class LockInTerm(DataTerm):
         return np.where(share >= self.least, np.nan_to_num(total, nan=np.inf), np.inf)
 
     def use_search(self, always: bool) -> None:
-        """Search for the orbits that the fast method does not find at every call, or no more."""
+        """As in `DataTerm`; the slower method searches for orbits."""
         self.searches, self.affordable = always, _SEARCHED_SAMPLES if always else _SAMPLES
 
     def search_wholly(self, values: Mapping[str, float]) -> None:
@@ -212,18 +213,18 @@ class LockInTerm(DataTerm):
         direct, known = self._functions["direct"], self._nearest(values)
         given = parameters_at(self.fixed, values, direct)
         left = np.flatnonzero(np.asarray(direct(given, known).outcome) != Outcome.CONVERGED)
-        if 0 < left.size <= _LEAST * self.table.rows:
+        if 0 < left.size <= _LEAST_SHARE * self.table.rows:
             missed = known.picked(left)
             self._functions[True]({n: v[left] for n, v in given.items()}, missed)
             known.complete(missed, left)
         self._visited.append((dict(values), known))
 
     def coarser(self) -> LockInTerm:
-        """As in `DataTerm`; both go on from the orbits of each other."""
+        """As in `DataTerm`; both terms share their orbits."""
         if not self.searches or self.coarse:
             return self
         result = copy(self)
-        result.coarse, result.least = True, _LEAST
+        result.coarse, result.least = True, _LEAST_SHARE
         return result
 
     @property
@@ -232,10 +233,10 @@ class LockInTerm(DataTerm):
         return sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
 
     def thinned(self, rows: int, data: int = 0) -> LockInTerm:
-        """The same for few rows that are spread over the operating points; see `DataTerm`."""
+        """The term for few rows, spread over the operating points; see `DataTerm`."""
         table = self.table
         kept = max(rows, math.ceil(data / max(self._count / table.rows, 1e-9)))
-        # Points that lie close together repeat each other.
+        # Points that are close together add little information.
         order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
         chosen = order[np.linspace(0, table.rows - 1, min(kept, table.rows)).round().astype(int)]
         return self.with_rows(np.isin(np.arange(table.rows), chosen), coarse=True)
@@ -247,7 +248,7 @@ class LockInTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
-        """Outliers, and amplitudes without a phase that are below three standard uncertainties."""
+        """Warnings about outliers, and about weak amplitudes without a phase."""
         said = list(self.table.remarks)
         if outliers:
             named = " and ".join(str(self.table.row_names[row]) for row in outliers)
@@ -259,10 +260,10 @@ class LockInTerm(DataTerm):
         expected = -ndtri(0.005 / residuals.values.size)
         apart = np.abs(standardised(residuals, information))
         beyond = np.flatnonzero(apart > expected)
-        # So many are no outliers: the law or the uncertainties are wrong, as chi-squared says.
+        # Many such rows are no outliers: the law or the uncertainties are wrong.
         few = beyond if beyond.size <= max(1, _FEW * apart.size) else beyond[:0]
         if outliers:
-            # Others are off because the fit follows these.
+            # Other readings may be off only because the fit follows the outliers.
             few = beyond[np.isin(residuals.row[beyond], outliers)]
         for j in sorted(few, key=lambda j: -apart[j])[:5]:
             said.append(
@@ -294,10 +295,10 @@ class LockInTerm(DataTerm):
         ----------
         free : mapping of str to float
         search : bool, optional
-            Whether points that the fast method does not find are searched for; by default where
-            the fast method alone has failed before.
+            Whether to search for orbits that the fast method does not reach; by default if the fast
+            method has failed before.
         every : bool
-            Whether to give up, and to leave out derivatives, once a row has no orbit.
+            Whether all rows need an orbit: without one, derivatives are left out.
         """
         search = self.searches if search is None else search
         applied = self.fixed["epsilon"]
@@ -314,7 +315,7 @@ class LockInTerm(DataTerm):
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
         )
         derivatives, zero = {}, np.zeros(self.table.rows)
-        # Nothing depends on a parameter of other data.
+        # Parameters of other data have no influence.
         none: Any = Prediction(zero, zero, np.zeros((zero.size, 2), complex))
         for name in free:
             source, factor = ("epsilon", applied) if name == "eps_ratio" else (name, 1.0)
@@ -338,8 +339,8 @@ class LockInTerm(DataTerm):
         repeats : int
             Number of sets.
         near : bool
-            Whether orbits are like those of the last call with derivatives, and begun there. They
-            are of the coarse model then.
+            Whether orbits are close to those of the last call with derivatives, and start from
+            them, on the coarse mesh.
         """
         function = self._function(search=self.searches, coarse=self.coarse or near)
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
@@ -359,10 +360,10 @@ class LockInTerm(DataTerm):
         return Prediction(mean, steady, harmonics), outcome
 
     def _nearest(self, free: Mapping[str, float]) -> KnownOrbits:
-        """Of each row the orbit of the earlier call with the most similar parameters that has one.
+        """For each row, the known orbit with the most similar parameters.
 
-        They are what a call begins with and replaces. Not simply those of the last call: a
-        minimiser that has gone too far comes back.
+        A call starts from these orbits and replaces them. The orbits of the last call would be a
+        poor start if a minimiser returns from a step that was too long.
         """
 
         def distance(visited: Mapping[str, float]) -> float:
@@ -390,7 +391,7 @@ def parameters_at(
     fixed : mapping of str to array, shape (rows,)
         `epsilon` is as applied.
     free : mapping of str to float or array, shape (rows,)
-        Those that do not belong to the response are left out.
+        Parameters that do not belong to the response are left out.
     function : ResponseFunction
     """
     given = on_contacts({**fixed, **free})
@@ -400,7 +401,7 @@ def parameters_at(
 
 
 def on_contacts(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters with the amplitude of the modulation that the contacts carry, eps_ratio of it."""
+    """Parameters with epsilon multiplied by eps_ratio: the amplitude that the contacts carry."""
     given = dict(parameters)
     given["epsilon"] = given["epsilon"] * given.pop("eps_ratio", 1.0)
     return given
@@ -409,9 +410,9 @@ def on_contacts(parameters: Mapping[str, Any]) -> dict[str, Any]:
 def _steady(
     law: type[Law], given: Mapping[str, Float], compiled: int
 ) -> tuple[Float, dict[str, Float]]:
-    """mu_ss(V) at each row and its derivatives to the law's parameters.
+    """mu_ss(V) at each row and its derivatives in the parameters of the law.
 
-    By a program for `compiled` rows.
+    The program is compiled for `compiled` rows.
     """
     rows = len(given["V"])
     padded = {
@@ -424,7 +425,7 @@ def _steady(
 @partial(jax.jit, static_argnames=("law",))
 def _steady_slopes(given: Mapping[str, Array], *, law: type[Law]) -> tuple[Array, dict[str, Array]]:
     V = given["V"]
-    # Rows do not depend on each other: the sum's gradient is each row's own derivative.
+    # Rows are independent: the gradient of their sum holds the derivative of each row.
     value, pull = jax.vjp(
         lambda numbers: steady_friction(law, {**numbers, "V": V}),
         {n: v for n, v in given.items() if n != "V"},

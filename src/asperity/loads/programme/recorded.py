@@ -27,7 +27,7 @@ class PiecewiseCubic(eqx.Module):
     knots : array, shape (pieces,)
         Where each piece begins (s); inf where padded.
     coefficients : array, shape (4, pieces)
-        Of falling powers of the time since the knot.
+        Coefficients of falling powers of the time since the knot.
     integral : array, shape (pieces,)
         Integral up to the knot.
     """

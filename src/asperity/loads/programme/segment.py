@@ -3,6 +3,8 @@
 Every number of a segment is an array, never part of the program's structure: two protocols made of
 the same kinds of segment run the same compiled program. Times are counted from the beginning of the
 segment, so that phases keep their digits in long programmes.
+
+Formulas describe levels, ramps, and harmonic and other periodic modulations.
 """
 
 from __future__ import annotations
@@ -13,11 +15,12 @@ from typing import Any, TypeAlias
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import configure
-from asperity.loads.modulation import Excitation
+from asperity.loads.modulation import Excitation, Modulation
 
 configure()  # double precision, before any segment makes an array
 
@@ -99,3 +102,212 @@ class ProgrammeSegment(eqx.Module):
 #: W (N) and the pulling velocity (m/s) of a segment at times (s), each by one program.
 load_of = jax.jit(lambda segment, t: segment.load(t)[0])
 pull_of = jax.jit(lambda segment, t: segment.pull(t))
+
+
+class HarmonicSegment(ProgrammeSegment):
+    """Load and velocity that rise or fall linearly, with a harmonic modulation on top.
+
+        W = (W1 + dW t) (1 + eps(t) cos psi),     psi = 2 pi f t + phase,
+        V = (V1 + dV t) (1 + eps_v cos psi),      S = ratio (W - W1 - dW t).
+
+    eps(t) goes smoothly, with two continuous derivatives, from eps1 to eps2 within `rise`.
+
+    Parameters
+    ----------
+    duration : array
+        Seconds.
+    load1, load_rate : array
+        W1 (N) and dW (N/s).
+    pull1, pull_rate : array
+        V1 (m/s) and dV (m/s^2).
+    epsilon1, epsilon2, rise : array
+        Relative amplitudes and the time (s) from one to the other; 0 is sudden.
+    frequency, phase : array
+        f (Hz) and the phase (rad) at the beginning of the segment.
+    epsilon_v : array
+        Relative amplitude of the pulling velocity.
+    shear_ratio : array
+        Shear force per modulated normal force, of an exciter at an angle.
+    """
+
+    duration: Scalar = eqx.field(converter=jnp.asarray)
+    load1: Scalar = eqx.field(converter=jnp.asarray)
+    pull1: Scalar = eqx.field(converter=jnp.asarray)
+    load_rate: Scalar = number(0.0)
+    pull_rate: Scalar = number(0.0)
+    epsilon1: Scalar = number(0.0)
+    epsilon2: Scalar = number(0.0)
+    rise: Scalar = number(0.0)
+    frequency: Scalar = number(0.0)
+    phase: Scalar = number(0.0)
+    epsilon_v: Scalar = number(0.0)
+    shear_ratio: Scalar = number(0.0)
+
+    def _turn(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Cosine and sine of psi."""
+        angle = 2 * jnp.pi * self.frequency * jnp.asarray(t)
+        cos, sin = jnp.cos(self.phase), jnp.sin(self.phase)
+        rotation = jnp.stack([cos, -sin, sin, cos]).reshape(2, 2, *[1] * angle.ndim)
+        # XLA computes a sum over an axis once, but a cosine again for every number that depends on
+        # it; this would double the time of a step.
+        turned = (rotation * jnp.stack([jnp.cos(angle), jnp.sin(angle)])).sum(axis=1)
+        return turned[0], turned[1]
+
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """As in `ProgrammeSegment`; one cosine and one sine serve all values."""
+        cos, sin = self._turn(t)
+        slow = self.rise > 0
+        x = jnp.where(slow, jnp.clip(t / jnp.where(slow, self.rise, 1.0), 0.0, 1.0), 1.0)
+        change = self.epsilon2 - self.epsilon1
+        epsilon = self.epsilon1 + change * x**3 * (10 - 15 * x + 6 * x**2)
+        growth = 30 * (x * (1 - x)) ** 2 * change / jnp.where(slow, self.rise, 1.0)
+        level = self.load1 + self.load_rate * t
+        part = level * epsilon * cos
+        turning = 2 * jnp.pi * self.frequency * sin
+        rate = self.load_rate * epsilon * cos + level * (growth * cos - epsilon * turning)
+        pull = (self.pull1 + self.pull_rate * t) * (1 + self.epsilon_v * cos)
+        return Excitation(
+            (level + part) / W0,
+            (self.load_rate + rate) / W0,
+            self.shear_ratio * part / W0,
+            self.shear_ratio * rate / W0,
+            pull / V,
+        )
+
+    def position(self, t: ArrayLike) -> Array:
+        """Integral of V, in closed form."""
+        smooth = self.pull1 * t + 0.5 * self.pull_rate * t**2
+        turns = self.frequency > 0
+        omega = 2 * jnp.pi * jnp.where(turns, self.frequency, 1.0)
+        cos, sin = self._turn(t)
+        cos0, sin0 = self._turn(0.0)
+        swing = self.pull1 * (sin - sin0) / omega
+        swing = swing + self.pull_rate * (t * sin / omega + (cos - cos0) / omega**2)
+        return smooth + self.epsilon_v * jnp.where(turns, swing, smooth * cos0)
+
+    @property
+    def lowest_load(self) -> float:
+        """The lower end of the level, at the larger amplitude."""
+        begin, rate = float(self.load1), float(self.load_rate)
+        epsilon = max(abs(float(self.epsilon1)), abs(float(self.epsilon2)))
+        return min(begin, begin + rate * float(self.duration)) * (1 - epsilon)
+
+    def surely_above(self, load: float) -> float:
+        """Time until a growing amplitude may reach `load`, for a constant level."""
+        begin, end, rise = float(self.epsilon1), float(self.epsilon2), float(self.rise)
+        level, duration = float(self.load1), float(self.duration)
+        if float(self.load_rate) != 0 or rise <= 0 or abs(end) <= abs(begin) or begin * end < 0:
+            return 0.0
+        low, high = 0.0, min(rise, duration) / rise
+        while low < (x := 0.5 * (low + high)) < high:  # until doubles are exhausted
+            epsilon = begin + (end - begin) * x**3 * (10 - 15 * x + 6 * x**2)
+            above = level * (1 - abs(epsilon)) > load
+            low, high = (x, high) if above else (low, x)
+        low *= rise
+        return low if level * (1 - abs(begin)) > load else 0.0
+
+    @property
+    def fastest_pull(self) -> float:
+        """The faster end."""
+        begin, rate = float(self.pull1), float(self.pull_rate)
+        fastest = max(abs(begin), abs(begin + rate * float(self.duration)))
+        return fastest * (1 + abs(float(self.epsilon_v)))
+
+    @property
+    def longest_step(self) -> float:
+        """A tenth of a period, or an eighth of a ramp."""
+        if self._swings:
+            return 0.1 / float(self.frequency)
+        duration = float(self.duration)
+        return duration if self.constant else duration / 8
+
+    @property
+    def _swings(self) -> bool:
+        amplitudes = (self.epsilon1, self.epsilon2, self.epsilon_v)
+        return float(self.frequency) > 0 and any(float(a) != 0 for a in amplitudes)
+
+    @property
+    def _level(self) -> bool:
+        """Whether load, velocity and amplitude are constant."""
+        fixed = float(self.epsilon1) == float(self.epsilon2) or float(self.rise) == 0
+        return fixed and float(self.load_rate) == 0 and float(self.pull_rate) == 0
+
+    @property
+    def period(self) -> float | None:
+        """1/f of a steady modulation."""
+        return 1 / float(self.frequency) if self._swings and self._level else None
+
+    @property
+    def constant(self) -> bool:
+        """Neither ramp nor modulation."""
+        return self._level and not self._swings
+
+
+class PeriodicSegment(ProgrammeSegment):
+    """A periodic modulation of any form about constant levels.
+
+    Parameters
+    ----------
+    duration : array
+        Seconds.
+    modulation : Modulation
+        Over its means, such as `Periodic`.
+    frequency : array
+        Hz.
+    load1, pull1 : array
+        Mean load (N) and mean pulling velocity (m/s).
+    """
+
+    duration: Scalar = eqx.field(converter=jnp.asarray)
+    modulation: Modulation
+    frequency: Scalar = eqx.field(converter=jnp.asarray)
+    load1: Scalar = eqx.field(converter=jnp.asarray)
+    pull1: Scalar = eqx.field(converter=jnp.asarray)
+
+    @property
+    def _omega(self) -> Array:
+        return 2 * jnp.pi * self.frequency
+
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """As in `ProgrammeSegment`."""
+        at, level = self.modulation.at(self._omega * t), self.load1
+        return Excitation(
+            level * at.w / W0,
+            level * at.w_slope * self._omega / W0,
+            level * at.shear / W0,
+            level * at.shear_slope * self._omega / W0,
+            self.pull1 * at.pull * jnp.ones_like(t) / V,
+        )
+
+    def position(self, t: ArrayLike) -> Array:
+        """Integral of V, term by term."""
+        displacement = self.pull1 * jnp.asarray(t)
+        for k, (a, b) in enumerate(getattr(self.modulation, "pull", ()), start=1):
+            angle = k * self._omega * t
+            swing = a * jnp.sin(angle) + b * (1 - jnp.cos(angle))
+            displacement = displacement + self.pull1 * swing / (k * self._omega)
+        return displacement
+
+    def _over_a_period(self) -> np.ndarray:
+        return np.linspace(0, 1 / float(self.frequency), 513)
+
+    @property
+    def lowest_load(self) -> float:
+        """Of 512 instants of a period."""
+        return float(np.min(load_of(self, self._over_a_period())))
+
+    @property
+    def fastest_pull(self) -> float:
+        """Of 512 instants of a period."""
+        return float(np.max(np.abs(pull_of(self, self._over_a_period()))))
+
+    @property
+    def longest_step(self) -> float:
+        """A tenth of the period of the highest harmonic."""
+        series = [getattr(self.modulation, name, ()) for name in ("load", "shear", "pull")]
+        return 0.1 / float(self.frequency) / max(1, *map(len, series))
+
+    @property
+    def period(self) -> float | None:
+        """1/f."""
+        return 1 / float(self.frequency)

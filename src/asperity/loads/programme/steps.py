@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 from asperity.errors import require
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
-from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
 from asperity.loads.programme.recorded import RecordedSegment, interpolated
-from asperity.loads.programme.segment import ProgrammeSegment
+from asperity.loads.programme.segment import HarmonicSegment, PeriodicSegment, ProgrammeSegment
 from asperity.parameters.arguments import number, typed
 from asperity.units import to_radians, to_si
 

@@ -37,11 +37,11 @@ class HoldReading:
     Attributes
     ----------
     start, end : float
-        Of the hold (s).
+        Begin and end of the hold (s).
     hold_time : float
         Its length (s).
     velocity : float
-        Of sliding again (m/s); NaN where no motion is recorded.
+        Velocity of the sliding after the hold (m/s); NaN where no motion is recorded.
     level, level_uncertainty : float
         Sliding friction before the hold, extrapolated to its beginning.
     relaxation, relaxation_uncertainty : float
@@ -118,15 +118,15 @@ def read_hold(
     Parameters
     ----------
     time, friction, displacement : array, (n,)
-        Of the recording; displacement None if it is not recorded.
+        Times, friction and displacement of the recording; displacement None if it is not recorded.
     bounds : (int, int, int, int)
         Samples: sliding before, hold, sliding after, its end.
     edges : (float, float)
         First and last time of the hold (s).
     velocity : float
-        Of sliding again, m/s.
+        Velocity of the sliding after the hold (m/s).
     degree : int
-        Of the trend before the hold: 0 or 1.
+        Degree of the trend before the hold: 0 or 1.
     settling : bool
         Whether the sliding before begins with the transient of something earlier.
     """

@@ -55,7 +55,7 @@ class SlidingSegment:
     steady : MeanLevel
         Friction once it has settled.
     slope : float
-        Of the steady friction over time (1/s).
+        Slope of the steady friction over time (1/s).
     scatter : float
         Standard deviation of the steady friction about that slope.
     highest, lowest : float
@@ -75,7 +75,7 @@ class SlidingSegment:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlidingMeasurement(Judged):
-    """What a recording without modulation says.
+    """Measurement of a recording without modulation.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class SlidingMeasurement(Judged):
     time, values : array, (n,)
         Friction over time, as used.
     velocity_from : str
-        The channel that velocities come from; empty if there is none.
+        The channel of the velocities; empty without such a channel.
     detrend : {"none", "linear", "quadratic"}
     chosen_by : {"program", "user"}
         Who chose where the recording is cut.
@@ -232,7 +232,7 @@ def _given_cuts(
 def _with_holds(
     cut: Partition, time: Float, holds: Sequence[tuple[float, float]] | None
 ) -> Partition:
-    """The same cuts, with the user's holds as the only ones."""
+    """The same cuts, with the user's holds as the only holds."""
     if holds is None:
         return cut
     starts = {start for start, _ in holds}
@@ -328,7 +328,7 @@ def _holds(
 def _rates(time: Float) -> tuple[tuple[float, float], ...]:
     """Sampling rates in use, commonest first."""
     steps = np.diff(time)
-    # Two figures tell rates apart, and jitter not.
+    # Two digits distinguish rates, but not jitter.
     digit = 10.0 ** (np.floor(np.log10(steps) + 1e-9) - 1)
     values, counts = np.unique(np.rint(steps / digit) * digit, return_counts=True)
     order = np.argsort(-counts)[:5]
@@ -371,7 +371,7 @@ def _checks(
     text = f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean"
     ask("drift", drift, text)
     if signals.turned:
-        ask("sign", 1.0, "friction is recorded as negative, and was turned")
+        ask("sign", 1.0, "friction is recorded as negative; its sign was reversed")
     text = "; ".join(doubts) or "the recording can be cut in one way only"
     ask("segments", float(len(doubts)), text)
     if steps:

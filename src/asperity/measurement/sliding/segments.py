@@ -20,7 +20,7 @@ import numpy as np
 from asperity.arrays import Float, Index
 from asperity.measurement.series import slope_of
 
-#: First sample of a piece, and the one after its last.
+#: First sample of a piece, and the sample after its last.
 Piece = tuple[int, int]
 
 #: Number of blocks of equal time, of equal numbers of samples and of equal slip each; number of
@@ -47,7 +47,7 @@ _OVERSHOOT = 0.05
 _LINE = 50.0
 #: Fewest samples of a piece.
 _FEWEST = 4
-#: A segment that moves by no more than this multiple of the noise stands still.
+#: A segment that moves by at most this multiple of the noise is at rest.
 _STILL = 6.0
 #: A segment slower than this share of its neighbours' velocity is a hold, unless it slides
 #: steadily.
@@ -109,7 +109,7 @@ class _Motion:
         Standard deviation (m) that a sample would have, were the noise of means over many samples
         white.
     step : float
-        Of a coarse recorder (m); 0 of a fine one.
+        Step of a coarse recorder (m); 0 for a fine recorder.
     """
 
     time: Float
@@ -153,7 +153,7 @@ def partition_at(
     times : array, (cuts,)
         Seconds, inside the recording.
     velocities : sequence of float, optional
-        Of the drive between the cuts (m/s), 0 in a hold; measured by default.
+        Velocities of the drive between the cuts (m/s), 0 in a hold; measured by default.
     """
     at = np.searchsorted(time, times)
     cuts = tuple(Cut(float(t), int(i)) for t, i in zip(times, at, strict=True))
@@ -209,7 +209,7 @@ def _motion(time: Float, displacement: Float) -> _Motion:
             spread = float(usual[usual.size // (2 if n == 1 else 4)]) * 1.4826 / np.sqrt(6)
             noise, slow = max(noise, spread), max(slow, spread * np.sqrt(n))
         n *= 2
-    # Of a coarse recorder most differences are zero: its step is the noise.
+    # With a coarse recorder most differences are zero: its step is the noise.
     moved = np.abs(np.diff(displacement))
     step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
     floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
@@ -219,7 +219,7 @@ def _motion(time: Float, displacement: Float) -> _Motion:
 
 
 def _pieces(motion: _Motion) -> list[Piece]:
-    """Lines and parabolas: cut at coarse blocks first, then at finer ones next to the changes.
+    """Lines and parabolas: cut at coarse blocks first, then at finer blocks next to the changes.
 
     Down to single samples: the mean of a block in which the velocity changes lies off the lines on
     both sides. A coarse recorder stands still between its steps, and is cut at the first finer
@@ -264,7 +264,7 @@ def _change_points(motion: _Motion, edges: Index) -> list[int]:
     size = np.diff(edges)
     t = np.add.reduceat(motion.time - motion.time[0], edges[:-1]) / size
     x = np.add.reduceat(motion.displacement - motion.displacement[0], edges[:-1]) / size
-    # What the recorder rounds is the same in all samples of a slow block.
+    # In a slow block the rounding error of the recorder is the same in all samples.
     unit = float(np.hypot(motion.slow_noise, motion.step))
     weight = 1 / ((motion.slow_noise / unit) ** 2 / size + (motion.step / unit) ** 2 / 12)
     x /= unit
@@ -498,12 +498,12 @@ def _speeds(
     for k, (piece, speed) in enumerate(zip(pieces, speeds, strict=True)):
         neighbours = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
         if not neighbours and speed == 0:
-            doubts.append("the displacement moves by no more than its noise: nothing slides")
+            doubts.append("the displacement changes by no more than its noise: nothing slides")
             continue
         share = abs(speed) / max(min(neighbours, default=0.0), 1e-300)
         change, uncertainty = _velocity_change(motion, piece)
         since = f"from {motion.time[piece[0]]:.6g} s on the velocity"
-        # What creeps in a hold slows down.
+        # Creep in a hold slows down.
         steady = abs(change) + 2 * uncertainty < abs(speed) / 2
         holds[k] = speed == 0 or (share < _HOLD and not steady)
         if holds[k]:

@@ -39,7 +39,7 @@ _LOAD_POINT = re.compile(r"\b(load ?point|lp|lpd|ram|vertical|axial|actuator)\b"
 
 @dataclass(frozen=True, eq=False)
 class SlidingSignals:
-    """Samples at which friction and motion are numbers and time goes on.
+    """Samples at which friction and motion are finite and time increases.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class SlidingSignals:
     load_unit : str
         SI unit of the load.
     motion : str
-        Name of the channel that the displacement comes from; empty if there is none.
+        Name of the channel of the displacement; empty without such a channel.
     no_motion : str
-        Why there is none; empty if there is one.
+        Reason why there is no motion; empty if there is a motion.
     names : tuple of str
         Channels that were read.
     turned : bool
@@ -151,7 +151,7 @@ def sliding_signals(
 def with_normalised_force(trace: Trace) -> Trace:
     """The same recording, with a force that is named as F/(m g) in the role of the friction.
 
-    Only where it is the only channel: next to others such a name is the normal force.
+    Only if it is the only channel: with other channels such a name is the normal force.
     """
     if len(trace.channels) != 1 or trace.roles:
         return trace
@@ -167,12 +167,12 @@ def with_normalised_force(trace: Trace) -> Trace:
 def _friction(
     trace: Trace, load: str, force: str
 ) -> tuple[Float, Float | None, str, list[Channel], list[Finding]]:
-    """Friction, load, the load's unit, the channels that they come from, and what was turned."""
+    """Friction, load, unit of the load, their channels, and findings on reversed signs."""
     W = load_channel(trace, load)
     F, is_friction = shear_channel(trace, force, W)
     if W is None:
         if not is_friction:
-            # It raises, and says which columns there are.
+            # This raises an error that names the columns.
             trace.channel(load)
         return F.values, None, "", [F], []
     unit, read = W.unit, [W, F]
@@ -190,7 +190,7 @@ def _friction(
 
 
 def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
-    """Displacement or velocity, whether it is a velocity, and why there is none.
+    """Displacement or velocity, whether it is a velocity, and the reason if there is neither.
 
     Of several displacements that of the load point is taken: it is what the machine imposes. A
     channel whose unit is unknown gives no velocity in m/s.

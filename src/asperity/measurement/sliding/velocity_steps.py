@@ -25,7 +25,7 @@ _LEFT_OUT = (1.0, 1.4, 2.0)
 #: Longest decay of a transient over the slip of the shorter side; share of its largest value below
 #: which it has settled.
 _LONGEST_DECAY, _SETTLED = 0.125, 0.03
-#: There are two slopes if their difference has less than this probability by chance.
+#: Two slopes differ if noise alone has less than this probability of such a difference.
 _CHANCE = 0.05
 #: Decays of exponentials that are tried.
 _DECAYS = 14
@@ -42,7 +42,7 @@ class StepChoice:
     Attributes
     ----------
     change, uncertainty : float
-        Of steady friction at the step, and its standard uncertainty from noise.
+        Change of steady friction at the step, and its standard uncertainty from noise.
     trend : {"none", "one slope", "two slopes"}
     left_out : float
         Slip (m; s without displacement) after the step that was not used; 0 if the transient was
@@ -133,7 +133,7 @@ def read_step(
     Parameters
     ----------
     time : float
-        Of the step (s).
+        Time of the step (s).
     before, after : (array (n,), array (n,), float)
         Times, friction and velocity (m/s, NaN if unknown) of the segments on its two sides.
     degree : int

@@ -1,4 +1,4 @@
-"""A campaign of stick-slip: recordings of one machine in one series, and what their drops tell."""
+"""A campaign of stick-slip: a series of recordings of one machine, healing and threshold."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class StickSlipSeries:
     K, W0 : float
         Medians (N/m, N); NaN where they are not known.
     rows : tuple of mapping
-        Of the campaign's table, in the order of V.
+        Rows of the campaign's table, in the order of V.
     """
 
     K: float
@@ -104,7 +104,7 @@ class StickSlipCampaign(Drawn):
     Attributes
     ----------
     series : tuple of StickSlipSeries
-        In rising stiffness.
+        In order of rising stiffness.
     model : StickSlip or None
         Cycles of a law to draw with them: a row for each of `modelled`, over the velocity.
     modelled : tuple of int

@@ -15,7 +15,7 @@ from asperity.measurement.stick_slip.noise import Noise
 #: Means over an eighth of a cycle still show its peak and trough; changes that last for less than a
 #: thirty-second of a cycle are noise.
 _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
-#: Number of rises on each side of an event that give the usual loading slope there.
+#: Number of rises on each side of an event from which its usual loading slope is computed.
 _NEAR = 10
 #: Quantile, by time, of the slopes of rises that is the usual loading slope.
 _LOADING = 0.75
@@ -264,7 +264,7 @@ def _steep_part(
             continue
         octave[new] = k
         high, low, drop = high[new], low[new], drop[new]
-        # Of each mean the last fall that begins before it.
+        # For each mean, the last fall that begins before it.
         cells = np.diff(high[1:], prepend=0, append=means.size)
         below = np.flatnonzero(means <= np.repeat(means[low] + drop / 4, cells))
         below = below[np.searchsorted(below, high)]

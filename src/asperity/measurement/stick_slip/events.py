@@ -1,7 +1,7 @@
 """Slip events of a stick-slip recording: onset, end, forces, drop, creep, each with uncertainty.
 
-Next to each fall the force is a straight line up to the onset, a slip, and a straight line again. A
-slider at constant friction moves by half a cosine, while the drive goes on.
+Around each fall the force is modelled as a straight line up to the onset, a slip, and a straight
+line after the end. A slider at constant friction moves by half a cosine, while the drive moves on.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from asperity.measurement.stick_slip.lines import Sums
 from asperity.measurement.stick_slip.noise import resolution
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
-#: Of each event peak, trough, and the run around them that is read.
+#: For each event: peak, trough, and first and last sample of the part that is fitted.
 Bounds = tuple[Index, ...]
 Shape = Callable[[Float, Float], Float]
 
-#: Lines are so long that noise moves their ends by this share of the drop; longer lines bend.
+#: Lines are long enough that noise moves their ends by this share of the drop at most; longer lines
+#: bend.
 _PRECISION = 0.01
 _SHORTEST = 6
 #: Bins of a slip; candidates of onset and end in each zoom of the search, and number of zooms.
 _BINS = 32
 _CANDIDATES = 8
 _ZOOMS = 4
-#: Events that are searched together: their arrays fit the cache.
-_TOGETHER = 64
+#: Events that are fitted together: their arrays fit the cache.
+_FITTED_TOGETHER = 64
 #: A stick shorter than this multiple of a slip may be the rise of an oscillation about sliding.
 STICKING = 2.0
-#: Most events that determine the shape, and simulated events of each shape; most runs of sticks
-#: that determine the noise, and most samples of a run.
-_TELLING, _MADE = 64, 64
+#: Largest number of events that determine the shape, and of simulated events of each shape.
+_MEASURED_EVENTS, _SIMULATED_EVENTS = 64, 64
+#: Largest number of runs in sticks from which the noise is estimated, and of samples of a run.
 _RUNS, _LONGEST_RUN = 64, 4096
 #: Part of the uncertainty of an onset or end that sampling causes (samples).
 _SAMPLING = 0.45
@@ -42,29 +43,32 @@ _SAMPLING = 0.45
 
 @dataclass(frozen=True, eq=False)
 class SlipEvents:
-    """Slip events, an entry each, in rising order. Forces are in the unit of the signal.
+    """Slip events in order of time: arrays with an entry for each event.
+
+    Forces are in the unit of the signal.
 
     Attributes
     ----------
     onset, end : array, (k,)
-        Times (s) at which the force begins and ceases to fall; of a gradual beginning, as that of a
-        rate-and-state law, between the peak and where the fall reaches a tenth of the steepest.
+        Times (s) at which the force begins and ceases to fall. If the fall begins gradually, as
+        with a rate-and-state law, the onset lies between the peak and the time at which the fall
+        reaches a tenth of its steepest rate.
     timing_uncertainty : array, (k,)
-        Of either (s).
+        Standard uncertainty of the onset, and of the end (s).
     force_before, force_after : array, (k,)
-        At onset and end.
+        Force at onset and end.
     drop_uncertainty : array, (k,)
-        Of force_before - force_after.
+        Standard uncertainty of force_before - force_after.
     loading_slope, slope_uncertainty : array, (k,)
-        Of the middle half of the stick before the event (1/s times the unit), creep throughout the
-        stick included; NaN of the first event.
+        Slope of the force in the middle half of the stick before the event (1/s times the unit),
+        including creep throughout the stick; NaN for the first event.
     slope_bend : array, (k,)
-        Part of that uncertainty that all sticks have in common.
+        Part of `slope_uncertainty` that all sticks have in common.
     creep, creep_uncertainty : array, (k,)
-        Line of that slope at the onset less the force there; NaN of the first event.
+        The line of the loading at the onset, less the force at the onset; NaN for the first event.
     fall_rate : array, (k,)
-        Steepest fall of the force over a quarter of the slip (1/s times the unit), by the mean
-        slip of the recording.
+        Steepest fall of the force over a quarter of the slip (1/s times the unit), from the mean
+        shape of all slips of the recording.
     """
 
     onset: Float
@@ -95,12 +99,12 @@ class SlipEvents:
 
     @property
     def stick_duration(self) -> Float:
-        """Seconds from the end of the event before to the onset; NaN of the first."""
+        """Seconds from the end of the previous event to the onset; NaN for the first event."""
         return self.onset - np.concatenate([[np.nan], self.end])[:-1]
 
     @property
     def recurrence(self) -> Float:
-        """Seconds from the onset of the event before to the onset; NaN of the first."""
+        """Seconds from the onset of the previous event to the onset; NaN for the first event."""
         return np.diff(self.onset, prepend=np.nan)
 
 
@@ -112,16 +116,16 @@ def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     time : array, (n,)
         Seconds.
     force : array, (n,)
-        Without impulses.
+        Force without impulses.
     falls : Falls
     """
     if not len(falls):
         return SlipEvents(*(np.empty(0) for _ in fields(SlipEvents)))
-    events = _read(time, force, falls)
-    # A fall that the lines before and after it do not confirm is a bend in the loading, as hum and
-    # a ringing gauge make it. In an oscillation about sliding all lines bend: there the drop
-    # counts, which is a third too small for a sine. Lines of other events still end at an
-    # unconfirmed fall, as it may be a slip that noise hides.
+    events = _fit_events(time, force, falls)
+    # A fall that the lines before and after it do not confirm is a bend in the loading, caused by
+    # hum or a ringing gauge. In an oscillation about sliding all lines bend; the size of the drop
+    # decides there, which for a sine is a third too small. Lines of other events still end at an
+    # unconfirmed fall, because it may be a slip that noise hides.
     clear = events.drop > 1.96 * events.drop_uncertainty
     cycles = events.stick_duration[1:] / events.slip_duration[1:]
     sticks = cycles.size > 0 and np.median(cycles) >= STICKING
@@ -129,7 +133,7 @@ def read_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     return SlipEvents(*(getattr(events, f.name)[real] for f in fields(SlipEvents)))
 
 
-def _read(time: Float, force: Float, falls: Falls) -> SlipEvents:
+def _fit_events(time: Float, force: Float, falls: Falls) -> SlipEvents:
     peak, trough = falls.peak, falls.trough
     k, n = peak.size, force.size
     before = np.concatenate([[0], trough[:-1]])
@@ -144,27 +148,29 @@ def _read(time: Float, force: Float, falls: Falls) -> SlipEvents:
     length = np.minimum(length, n).astype(np.intp) + 2 * (trough - peak)
     first = np.maximum(edges[:-1], peak - length + (trough - peak))
     stop = np.minimum(edges[1:], trough + length)
-    # Of the middle half: inertia, a ringing gauge and creep bend the force at the ends of a stick.
+    # Only the middle half of a stick is fitted: inertia, a ringing gauge and creep bend its ends.
     quarter = (peak[1:] - trough[:-1]) // 4
     sticks = _sticks(force, trough[:-1] + quarter, peak[1:] - quarter + 2, falls.scatter)
     rate = np.maximum(np.concatenate([sticks.slope[:1] if k > 1 else [0.0], sticks.slope]), 0.0)
     bounds = peak, trough, first, stop
-    # Events from all of the recording: of equal slips, noise alone makes some the largest.
+    # The shape is estimated from events of the whole recording. They are not the largest events:
+    # among equal slips, noise alone decides which is the largest.
     large = np.flatnonzero(drop > np.quantile(drop, 0.9) / 2)
-    large = large[np.linspace(0, large.size - 1, min(large.size, _TELLING)).astype(np.intp)]
+    large = large[np.linspace(0, large.size - 1, min(large.size, _MEASURED_EVENTS)).astype(np.intp)]
     runs = (trough[:-1] + quarter, peak[1:] - quarter + 2) if k > 1 else (first, peak)
     of_large = tuple(b[large] for b in bounds)
     noise = _noise(force, *runs)
     scatter = falls.scatter
     timing = _timing(sums, large, of_large, rate[large], drop[large], noise, scatter)
     shape = timing.shape
-    parts = [
+    fits = [
         _onset_and_end(sums, part, *(b[part] for b in bounds), rate=rate[part], shape=shape)
-        for part in np.array_split(np.arange(k), -(-k // _TOGETHER))
+        for part in np.array_split(np.arange(k), -(-k // _FITTED_TOGETHER))
     ]
-    onset, end, _ = (np.concatenate(values) for values in zip(*parts, strict=True))
-    empty = _empty_falls(sums, edges[1:-1], (onset, end), (first, stop), sticks.slope, scatter)
-    return _measured(time, force, scatter, sums, (onset, end), (first, stop), sticks, timing, empty)
+    onset, end, _ = (np.concatenate(values) for values in zip(*fits, strict=True))
+    slips, parts = (onset, end), (first, stop)
+    slow = _slow_noise_factor(sums, edges[1:-1], slips, parts, sticks.slope, scatter)
+    return _events_from_fits(time, force, scatter, sums, slips, parts, sticks, timing, slow)
 
 
 def _onset_and_end(
@@ -208,7 +214,7 @@ def _onset_and_end(
         edges = np.linspace(span_on[0], span_end[1] + 1.0, _BINS + 1, axis=1)
         edges = np.clip(np.rint(edges).astype(np.intp), first[:, None], stop[:, None])
         pair = np.s_[:, :, None, None], np.s_[:, None, :, None]
-        # In the bins where the slip begins or ends, only the samples of the slip count.
+        # In the bins in which the slip begins or ends, only samples of the slip count.
         begin = np.maximum(edges[:, None, None, :-1], until[pair[0]])
         stops = np.maximum(np.minimum(edges[:, None, None, 1:], since[pair[1]]), begin)
         weight = stops - begin
@@ -235,11 +241,11 @@ def _onset_and_end(
     return onset, end, np.where(np.isfinite(squares), squares, 0.0)
 
 
-def _free(u: Float, loaded: Float) -> Float:
+def _free_slip(u: Float, loaded: Float) -> Float:
     """A free slider at constant friction: the cosine of a phase from -a to pi + a.
 
-    It goes on with the slope of the loading: what the drive loads during the slip, over the drop,
-    is `loaded` = (pi/2 + a) tan a.
+    The slip joins the lines with the slope of the loading. The loading by the drive during the
+    slip, over the drop, is `loaded` = (pi/2 + a) tan a.
     """
     angle = np.interp(loaded, _LOADED, _ANGLES)
     x = (np.pi + 2 * angle) * (u - 0.5)
@@ -252,32 +258,33 @@ def _free(u: Float, loaded: Float) -> Float:
 _ANGLES = np.linspace(0.0, 0.75, 64)
 _LOADED = (np.pi / 2 + _ANGLES) * np.tan(_ANGLES)
 
-#: How a slider slips on a spring: freely at constant friction, at a constant velocity, damped over
-#: four time constants, with a velocity in proportion to u (1 - u), and freely under a drive that
-#: pauses. The force falls from 1 to 0 as u goes from 0 to 1; the second argument is what the drive
-#: loads in the slip, over the drop.
+#: Shapes of the slip of a slider on a spring: free at constant friction, at constant velocity,
+#: damped over four time constants, with a velocity in proportion to u (1 - u), and free under a
+#: drive that pauses. The force falls from 1 to 0 as u goes from 0 to 1; the second argument is the
+#: loading by the drive during the slip, over the drop.
 _SHAPES: tuple[Shape, ...] = (
-    _free,
+    _free_slip,
     lambda u, _: 1 - u,
     lambda u, _: (np.exp(-4 * u) - np.exp(-4)) / (1 - np.exp(-4)),
     lambda u, _: 1 - u * u * (3 - 2 * u),
-    lambda u, _: _free(u, np.zeros(())),
+    lambda u, _: _free_slip(u, np.zeros(())),
 )
 
 
 @dataclass(frozen=True)
 class _Timing:
-    """How the slips of a recording fall, and how well their onsets and ends are known.
+    """Shape of the slips of a recording, and the uncertainty of their onsets and ends.
 
     Attributes
     ----------
     shape : callable
+        One of `_SHAPES`.
     factor : float
-        Standard uncertainty of onset or end, the larger of both, of a slip of d samples and drop D
-        in noise of scatter s of the means over half of the slip: factor d s/D.
+        The standard uncertainty of onset or end, whichever is larger, is factor d s/D for a slip of
+        d samples and drop D, where s is the scatter of means over half of the slip.
     shift : float
-        What is open of the shape: standard uncertainty of onset or end over the duration, which
-        all slips have in common.
+        Standard uncertainty of onset or end due to the unknown shape, over the duration; all slips
+        have it in common.
     """
 
     shape: Shape
@@ -294,16 +301,18 @@ def _timing(
     noise: Autoregression,
     scatter: Float,
 ) -> _Timing:
-    """The shape of the slips of a recording, which all have one shape, from simulated recordings.
+    """The shape of all slips of a recording, by comparison with simulated recordings.
 
-    For each shape, slips are simulated with noise of the recording's spectrum and read with all
-    shapes. A shape is likely if its simulated recordings have the same sums of squared residuals
-    under all shapes as the recording (indirect inference: Gourieroux, Monfort and Renault, J. Appl.
-    Econometrics 8, S85, 1993): correlated noise acts on both alike. Where no shape fits, the
-    distances are taken in units of the smallest. The true shape may lie between these shapes, as
-    that of a damped slider lies between a free slip and an exponential fall: differences of squares
-    are linear in the shape, so that the mixture of shapes with the squares of the recording says
-    how late or early the best shape reads onset and end.
+    For each shape, slips are simulated with noise of the recording's spectrum, and all shapes are
+    fitted to them. A shape is likely if its simulated recordings have the same sums of squared
+    residuals under all shapes as the recording (indirect inference: Gourieroux, Monfort and
+    Renault, J. Appl. Econometrics 8, S85, 1993); correlated noise acts on both alike. Where no
+    shape fits, distances are divided by the smallest.
+
+    The true shape may lie between these shapes: that of a damped slider lies between a free slip
+    and an exponential fall. Differences of sums of squares are linear in the shape. The mixture of
+    shapes that reproduces the sums of the recording therefore says how late or early the best shape
+    places onset and end.
     """
     # scipy.signal loads the whole of scipy.stats, which recordings without events do not need.
     from scipy.optimize import nnls
@@ -322,7 +331,7 @@ def _timing(
     fits = read(sums, part, bounds, rate)
     seen = contrasts(fits, drop).mean(1)
     # Windows of the events, one after the other, several times.
-    many = np.repeat(np.arange(k), -(-_MADE // k))
+    many = np.repeat(np.arange(k), -(-_SIMULATED_EVENTS // k))
     size = (stop - first)[many]
     begin = np.concatenate([[0], np.cumsum(size)])
     event = np.repeat(np.arange(many.size), size)
@@ -332,7 +341,9 @@ def _timing(
     taps = np.concatenate([[1.0], -noise.coefficients[-1]])
     distance, shifts, factors, means, covariances = [], [], [], [], []
     for shape, (onset, end, *_) in zip(_SHAPES, fits, strict=True):
-        clean = _force_of(sums, part, shape, (onset, end), (first, stop), rate, place, many[event])
+        clean = _fitted_force(
+            sums, part, shape, (onset, end), (first, stop), rate, place, many[event]
+        )
         settling = 10 * taps.size
         white = rng.standard_normal(settling + place.size)
         made = clean + noise.innovation * lfilter([1.0], taps, white)[settling:]
@@ -350,7 +361,7 @@ def _timing(
         )
         late /= np.maximum(length, 1.0)
         shifts.append(np.median(late, axis=2))
-        unit = _of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
+        unit = _scatter_of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
         # The standard deviation, of which normal values exceed twice by 5 %.
         away = np.abs(late - shifts[-1][:, :, None]) / unit
         factors.append(np.quantile(away, 0.95, axis=2).max(0) / 1.96)
@@ -361,17 +372,17 @@ def _timing(
     weight = np.exp((min(distance) - np.array(distance)) / (2 * excess))
     weight /= weight.sum()
     moved = np.array(shifts)[:, :, best]
-    # In units of what the noise makes.
+    # Distances between the shapes, in standard deviations of the noise.
     power, axes = np.linalg.eigh(covariances[best])
     known = power > 1e-12 * power[-1]
     away = np.array([*means, seen]) - means[best]
     away = away @ axes[:, known] / np.sqrt(power[known])
-    # The shares of a mixture add up to one, which a row of large weight says.
+    # The shares of a mixture add up to one: a row of large weight.
     unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
     columns = np.hstack([away, unit])
     mixture, left = nnls(columns[:-1].T, columns[-1])
-    # The part that no mixture explains, beyond noise, is a shape in another direction: it moves
-    # onset or end at most as the shape does that moves it the most per distance.
+    # A part that neither a mixture nor noise explains is due to an unknown shape. It is assumed to
+    # move onset or end, per distance, no more than the worst of the known shapes.
     far = (away[:-1] ** 2).sum(1)
     others = np.arange(len(_SHAPES)) != best
     lever = (moved[others] ** 2 / far[others, None]).max(0)
@@ -383,7 +394,7 @@ def _timing(
     )
 
 
-def _force_of(
+def _fitted_force(
     sums: Sums,
     part: Index,
     shape: Shape,
@@ -393,7 +404,7 @@ def _force_of(
     place: Index,
     owner: Index,
 ) -> Float:
-    """Force at the samples `place` of the events `owner`: line, slip and line, as fitted."""
+    """Fitted force, line, slip and line, at the samples `place` of the events `owner`."""
     (onset, end), (first, stop) = slips, bounds
     until = np.maximum(np.floor(onset).astype(np.intp) + 1, first + 2)
     since = np.minimum(np.ceil(end).astype(np.intp), stop - 2)
@@ -409,7 +420,7 @@ def _force_of(
     return np.asarray(slip + right[1][owner] * np.maximum(place - end[owner], 0.0))
 
 
-def _measured(
+def _events_from_fits(
     time: Float,
     force: Float,
     scatter: Float,
@@ -420,7 +431,7 @@ def _measured(
     timing_of: _Timing,
     slow: float,
 ) -> SlipEvents:
-    """Forces and their uncertainties; slow noise multiplies these by `slow`."""
+    """Events with uncertainties; slow noise multiplies the uncertainties of forces by `slow`."""
     (onset, end), (first, stop) = slips, bounds
     step = float(time[-1] - time[0]) / (force.size - 1)
     until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
@@ -433,11 +444,11 @@ def _measured(
     high, before = level(first, until, onset)
     low, after = level(since, stop, end)
     drop = high - low
-    # The end of a line is twice as uncertain as its mean. The mean difference of lines through half
-    # of the samples shows how sticks bend: by creep in proportion to the loading before, by a
-    # ringing gauge in proportion to the drop.
-    before_error = slow * 2 * _of_mean(scatter, until - first)
-    of_noise = np.hypot(before_error, slow * 2 * _of_mean(scatter, stop - since))
+    # The end of a line is twice as uncertain as its mean. Lines through half of the samples differ
+    # from the whole lines where sticks bend: by creep in proportion to the loading before the slip,
+    # and by a ringing gauge in proportion to the drop.
+    before_error = slow * 2 * _scatter_of_mean(scatter, until - first)
+    of_noise = np.hypot(before_error, slow * 2 * _scatter_of_mean(scatter, stop - since))
     # The level of a line may lie anywhere within a step of the recorder.
     rounding = resolution(force) / np.sqrt(6.0)
     of_noise = np.hypot(of_noise, rounding)
@@ -448,9 +459,9 @@ def _measured(
     error = np.hypot(of_noise, bend)
     long = np.maximum(end - onset, 2.0)
     least = np.maximum(drop, scatter[0])
-    timing = timing_of.factor * _of_mean(scatter, long / 2) / least
-    # A line that ends too low meets the slip later by the same share; the effect on lines of noise
-    # with the spectrum of the sticks is in the factor.
+    timing = timing_of.factor * _scatter_of_mean(scatter, long / 2) / least
+    # A line that ends too low meets the slip later by the same share. The factor already includes
+    # the effect of noise with the spectrum of the sticks.
     slowly = np.hypot(of_noise * np.sqrt(1 - slow**-2), rounding) / least
     timing = np.linalg.norm(
         [timing, np.full_like(drop, timing_of.shift), bend / least, slowly], axis=0
@@ -480,16 +491,16 @@ def _measured(
 
 @dataclass(frozen=True, eq=False)
 class _Sticks:
-    """Lines through the middle halves of sticks, an entry each.
+    """Lines through the middle halves of the sticks between k events.
 
     Attributes
     ----------
     centre, mean, slope : array, (k - 1,)
-        In samples.
+        Middle of the line (samples), and its mean and slope (per sample).
     mean_error, slope_error : array, (k - 1,)
-        Standard uncertainty of mean and slope in noise.
+        Standard uncertainty of mean and slope due to noise.
     bend : array, (k - 1,)
-        What of the slope is open in all sticks, as they bend.
+        Standard uncertainty of the slope due to the curvature that all sticks have in common.
     """
 
     centre: Float
@@ -501,14 +512,14 @@ class _Sticks:
 
 
 def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
-    """Lines through runs of samples, and how lines through their halves differ from them."""
+    """Lines through the middle halves of sticks; lines through their halves show the curvature."""
     if not first.size:
         return _Sticks(*(np.empty(0),) * 6)
     middle = (first + stop) // 2
     sums = Sums(force, first, middle)
     level, slope, _, away = sums.line(first, stop)
     count = (stop - first).astype(float)
-    mean_error = _of_mean(scatter, count)
+    mean_error = _scatter_of_mean(scatter, count)
     # The slope of n samples has a variance of 12/n^2 of that of their mean.
     slope_error = np.sqrt(12.0) * mean_error / count
     # Slopes of halves, in white noise, differ by four times as much as the slope scatters.
@@ -522,7 +533,7 @@ def _sticks(force: Float, first: Index, stop: Index, scatter: Float) -> _Sticks:
     return _Sticks(sums.origin + away, mean, slope, mean_error, slope_error, bend)
 
 
-def _empty_falls(
+def _slow_noise_factor(
     sums: Sums,
     edges: Index,
     slips: tuple[Float, Float],
@@ -530,14 +541,14 @@ def _empty_falls(
     slope: Float,
     scatter: Float,
 ) -> float:
-    """True uncertainty of drops over that by the scatter of means.
+    """Ratio of the true uncertainty of a drop to the uncertainty by the scatter of means.
 
-    In the middle of a stick, where there is no slip, lines on both sides should meet; hum and other
-    noise slower than a thirty-second of a cycle keep them apart.
+    In the middle of a stick there is no slip, and the lines before and after should meet. Hum and
+    other noise slower than a thirty-second of a cycle keep them apart.
     """
     (begin, end), (first, stop) = slips, bounds
     half = (end - begin)[:-1] / 2
-    # Behind a slip the gauge may ring, and before the next one the slider creeps.
+    # After a slip the gauge may ring, and before the next slip the slider creeps.
     margin = (begin[1:] - end[:-1]) / 8
     until, since = np.floor(edges - half).astype(np.intp), np.ceil(edges + half).astype(np.intp)
     lead = np.minimum(until - end[:-1] - margin, (begin - first)[1:]).astype(np.intp)
@@ -552,13 +563,13 @@ def _empty_falls(
     high = before + left * (until - sums.origin[cells]) + sums.level[cells]
     low = after + right * (since - sums.origin[cells + 1]) + sums.level[cells + 1]
     drop = high - low + slope[long] * (since - until)
-    error = 2 * np.hypot(_of_mean(scatter, lead), _of_mean(scatter, tail))
-    # The median, as some sticks hold slips that were not detected.
+    error = 2 * np.hypot(_scatter_of_mean(scatter, lead), _scatter_of_mean(scatter, tail))
+    # The median: some sticks hold slips that were not detected.
     return max(1.0, float(np.median(np.abs(drop) / error)) / 0.6745)
 
 
 def _noise(force: Float, first: Index, stop: Index) -> Autoregression:
-    """Noise about straight lines through runs of sticks, of which short ones are left out."""
+    """Noise about straight lines through runs of samples in sticks; short runs are left out."""
     from scipy.signal import detrend
 
     size = np.minimum(stop - first, _LONGEST_RUN)
@@ -567,8 +578,8 @@ def _noise(force: Float, first: Index, stop: Index) -> Autoregression:
     return fitted([detrend(part) for part in parts], parameters=2 * len(parts))
 
 
-def _of_mean(scatter: Float, samples: Index | Float) -> Float:
-    """Scatter of means over numbers of samples, between and beyond the widths in `scatter`."""
+def _scatter_of_mean(scatter: Float, samples: Index | Float) -> Float:
+    """Scatter of means over `samples` samples, interpolated between the widths 2^j of `scatter`."""
     known = np.arange(scatter.size)
     octave = np.log2(np.maximum(samples, 1))
     inside = np.exp(np.interp(octave, known, np.log(scatter)))
@@ -576,16 +587,16 @@ def _of_mean(scatter: Float, samples: Index | Float) -> Float:
 
 
 def steepest_fall(force: Float, onset: Float, end: Float, drop: Float) -> Float:
-    """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
+    """Largest fall per sample over a quarter of the slip; for an unresolved slip, its drop.
 
-    All slips have one shape, so that the steepest quarter of their mean counts; the largest rate of
-    a single slip would be biased by noise.
+    All slips have one shape, and the steepest quarter of their mean is used: noise would bias the
+    largest rate of a single slip.
 
     Parameters
     ----------
     force : array, (n,)
     onset, end : array, (k,)
-        In samples.
+        Sample numbers, with fractions.
     drop : array, (k,)
     """
     total = np.concatenate([[0.0], np.cumsum(force)])

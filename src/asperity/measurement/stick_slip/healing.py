@@ -36,7 +36,7 @@ class StickSlipHealing:
     interval_95 : (float, float)
     recordings : int
     reason : str
-        Why it cannot be told; empty where it can.
+        Reason without a result; empty with a result.
     """
 
     drop_per_efold: float
@@ -80,14 +80,14 @@ def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> S
     y, uncertainty = np.asarray(drops, float), np.asarray(uncertainties, float)
     n = x.size
     if n < _FEWEST:
-        return _untold(n, f"{n} recordings are too few; {_FEWEST} can tell")
+        return _without_result(n, f"{n} recordings are too few; at least {_FEWEST} are needed")
     extra = 0.0
     for _ in range(_PASSES):
         weight = 1 / (uncertainty**2 + extra)
         centre = float(weight @ x) / float(weight.sum())
         power = float(weight @ (x - centre) ** 2)
         if power == 0:
-            return _untold(n, "all recordings have one and the same stick time")
+            return _without_result(n, "all recordings have one and the same stick time")
         slope = float(weight @ ((x - centre) * y)) / power
         level = float(weight @ (y - slope * (x - centre))) / float(weight.sum())
         squares = (y - level - slope * (x - centre)) ** 2
@@ -98,12 +98,12 @@ def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> S
     interval = float(slope - half), float(slope + half)
     reason = ""
     if np.ptp(x) < 1:
-        reason = f"stick times range over {np.ptp(x):.2g} e-folds; one or more can tell"
+        reason = f"stick times range over {np.ptp(x):.2g} e-folds; at least one is needed"
     elif interval[0] <= 0 <= interval[1]:
         reason = f"the 95 % interval, {interval[0]:.2g} to {interval[1]:.2g}, holds zero"
     return StickSlipHealing(slope, float(spread), interval, n, reason)
 
 
-def _untold(recordings: int, reason: str) -> StickSlipHealing:
+def _without_result(recordings: int, reason: str) -> StickSlipHealing:
     none = float("nan")
     return StickSlipHealing(none, none, (none, none), recordings, reason)

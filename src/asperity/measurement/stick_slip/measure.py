@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 
 _DEFAULTS = Question()
-#: With this number of events or fewer there is no regime.
+#: With this number of events or fewer there is no regime, and means have no spread.
 _FEW = 2
-#: The displacement is the slider's if more than this share of it falls into the slips.
+#: The recorded displacement is that of the slider if more than this share of it falls into slips.
 SLIDER = 0.5
 #: Evidence of `Falls` in a recording of many slips.
 _MANY_SLIPS = 3
@@ -42,8 +42,9 @@ _MANY_SLIPS = 3
 _NEAR = 1.5
 #: Longest interval between two samples that a straight line bridges, over the usual interval.
 _LONGEST_GAP = 4.0
-#: Straight loading fills no level of the recorder more often than the next: of 480 extremes of
-#: simulated recordings that are not saturated, 474 do not, the others in three samples or fewer.
+#: Above this ratio of the samples at the extreme level of the recorder to those at the next level,
+#: the signal is saturated. Straight loading fills all levels alike: of 480 extremes of simulated
+#: recordings without saturation, 474 stay below; the other 6 have three samples or fewer.
 _CROWDED = 1.5
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
@@ -51,14 +52,14 @@ GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class Machine:
-    """What is known of the machine, in SI; None where it is not.
+    """Numbers of the machine in SI; None where unknown.
 
     Attributes
     ----------
     stiffness : float or None
         K (N/m).
     velocity : float or None
-        V, of the far end of the spring (m/s).
+        V, velocity of the driven end of the spring (m/s).
     mass : float or None
         M (kg).
     load : float or None
@@ -73,33 +74,33 @@ class Machine:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StickSlipMeasurement(Judged):
-    """Events of a recording and what they say.
+    """Slip events of a recording, and the loading, slips and energies computed from them.
 
     Attributes
     ----------
     time, friction : array, (n,)
         Seconds and F/W, without impulses.
     events : SlipEvents
-        Forces over the load.
+        Forces are divided by the load.
     regimes : tuple of Regime
     machine : Machine
-        As given, completed by the recording.
+        Numbers of the question, completed from the recording.
     loading_slope, loading_slope_uncertainty : float
         Median slope of F/W in the sticks (1/s), and its standard uncertainty; NaN with fewer than
         two events.
     smallest_drop : float
-        A smaller drop of F/W may not have been seen, in white noise at the usual loading.
+        Smallest drop of F/W that is surely detected, in white noise at the usual loading.
     noise : float
         Standard deviation of a sample of F/W.
     impulses : int array
-        Samples that were replaced.
+        Indices of samples that were replaced.
     slip_share : float
-        Share of the recorded displacement that falls into the slips: near 1 where it is the
-        slider's, small where it is the load point's; NaN where none is recorded.
+        Share of the recorded displacement that falls into the slips: near 1 if the displacement of
+        the slider is recorded, small for that of the load point; NaN without a displacement.
     slip, slip_velocity, energy : array, (k,)
-        Of each event: slip (m), largest slip velocity (m/s), energy that the spring releases (J).
-        Slips and velocities are those of the recorded displacement where it is the slider's, else
-        those of the spring; NaN where stiffness, velocity or load are not known.
+        Slip (m), largest slip velocity (m/s) and energy that the spring releases (J), for each
+        event. Slip and velocity come from the recorded displacement of the slider, if there is one,
+        and otherwise from the force of the spring; NaN if stiffness, velocity or load is unknown.
     names : tuple of str
         Channels that were read.
     checks : tuple of Check
@@ -126,7 +127,7 @@ class StickSlipMeasurement(Judged):
 
     @property
     def stiffness_from_slope(self) -> tuple[float, float]:
-        """K (N/m) that the loading slope says, with its standard uncertainty; NaN if not known."""
+        """K (N/m) from the loading slope, and its standard uncertainty; NaN if unknown."""
         load, velocity = self.machine.load, self.machine.velocity
         if load is None or velocity is None:
             return np.nan, np.nan
@@ -137,7 +138,7 @@ class StickSlipMeasurement(Judged):
 
     @property
     def clear(self) -> bool:
-        """Whether stick-slip, or an oscillation, takes more of the recording than all else."""
+        """Whether stick-slip or oscillations take more than half of the recording."""
         moving = sum(r.end - r.start for r in self.regimes if r.stop - r.first > _FEW)
         return moving > float(self.time[-1] - self.time[0]) / 2
 
@@ -160,8 +161,8 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     ----------
     trace : Trace
     question : asperity.questions.recording.Measurement
-        Its channels, window and machine; all have defaults. A friction coefficient takes the place
-        of load and force.
+        Channels, window and machine; all have defaults. A recorded friction coefficient may take
+        the place of load and force.
 
     Raises
     ------
@@ -172,7 +173,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     -----
     Samples at uneven times are interpolated to even ones.
     """
-    # F/(m g) goes by its name only where it is the only channel: before a load is added.
+    # F/(m g) is recognised only if it is the only channel: this comes before a load is added.
     trace = with_normalised_force(trace)
     if question.normal_load is not None and not trace.has("W"):
         constant = Channel(np.full(len(trace), question.normal_load), "force", "N", "load", "N")
@@ -207,7 +208,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
         natural_period=period,
     )
     slip_share = _slip_share(signals, events)
-    slip, speed, energy = _spring(events, machine)
+    slip, speed, energy = _slip_from_spring(events, machine)
     if signals.displacement is not None and slip_share > SLIDER:
         slip, speed = _recorded_slip(time, signals.displacement, events)
     result = StickSlipMeasurement(
@@ -239,11 +240,11 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
     checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
     if signals.turned or upside_down:
         text = (
-            "the force is recorded with the other sign, in which it falls slowly and rises fast, "
-            "and was turned"
+            "the force is recorded with the opposite sign, with which it falls slowly and rises "
+            "fast; its sign was reversed"
             if signals.turned != upside_down
-            else "the force is negative on average, though it rises slowly and falls fast: drops "
-            "stand, but forces before and after lack the zero of the gauge"
+            else "the force is negative on average, but rises slowly and falls fast: drops are "
+            "right, but forces before and after a drop lack the zero of the gauge"
         )
         checks.append(STICK_SLIP.check("sign", 1.0, text))
     steps = coarsely_rounded(signals.friction)
@@ -255,7 +256,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
 
 
 def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
-    """Signals at even times, by straight lines between samples at uneven ones."""
+    """Signals at even times, linearly interpolated where samples are uneven."""
     time = signals.time
     if even_rate(time) is not None:
         return signals
@@ -267,7 +268,7 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
         raise InputError(Argument("measure.trace"), rule, got, "give a window without it")
     even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / usual) + 1)
     moved = signals.displacement
-    # A line would make an impulse of one sample one of two or three.
+    # Interpolation would spread an impulse of one sample over two or three samples.
     friction, _ = without_impulses(signals.friction)
     return replace(
         signals,
@@ -278,7 +279,7 @@ def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
 
 
 def _machine(question: Question, signals: SlidingSignals) -> Machine:
-    """What the question says of the machine, completed by the recording."""
+    """The machine as stated in the question, completed from the recording."""
     load, velocity = question.normal_load, question.velocity
     if load is None and signals.load is not None and signals.load_unit == "N":
         load = float(np.mean(signals.load))
@@ -291,11 +292,11 @@ def _machine(question: Question, signals: SlidingSignals) -> Machine:
 
 
 def _loading(events: SlipEvents) -> tuple[float, float]:
-    """Median slope of the sticks that show one, without drift, and its standard uncertainty.
+    """Median loading slope of the sticks, corrected for drift, and its standard uncertainty.
 
-    The level of the force changes where friction does along the track, which leaves the loading as
-    it is, and where the gauge drifts, which adds its rate. Which of both it is cannot be seen:
-    half of the rate is taken off, plus or minus half.
+    The mean force changes if friction varies along the track, which does not change the loading,
+    or if the gauge drifts, which adds its rate to the loading. The two cannot be told apart: half
+    of the rate is subtracted, with an uncertainty of half of the rate.
     """
     if len(events) < 2:
         return np.nan, np.nan
@@ -306,14 +307,14 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     slope, uncertainty, usual = slope[clear], uncertainty[clear], float(np.median(slope[clear]))
     rate = float(np.polyfit(events.onset, events.force_before + events.force_after, 1)[0]) / 2
     scatter = max(1.4826 * float(np.median(np.abs(slope - usual))), float(np.median(uncertainty)))
-    # The median of n normal values scatters by sqrt(pi/2 n).
-    one = scatter * np.sqrt(np.pi / 2 / slope.size)
+    # The median of n normal values scatters by sqrt(pi/(2 n)).
+    of_median = scatter * np.sqrt(np.pi / 2 / slope.size)
     bend = float(np.median(events.slope_bend[1:][clear]))
-    return usual - rate / 2, float(np.linalg.norm([one, bend, rate / 2]))
+    return usual - rate / 2, float(np.linalg.norm([of_median, bend, rate / 2]))
 
 
 def _smallest_drop(falls: Falls, slope: float) -> float:
-    """Smallest drop that means of any width show; the loading within their width hides a part."""
+    """Smallest drop that means of any width detect; the loading within the width hides a part."""
     width = 2.0 ** np.arange(falls.thresholds.size)
     rise = slope if np.isfinite(slope) else 0.0
     return float((falls.thresholds + width * max(rise, 0.0)).min())
@@ -328,8 +329,8 @@ def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
     return float(np.abs(at[1] - at[0]).sum()) / moved if moved else np.nan
 
 
-def _spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
-    """Slip, largest slip velocity and energy from M = 0, F = K (Vt - x)."""
+def _slip_from_spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
+    """Slip, largest slip velocity and energy of each event, by F = K (V t - x) without inertia."""
     if machine.stiffness is None or machine.load is None:
         none = np.full(len(events), np.nan)
         return none, none, none
@@ -344,8 +345,8 @@ def _spring(events: SlipEvents, machine: Machine) -> tuple[Float, Float, Float]:
 def _recorded_slip(time: Float, displacement: Float, events: SlipEvents) -> tuple[Float, Float]:
     """Slip and largest slip velocity of each event from the displacement of the slider.
 
-    The slip is the difference of means over a quarter of its duration, after the end and before the
-    onset, as a slider creeps ever faster before the onset.
+    The slip is the difference between the means after the end and before the onset, each over a
+    quarter of the duration of the slip: the slider creeps ever faster before the onset.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
     forward = displacement * np.sign(displacement[-1] - displacement[0])
@@ -371,11 +372,11 @@ class _Middles:
     after : int array, (m,)
         Event that ends each stick.
     total : array, (n + 1,)
-        Sums of the force, less its mean, over all samples before each.
+        Cumulative sums of the force less its mean.
     first, stop : int array, (m,)
-        Samples of the middle half.
+        First sample of the middle half, and the sample after its last.
     mean, centre : array, (m,)
-        Of force, and of time (s), in the middle half.
+        Mean force, and mean time (s), of the middle half.
     """
 
     after: Index
@@ -403,8 +404,9 @@ class _Middles:
 def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
     """Largest mean departure of the force after slips from the lines of the sticks, over the drop.
 
-    Means over a quarter of a slip, in three slips after each end, of all events. A gauge that rings
-    as slowly as the slider slips bends the lines that give drops and ends.
+    The departures are means over a quarter of the slip duration, within three slip durations after
+    the end, averaged over all events. A gauge that rings as slowly as the slider slips bends the
+    lines that give drops and ends.
     """
     events, (time, force) = result.events, (result.time, result.friction)
     width = max(float(np.median(events.slip_duration)) / 4, 2 * (time[1] - time[0]))
@@ -424,14 +426,14 @@ def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
     return largest / float(np.median(events.drop))
 
 
-def _hidden(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, float]:
-    """Share of the loading that events too small to be detected release, and its standard error.
+def _undetected_share(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, float]:
+    """Share of the loading that undetected small events release, and its standard error.
 
-    A few such events make sticks load less in their first half than their slope says; creep acts in
-    the second half. Many such events lower the slope of every stick: of the differences between
-    neighbouring means in its middle half the median is that of the loading alone, as noise is
-    symmetrical, and the mean includes the falls. The most significant of these estimates, over all
-    widths of means; NaN with few sticks.
+    If such events are few, sticks load less in their first half than their slope predicts; creep
+    acts in the second half. If they are many, they lower the slope of every stick. Differences
+    between neighbouring means in the middle half of a stick then show them: their median is that
+    of the loading alone, because noise is symmetrical, and their mean includes the falls. The
+    result is the most significant of these estimates over all widths of means; NaN with few sticks.
     """
     events, time, after = result.events, result.time, sticks.after
     if after.size < STICK_SLIP["events"][1] or not result.loading_slope > 0:
@@ -452,8 +454,8 @@ def _hidden(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, floa
         at = at[(owner >= 0) & (at + 2 * width < stop[owner])]
         change = total[at + 2 * width] - 2 * total[at + width] + total[at]
         usual, spread = np.median(change), np.diff(np.quantile(change, [0.16, 0.84]))[0] / 2
-        # The median of n normal values less their mean scatters by sqrt((pi/2 - 1)/n); eight
-        # differences of the same two widths are about one. Sums are whole steps of the recorder.
+        # The median of n normal values less their mean scatters by sqrt((pi/2 - 1)/n). Eight
+        # overlapping differences count as one. Sums are whole steps of the recorder.
         error = np.hypot(spread * np.sqrt((np.pi / 2 - 1) * 8 / at.size), rounding)
         if usual > 0 and (usual - change.mean()) * best[1] > best[0] * error:
             best = float(1 - change.mean() / usual), float(error / usual)
@@ -469,14 +471,17 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         checks.append(check if check.verdict == "ok" else replace(check, sentence=sentence + doubt))
 
     text = f"{count} complete event{'' if count == 1 else 's'}"
-    ask("events", count, text, "; means and spreads of so few say little")
+    ask("events", count, text, "; means and spreads of so few events are uncertain")
     open_ = [regime for regime in result.regimes if regime.kind == "cannot tell"]
     kind = result.kind
-    for one in open_[:1]:
-        kind = f"cannot tell what {one.start:.4g} to {one.end:.4g} s is: {one.evidence}"
-    # Of a sine the drop is a third too small: it has no stick, from which a slip falls.
+    for regime in open_[:1]:
+        kind = (
+            f"cannot tell the regime from {regime.start:.4g} to {regime.end:.4g} s: "
+            f"{regime.evidence}"
+        )
+    # The measured drop of a sine is a third too small: a sine has no stick before the slip.
     swings = [regime for regime in result.regimes if regime.kind.startswith("oscillation")]
-    doubt = "; its cycles have no sticks, and drops and durations of slips are not theirs"
+    doubt = "; its cycles have no sticks, so that drops and durations of slips do not apply"
     ask("regime", len(open_) + len(swings), kind, doubt if swings and not open_ else "")
     if not count:
         return checks
@@ -486,16 +491,16 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     ask(
         "threshold",
         near,
-        f"a drop below {least:.2g}, {percent(least / drop)} of the median, may not have been seen; "
-        f"{percent(near)} of the events are smaller than {_NEAR:g} times that",
-        ": some below it may be missing",
+        f"drops below {least:.2g}, {percent(least / drop)} of the median, may not be detected; "
+        f"{percent(near)} of the events are smaller than {_NEAR:g} times this limit",
+        ": some events below the limit may be missing",
     )
     fast = float(np.mean(events.slip_duration < 2 * step))
     ask(
         "sampling",
         fast,
         f"{percent(fast)} of the slips last for less than two samples: their durations and "
-        "velocities are bounds; a higher sampling rate tells more",
+        "velocities are bounds; a higher sampling rate resolves them",
     )
     drift = float(np.ptp(events.force_before + events.force_after)) / 2 / drop
     ask("drift", drift, f"the middle of the drops varies along the track by {drift:.2g} drops")
@@ -505,19 +510,19 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         ask(
             "ringing",
             ringing,
-            f"after a slip the mean force is off the line of the stick by up to {percent(ringing)} "
-            "of the drop",
-            ": a gauge that rings or follows slowly, or a slider that does; drops and ends are as "
-            "uncertain",
+            f"after a slip the mean force departs from the line of the stick by up to "
+            f"{percent(ringing)} of the drop",
+            ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
+            "much",
         )
-    hidden, error = _hidden(result, sticks)
+    hidden, error = _undetected_share(result, sticks)
     if np.isfinite(hidden):
         ask(
             "hidden events",
             hidden,
             f"the mean loading of the sticks is {percent(abs(hidden))} "
-            f"{'less' if hidden > 0 else 'more'} than the usual one",
-            ": small events are missing, or drops are read too small",
+            f"{'less' if hidden > 0 else 'more'} than the usual loading",
+            ": small events are missing, or drops are measured too small",
             error,
         )
     stiffness, error = result.stiffness_from_slope

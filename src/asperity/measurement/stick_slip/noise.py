@@ -14,10 +14,10 @@ from scipy.special import ndtri
 
 from asperity.arrays import Float, Index
 
-#: Median filter whose output two neighbouring impulses leave as it is.
+#: Width of a median filter whose output two neighbouring impulses do not change.
 _FILTER = 5
-#: Standard deviations by which an impulse stands out of the median, including the median's noise.
-#: Two samples that stand out by less, one up and one down, make no fall.
+#: An impulse differs from the median by this many standard deviations, including the median's
+#: noise. Two samples that stand out by less, one up and one down, make no fall.
 _IMPULSE = 4.5
 #: Quantile of second differences that gives their scatter, as up to two thirds of the blocks may
 #: hold a slip or a peak; largest share of differences on one level of a coarse recorder.
@@ -42,7 +42,7 @@ class Noise:
         Entry (k, j), j >= k: standard deviation of means over 2^k samples, by second differences at
         a lag of 2^j samples, in the unit of the force. Noise counts that is faster than the lag.
     samples : int
-        Of the recording.
+        Number of samples of the recording.
     """
 
     scatter: Float

@@ -1,4 +1,4 @@
-"""What a recording of friction is: stick-slip, oscillation about sliding, steady sliding.
+"""The regimes of a recording of friction: stick-slip, oscillation about sliding, steady sliding.
 
 Events that follow each other make a train. The spring loads through every stick of a train; where
 the force does not rise between two events as it does in the sticks, the slider slides.
@@ -106,7 +106,7 @@ def regimes(
     smallest_drop : float
         That could have been seen.
     falls : int
-        Of the force, slip events or not.
+        Number of falls of the force, slip events or not.
     impulses : float
         Share of the samples that were taken for impulses.
     natural_period : float, optional
@@ -157,7 +157,7 @@ def _usual(values: Float) -> Float:
 
 
 def _other_velocity(slope: Float) -> Bool:
-    """After which events the loading slope changes: velocity or stiffness has changed there.
+    """Events after which the loading slope changes, because velocity or stiffness has changed.
 
     An entry for each stick; entry k is true where the events up to k load otherwise than those
     from k + 1 on.
@@ -209,8 +209,8 @@ def _without_events(
     if impulses > _MANY:
         kind = "cannot tell"
         seen = (
-            f"{100 * impulses:.2g} % of the samples stand out of those around them: slips faster "
-            "than the sampling, or impulses; a higher sampling rate tells"
+            f"{100 * impulses:.2g} % of the samples stand out of their neighbours: slips faster "
+            "than the sampling, or impulses; a higher sampling rate distinguishes them"
         )
     return Regime(kind, float(time[0]), float(time[-1]), 0, 0, seen)
 
@@ -247,9 +247,8 @@ def _train(
 ) -> Regime:
     number = stop - first
     if number < _FEWEST:
-        text = (
-            f"{number} event{'s' if number > 1 else ''} cannot tell stick-slip from a single slip"
-        )
+        count = f"{number} event{'s' if number > 1 else ''}"
+        text = f"{count} cannot tell stick-slip from a single slip"
         return Regime("cannot tell", *span, first, stop, f"{text}; {_FEWEST} can")
     cut, inner = slice(first, stop), slice(first + 1, stop)
     drop, recurrence = events.drop[cut], events.recurrence[inner]
@@ -274,7 +273,7 @@ def _train(
     if ratio < _SYMMETRICAL or (inertial and ratio < STICKING):
         return Regime("oscillation about sliding", *span, first, stop, text + _mains(cycle))
     if ratio < STICKING and natural_period is None:
-        text += ": between stick-slip and an oscillation; stiffness and mass tell"
+        text += ": between stick-slip and an oscillation; give stiffness and mass to decide"
         return Regime("cannot tell", *span, first, stop, text)
     kind: Kind = "irregular stick-slip"
     if number >= _FEWEST_OF_TREND:

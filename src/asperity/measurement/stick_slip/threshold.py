@@ -43,7 +43,7 @@ _WIDEST, _NEAR = 2.0, 1.6
 #: Largest share by which a period is extrapolated.
 _FARTHEST = 0.4
 
-#: Regimes that the motion comes to below the threshold.
+#: Final regimes of the motion below the threshold.
 _STICKING = "regular", "irregular", "growing", "oscillation"
 
 #: Columns as `asperity recipe` takes them, and the bracket.
@@ -72,12 +72,12 @@ class Threshold:
         have one error in common: n of them have sqrt(n) times the uncertainty, so that their mean
         is no surer than each. NaN where there is no bracket.
     frequency, frequency_err : float
-        Of vanishing oscillations at the threshold (Hz); NaN where it cannot be told.
+        Frequency of vanishing oscillations at the threshold (Hz); NaN where it cannot be told.
     sticks_at, slides_at : float
         The bracket: largest K/W0 with stick-slip and smallest with steady sliding (1/m); NaN where
         there is none.
     reason : str
-        Why it cannot be told; empty where it can.
+        Reason without a result; empty with a result.
     """
 
     V: float
@@ -150,7 +150,7 @@ def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
     Parameters
     ----------
     rows : sequence of mapping
-        Of the campaign's table: ``V``, ``K``, ``W0``, ``regime``, ``linear_frequency`` and its
+        Rows of the campaign's table: ``V``, ``K``, ``W0``, ``regime``, ``linear_frequency`` and its
         uncertainty, ``drop``, ``recurrence`` and their uncertainties. Rows without V, K, W0 or a
         regime are left out.
 

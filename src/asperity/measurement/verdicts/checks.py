@@ -1,7 +1,7 @@
-"""The questions that are put to a lock-in reading, each with its limits.
+"""Checks of a lock-in reading, each a number with its limits.
 
-Some ask whether a dry contact can give such numbers at all: if not, columns, signs or units are
-mistaken.
+Some checks ask whether a dry contact can give these numbers at all; if it cannot, columns, signs or
+units are wrong.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def modulation(reading: LockInReading) -> Check:
 
 
 def periods(reading: LockInReading) -> Check:
-    """Whether the window holds enough of them."""
+    """Whether the window holds enough periods of the modulation."""
     number = reading.periods
     return LOCK_IN.check(
         "periods",
@@ -59,7 +59,7 @@ def signal(reading: LockInReading) -> Check:
 def load_harmonics(reading: LockInReading) -> Check:
     """How much of mu2 can come from a second harmonic of the load."""
     if reading.harmonics.size < 2:
-        return LOCK_IN.check("load harmonics", 0.0, "mu2 was not asked for")
+        return LOCK_IN.check("load harmonics", 0.0, "mu2 was not measured")
     second, response = reading.load_phasor(2), reading.phasor(2)
     share = second.amplitude
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
@@ -67,8 +67,8 @@ def load_harmonics(reading: LockInReading) -> Check:
     return LOCK_IN.check(
         "load harmonics",
         number,
-        f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
-        f"{effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
+        f"the load's second harmonic is {share:.3g} W0; with the ratio mu1/epsilon of the first "
+        f"harmonic it makes {effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
         significant=share > 4 * second.amplitude_uncertainty
         and effect > response.amplitude_uncertainty,
@@ -97,9 +97,9 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
 def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
     """Whether the mean force settles in the window, and whether its final value is determined.
 
-    A settling that ends in the window is part of the reading; in a window that the user chose, it
-    still shows that the window holds no steady state. Over a fraction of its time constant a
-    settling looks like a drift, which the force without modulation does not have.
+    A settling that ends in the window is part of the reading. In a window that the user chose, it
+    is still reported: the window does not hold a steady state. A settling that is much slower than
+    the window looks like a drift; the force without modulation does not have this drift.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
             f"the force settles by {percent(number)} of its mean, and the window holds "
             f"{lasts:.2g} of its time constants; "
         ) + (
-            "what it settles to is read"
+            "the reading is of its final value"
             if settling.determined
             else "its final value is not determined; record a longer stretch"
         )
@@ -131,7 +131,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
         f"over the window the force moves by {percent(number)} of its mean more than without "
         "modulation: it still settles, and its final value is not determined"
         if number
-        else "no settling of the force stands out"
+        else "the force does not settle significantly"
     )
     return LOCK_IN.check("transient", number, sentence)
 
@@ -146,7 +146,7 @@ def drift_rate(reading: LockInReading) -> Rate:
 def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
     """Whether the force oscillates slowly, by itself."""
     line = slow_line(reading, time, force)
-    number, sentence, seen = 0.0, "no slow oscillation stands out", False
+    number, sentence, seen = 0.0, "no slow oscillation is significant", False
     if line is not None:
         number = line.amplitude / max(abs(reading.mean_force), 1e-300)
         seen = line.amplitude > _LINE * line.background
@@ -161,7 +161,8 @@ def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
 def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
     """Whether the steps of the recorder are small against the first harmonics.
 
-    Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
+    Noise of at least half a step smooths the steps; without noise, a harmonic smaller than a step
+    cannot be measured.
     """
     heights = (reading.epsilon, reading.phasor(1).amplitude)
     answers = []
@@ -182,22 +183,22 @@ def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
 
 
 def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
-    """What the reader and the checks of the recording say about the window.
+    """Findings of the reader and of the checks of the recording, as checks of the window.
 
     Parameters
     ----------
     noticed : list of Finding
     samples : int
-        In the window.
+        Number of samples in the window.
     span : float
-        Its length (s).
+        Length of the window (s).
     """
     return [_finding(finding, samples, span) for finding in noticed]
 
 
 def _finding(finding: Finding, samples: int, span: float) -> Check:
     sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
-    # Shares of the window, where the number of the finding can be made one.
+    # Factors that turn the number of a finding into a share of the window.
     shares = {
         **dict.fromkeys(("spike", "repeated time", "missing values", "infinite"), 1 / samples),
         "gap": 1 / span,

@@ -1,4 +1,4 @@
-"""Faults of the instrument: held samples, a force that was made, mains, flat tops.
+"""Faults of the instrument: repeated samples, a computed force, mains, flat tops.
 
 A waveform that is clipped before the recorder's noise is added has no two equal samples: only the
 mean cycle shows it. Two descriptions of the mean cycle are compared by the Bayesian information
@@ -107,7 +107,7 @@ def made_force(
 def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -> Check:
     """Whether what is taken for the modulation can be the mains in the load's signal.
 
-    A line that is switched off in the pauses of the recording is none of the mains.
+    A line that vanishes in the pauses of the recording is not the mains.
     """
     f = reading.frequency
     near = _near_mains(f, *_MAINS)
@@ -164,7 +164,7 @@ def lines_in_the_pauses(
             harmonic = reading.phasor(n)
             height = max(harmonic.amplitude, harmonic.amplitude_uncertainty) * abs(reading.W0)
             number = line / height
-            # What is smaller than the uncertainty of the harmonic changes nothing that is reported.
+            # An effect smaller than the uncertainty of the harmonic is not reported.
             seen = line > _SEEN * doubt and line > harmonic.amplitude_uncertainty * abs(reading.W0)
             if largest is None or (seen, number) > (largest[2], largest[0]):
                 sentence = (
@@ -176,7 +176,7 @@ def lines_in_the_pauses(
         return ()
     number, sentence, seen = largest
     if not seen:
-        sentence = "without modulation the force has no line at f and 2f that stands out"
+        sentence = "without modulation the force has no significant line at f and 2f"
     return (LOCK_IN.check("lines in the pauses", number, sentence, significant=seen),)
 
 
@@ -248,7 +248,7 @@ def flat_top(reading: LockInReading, time: Float, load: Float, force: Float) -> 
     ----------
     reading : LockInReading
     time, load, force : array, (n,)
-        Of the window.
+        Times, load and force of the window.
     """
     number = 0.0
     sentence = (

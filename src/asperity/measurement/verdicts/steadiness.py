@@ -41,7 +41,7 @@ def slow_line(reading: LockInReading, time: Float, force: Float) -> SpectralLine
     ----------
     reading : LockInReading
     time, force : array, (n,)
-        Of the window.
+        Times and force of the window.
     """
     f = reading.frequency
     piece, left = left_of_piece(reading, time, force)
@@ -154,7 +154,7 @@ def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bo
     """Amplitude of slow motion of the load, and whether noise does not explain it."""
     white = float(reading.noise.spectra[1, 0, 0].real)
     count, sums = reading.blocks.count, reading.residual[:, 0, 0].real
-    # Each block with its samples: a short one at the end says little.
+    # Blocks are weighted by their samples: a short block at the end has little weight.
     series = [(sums / count, count)]
     at, left = left_of_piece(reading, time, load)
     # Means over half a period keep slower motion; the modulation is not in the residual.
@@ -178,7 +178,7 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     ----------
     reading : LockInReading
     time, force : array, (n,)
-        Of the window.
+        Times and force of the window.
     """
     pieces = int(min(_PIECES, reading.periods // _FEWEST_PERIODS))
     if pieces < 3:

@@ -23,7 +23,7 @@ class Check:
     name : str
         Short name, such as ``"stick-slip"``.
     number : float
-        What was measured; the sentence says of what.
+        The measured number; the sentence says what it is.
     suspicious, bad : float
         Where the verdicts begin: numbers above, or below if `suspicious` is the larger of the two.
     verdict : {"ok", "suspicious", "bad"}
@@ -139,7 +139,7 @@ STICK_SLIP = Limits(
 
 
 def worst(checks: Iterable[Check]) -> Verdict:
-    """The gravest verdict; ``"ok"`` if there is none."""
+    """The gravest verdict; ``"ok"`` without checks."""
     return max((check.verdict for check in checks), key=_ORDER.index, default="ok")
 
 

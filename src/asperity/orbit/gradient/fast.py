@@ -58,7 +58,7 @@ class FastOrbits(NamedTuple):
     Attributes
     ----------
     unknowns : pytree
-        Of the equations of the method.
+        Unknowns of the equations of the method.
     prepared : tuple
         Data of the linear systems of the derivatives.
     valid, converged : bool array, shape (points,)

@@ -125,10 +125,10 @@ class KnownOrbits:
     orbit : Orbit or None
         Points along the last axis; None where no orbit is known.
     known : bool array, shape (points,)
-        Of which points an orbit is known.
+        Whether an orbit of each point is known.
     near : bool array, shape (points,)
-        Of which points it is one of so similar parameters that a coarse search tries no other guess
-        where Newton's method fails from it: the orbit has ended.
+        Whether the known orbit belongs to parameters so similar that a coarse search tries no other
+        initial guess where Newton's method fails from this orbit.
     """
 
     points: int
@@ -191,7 +191,7 @@ def followed_orbits(
     ----------
     problem : Problem
     guess : Orbit
-        Of the points of the problem, of meaning for those of `index`.
+        Orbits of the points of the problem; only those of `index` are used.
     index : array of int
     harmonics : int
     meshes : tuple of int
@@ -378,7 +378,7 @@ def settled_orbits(
     equations : ParametrisedProblem
     parameters : mapping of str to array, shape (points,)
     problem : Problem
-        Of these parameters.
+        Problem of these parameters.
     index : array of int
     every : bool
         Whether to stop at the first motion that does not settle.
@@ -386,7 +386,7 @@ def settled_orbits(
     Returns
     -------
     orbit : Orbit
-        Of all points, on meshes that are finest where the integrator's steps were shortest.
+        Orbits of all points, on meshes that are finest where the integrator's steps were shortest.
     index : array of int
         Points whose transient becomes periodic.
     """

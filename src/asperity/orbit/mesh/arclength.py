@@ -172,7 +172,7 @@ class Turn(NamedTuple):
     values : PointValues
         The equations at its collocation points.
     cosine : array, shape (points,)
-        Of the angle with the tangent before.
+        Cosine of the angle with the tangent before.
     """
 
     point: ContinuationPoint

@@ -49,7 +49,7 @@ def condense(jacobian: Array, right: Array, widths: Array, a: Array) -> tuple[Ar
         Right-hand sides.
     widths : array, shape (intervals,)
     a : array, shape (STAGES, STAGES)
-        Of the collocation scheme.
+        Coefficients a of the collocation scheme.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
         As `condense` returns it.
     widths : array, shape (...)
     b : array, shape (STAGES,)
-        Of the collocation scheme.
+        Coefficients b of the collocation scheme.
     """
     n = response.shape[0]
     identity = np.eye(n).reshape(n, n, *(1 for _ in widths.shape))
@@ -195,7 +195,7 @@ def condensed(
         NumPy arrays (points,).
     orbit : Orbit
     direction : Problem, optional
-        Of the parameters, for a second right-hand side.
+        Direction of the parameters, for a second right-hand side.
     at : Excitation, optional
         As in `collocated`.
     closed : bool
@@ -307,7 +307,7 @@ def read_orbit(
     orbit : Orbit
     harmonics : int
     equations : CondensedEquations, optional
-        Of the orbit, where they are known.
+        Condensed equations of the orbit, where they are known.
     """
     with np.errstate(all="ignore"):
         if equations is None:

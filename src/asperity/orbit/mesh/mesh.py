@@ -148,7 +148,7 @@ def on_mesh(orbit: Orbit, mesh: Float) -> Orbit:
 
 
 def split(orbit: Orbit, parts: int) -> Orbit:
-    """Every interval cut into `parts` equal ones."""
+    """Every interval divided into `parts` equal intervals."""
     fraction = np.arange(parts)[:, None] / parts
     inner = orbit.mesh[:-1, None] + fraction * orbit.widths[:, None]
     inner = inner.reshape(-1, orbit.mesh.shape[1])

@@ -1,4 +1,4 @@
-"""Newton's method on whole orbits, along a line of parameters or at fixed ones.
+"""Newton's method on whole orbits, along a line of parameters or at fixed parameters.
 
 The unknowns are an orbit X and the coordinate t of a line of parameters. Newton's step is condensed
 interval by interval to a transfer map and the maps are tied into a cycle by
@@ -353,7 +353,7 @@ def refined_orbit(
 def _attempt(
     problem: Problem, guess: Orbit, intervals: int, patience: float
 ) -> tuple[Orbit, NewtonResult]:
-    """The guess on a new mesh, and what Newton's method makes of it there."""
+    """The guess on a new mesh, and the result of Newton's method on that mesh."""
     mesh = remeshed(problem, guess, intervals)
     return mesh, solve(problem, mesh, _NEWTON_STEPS, patience)
 

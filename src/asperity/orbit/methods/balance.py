@@ -39,7 +39,7 @@ from asperity.orbit.methods.fourier import (
 )
 from asperity.slider import Inertial, QuasiStatic, StiffInertial
 from asperity.slider.problem import Problem
-from asperity.theory.averaged import averaged_limit
+from asperity.theory.limits import averaged_limit
 
 #: Largest change of the slip exponent in a step.
 _LARGEST_CHANGE = 2.0
@@ -81,7 +81,7 @@ class Prepared(NamedTuple):
     Attributes
     ----------
     inverse : array, shape (nodes, nodes, points)
-        Of the derivative of the balance by the friction.
+        Inverse of the derivative of the balance by the friction.
     friction : tuple of arrays, shape (nodes, points)
         Change of the friction with the mean of each slow state.
     rates : matrix of arrays, shape (nodes, points)
@@ -117,7 +117,7 @@ class BalanceEquations(Equations):
         return load_cycle(problem.load, self.nodes, self.grading)
 
     def prepare(self, parameters: Parameters, unknowns: BalanceUnknowns) -> tuple[Prepared, Array]:
-        """What the solver has prepared, and the steps to take."""
+        """Prepared arrays of the solver, and its steps."""
         return parameters[1], parameters[2] + _MORE_STEPS
 
     def linearised(self, problem: Problem, unknowns: BalanceUnknowns) -> Prepared:
@@ -446,7 +446,7 @@ def elastic_swing(
     ----------
     load : Harmonic
     impedance : complex array, shape (orders, points)
-        Of `SWING_ORDERS`.
+        Impedance of `SWING_ORDERS`.
     carried : array, shape (points,)
         The same at rest.
     theta : array, shape (nodes, 1)

@@ -291,7 +291,7 @@ def _without_orbit(solution: Solution) -> NDArray[np.bool_]:
 def solve_along_branches(
     problem: Problem, solution: Solution, options: SearchOptions, mesh: BranchMesh
 ) -> NDArray[np.bool_]:
-    """Refine the orbits at the ends of the branches, or say why a branch has none.
+    """Refine the orbits at the ends of the branches, or give the reason why a branch has none.
 
     Returns
     -------

@@ -25,7 +25,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
-from asperity.theory.averaged import averaged_limit
+from asperity.theory.limits import averaged_limit
 
 #: As `AGREEMENT`, for two meshes with the same number of intervals.
 _CLOSE_AGREEMENT = 1e-8
@@ -44,7 +44,7 @@ def refine(
     ----------
     problem : Problem
     solution : Solution
-        Of the points of the problem.
+        Solution of the points of the problem.
     orbit : Orbit
         Orbits of the problem on the initial mesh.
     index : array of int
@@ -101,7 +101,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     ----------
     problem : Problem
     solution : Solution
-        Of the points of the problem.
+        Solution of the points of the problem.
     orbit : Orbit
         An orbit for every point.
     options : SearchOptions
@@ -188,7 +188,7 @@ def orbits_from_averaged_limit(
     index : array of int
         Points to work on.
     patience : float
-        Of Newton's method, see `asperity.orbit.mesh.newton.solve_in_plane`.
+        Patience of Newton's method, see `asperity.orbit.mesh.newton.solve_in_plane`.
 
     Returns
     -------

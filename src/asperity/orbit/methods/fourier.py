@@ -44,7 +44,7 @@ from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
-from asperity.theory.averaged import averaged_limit
+from asperity.theory.limits import averaged_limit
 
 States = tuple[Array, ...]
 
@@ -54,7 +54,7 @@ _ROUND_OFF = 1e-12
 #: The averaged limit is itself no closer to the orbit than this.
 _AVERAGED_TOLERANCE = 1e-2
 
-#: Convergence is looked for at every third node: the changes are smooth.
+#: Convergence is checked at every third node: the changes are smooth.
 _LOOKED_AT = slice(1, None, 3)
 
 
@@ -68,7 +68,7 @@ class FourierOrbit(NamedTuple):
     ----------
     mean : tuple of arrays, shape (points,)
     zero_mean : tuple of arrays, shape (nodes, points)
-        Of zero mean in tau.
+        Arrays of zero mean in tau.
     error : array, shape (points,)
     steps : int
     grading : float
@@ -154,7 +154,7 @@ def advance(
     Parameters
     ----------
     inverse : Matrix
-        Of the derivatives of the mean rates to the means, roughly.
+        Inverse of the derivatives of the mean rates to the means, roughly.
     rates : States
         At the present states.
     push : callable
@@ -182,7 +182,7 @@ def _largest_change(change: States, new: States, old: States, kappa: Array) -> A
 
 
 def error_of(change: Array, last: Array, round_off: float) -> Array:
-    """Error after a change, from the one before: r / (1 - r) of it if a step contracts by r."""
+    """Error after a change, from the change before: r / (1 - r) times it for contraction by r."""
     contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
     error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
     return jnp.where(change < round_off, change, error)

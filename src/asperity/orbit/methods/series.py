@@ -29,7 +29,7 @@ from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import adiabatic_growth, adiabatic_states, even_phases
+from asperity.theory.limits import adiabatic_growth, adiabatic_states, even_phases
 
 Float = NDArray[np.float64]
 

@@ -39,8 +39,7 @@ from asperity.orbit.observables import Observables, response_gap, waveform_of
 from asperity.orbit.solution import Float, Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
 from asperity.slider.problem import Problem
-from asperity.theory.adiabatic import even_phases
-from asperity.theory.averaged import averaged_limit
+from asperity.theory.limits import averaged_limit, even_phases
 
 #: Samples of the load for the averaged limit.
 _NODES = 48
@@ -160,7 +159,7 @@ def _refine(
     first: Float,
     rows: Indices,
 ) -> None:
-    """Solve the points that divisions resolve, on finer and finer ones until two agree.
+    """Solve points on finer and finer divisions of the period until two divisions agree.
 
     Parameters
     ----------
@@ -286,7 +285,7 @@ class PeriodIntegration(NamedTuple):
     Attributes
     ----------
     observables : Observables
-        Of an orbit if the period closes.
+        Observables of an orbit if the period closes.
     step : array, shape (size, points)
         Newton's, to be added to the first states.
     leap : array, shape (points,)
@@ -294,7 +293,7 @@ class PeriodIntegration(NamedTuple):
     change : array, shape (points,)
         What it does to these and to the velocity; inf if the slider sticks.
     inverse : array, shape (size, size, points)
-        Of 1 less the monodromy matrix.
+        Inverse of 1 less the monodromy matrix.
     """
 
     observables: Observables

@@ -94,7 +94,7 @@ class Autoregression:
     reflection : array, shape (p,)
         Partial correlations; the process is stationary as all are inside (-1, 1).
     variance : float
-        Of the process itself.
+        Variance of the process itself.
     """
 
     reflection: Float

@@ -57,11 +57,12 @@ def check(trace: Trace) -> tuple[Finding, ...]:
 
     Notes
     -----
-    A gap is a step of time longer than 1.5 times the median of the 24 steps before it, and of
-    those after it, and outside their scatter: a change of the sampling rate is uneven, and no gap.
-    Saturation is an excess of samples at exactly the largest or smallest value, or several such
-    samples in a row where no two samples are equal by chance. A spike stands out of
-    the samples on both sides of it by ten usual differences, for three samples at most.
+    A gap is a step of time longer than 1.5 times the median of the 24 steps before it and of the
+    24 steps after it, and outside the scatter of these steps. A change of the sampling rate is
+    "uneven sampling" and no gap. Saturation is an excess of samples at exactly the largest or
+    smallest value, or several such samples in a row where no two samples are equal by chance. A
+    spike of at most three samples differs from the samples on both sides by more than ten times
+    the usual difference.
     """
     # Sums and differences of a damaged file may overflow; another check reports such values.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -104,9 +105,9 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
     ----------
     values, time : array, (n,)
     name : str
-        Of the channel.
+        Name of the channel.
     crowded : float
-        As of `saturated`.
+        As in `saturated`.
     """
     finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
     if finite.size < 2:
@@ -127,18 +128,18 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
             "warning",
             level.rows.size / values.size,
             f"{name}, row {level.rows[0]}, t = {time[level.rows[0]]:.10g} s",
-            f"{level.rows.size} of {values.size} samples of '{name}' stand at exactly its "
-            f"{level.side} value, {level.value:.6g}, and at most {level.usual} at any value next "
-            "to it: saturated, or kept there by a command.",
+            f"{level.rows.size} of {values.size} samples of '{name}' have exactly its "
+            f"{level.side} value, {level.value:.6g}, and at most {level.usual} have a neighbouring "
+            "value: saturated, or held constant by the machine.",
         )
         for level in saturated(values, crowded)
     ]
 
 
 def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
-    """Finding ``"spike"``, for samples that stand out of the samples before and behind them.
+    """Finding ``"spike"``, for samples that differ from the samples before and after them.
 
-    A step, a slip event or a change of the amplitude has a new level on one side; it is no spike.
+    A step, a slip event or a change of the amplitude differs on one side only, and is no spike.
     """
     at = np.array(spikes(values), dtype=np.intp)
     if not at.size:
@@ -158,7 +159,7 @@ def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
 
 
 def usable_rows(time: Float, columns: Sequence[Float]) -> Bool:
-    """Whether all columns are finite and time is later than in every usable row before.
+    """Rows in which all columns are finite and time is later than in all usable rows before.
 
     Parameters
     ----------
@@ -175,7 +176,7 @@ def usable_rows(time: Float, columns: Sequence[Float]) -> Bool:
 
 
 def rows_to_avoid(time: Float, columns: Sequence[Float], kept: Bool | None = None) -> Index:
-    """Rows that are saturated, stand out, or follow a gap or a row that was left out.
+    """Rows that are saturated, are spikes, or follow a gap or a row that was left out.
 
     Parameters
     ----------
@@ -183,12 +184,12 @@ def rows_to_avoid(time: Float, columns: Sequence[Float], kept: Bool | None = Non
         Seconds, rising.
     columns : sequence of array, shape (n,)
     kept : array of bool, optional
-        Which rows of the recording these are.
+        Which rows of the recording `time` and `columns` hold; all by default.
 
     Returns
     -------
     array of int
-        In rising order.
+        Indices of the rows, in rising order.
     """
     avoided = [gap_rows(time)]
     if kept is not None:
@@ -196,6 +197,6 @@ def rows_to_avoid(time: Float, columns: Sequence[Float], kept: Bool | None = Non
     for values in columns:
         avoided.append(spikes(values))
         for level in saturated(values):
-            # A single largest value is none: saturation stands still.
+            # A single largest value is not saturated: saturated samples follow each other.
             avoided.append(level.rows[1:][np.diff(level.rows) == 1])
     return np.unique(np.concatenate(avoided))

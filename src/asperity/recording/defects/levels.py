@@ -1,4 +1,4 @@
-"""Repeated values: a channel that is saturated, coarsely rounded, or held."""
+"""Repeated values: a channel that is saturated, coarsely rounded, or repeats its samples."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     step : float
         Between samples (s).
     lowest : float
-        Frequency (Hz) from which on lines are looked for.
+        Lowest frequency (Hz) of lines that are searched.
     """
     size = min(2 ** round(math.log2(1 / (_RESOLUTION * step))), x.size // 4)
     if size < 4 * _ABOUT:

@@ -22,7 +22,7 @@ _EVEN = 0.01
 _GAP = 1.5
 #: ...and lies this many robust standard deviations outside them.
 _OUTSIDE = 6.0
-#: Steps on each side of a gap that say what is usual there.
+#: Number of steps on each side of a gap whose median is the usual step.
 _SIDE = 24
 _CHUNK = 100_000
 #: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
@@ -30,7 +30,7 @@ _SHORTEST, _OTHER_RATE = 16, 1.5
 
 
 def even_rate(time: Float) -> float | None:
-    """Samples per second where all steps agree within 1 % or are even but for rounding, else None.
+    """Samples per second if all steps agree within 1 % or are even up to rounding, else None.
 
     Parameters
     ----------

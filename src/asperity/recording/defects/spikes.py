@@ -61,7 +61,7 @@ def _standing_out(piece: Float, distance: int) -> Index:
 
 
 def _locally(sizes: Float, at: Index, distance: int) -> Bool:
-    """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
+    """Whether spikes exceed the usual differences on both sides, as a modulation may begin here."""
     jump = np.minimum(sizes[at - distance], sizes[at])
     out = np.ones(at.size, dtype=bool)
     # The steps of the spike itself end where it is one step away.
@@ -75,7 +75,7 @@ def _locally(sizes: Float, at: Index, distance: int) -> Bool:
 
 
 def _usual(steps: Float) -> float:
-    """The usual size of a difference, which a few spikes hardly change."""
+    """The usual size of a difference: robust against a few spikes."""
     size = np.abs(steps[::_EVERY])
     size = size[np.isfinite(size)]
     if not size.size:

@@ -282,7 +282,7 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
     Raises
     ------
     InputError
-        As of `read`; or if the area makes no force of a stress.
+        As in `read`; or if the area makes no force of a stress.
     """
     from asperity.recording.conversions import stress_to_force
 

@@ -147,7 +147,7 @@ def _is_grouped(cell: str, decimal: str) -> bool:
 
 
 def _is_value(cell: str, decimal: str) -> bool:
-    """Whether a cell can stand in a table of numbers: a number, nothing, or a date."""
+    """Whether a cell fits a table of numbers: a number, an empty cell, or a date."""
     return is_number(cell, decimal) or cell in MISSING or bool(_STAMP.fullmatch(cell))
 
 
@@ -311,7 +311,7 @@ def _row(text: str, delimiter: str | None, width: int, counted: bool) -> list[st
     for cells in ways:
         if len(cells) == width:
             return cells
-        # LabVIEW has a column of comments, and no delimiter where there is none.
+        # LabVIEW has a column of comments, and omits its delimiter if there is no comment.
         if len(cells) == width + 1 and cells[-1].lower() in ("", "comment", "comments"):
             return cells[:-1]
     for cells in ways if counted else ():

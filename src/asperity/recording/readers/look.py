@@ -178,7 +178,7 @@ def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
 
 
 def _columns(header: _Header, data: np.ndarray[Any, Any]) -> tuple[list[RawColumn], list[Finding]]:
-    """The channels in order, short ones filled up with NaN."""
+    """The channels in order; short channels are padded with NaN."""
     rows = max(channel.elements for channel in header.channels)
     columns, findings, at = [], [], 0
     for channel in header.channels:

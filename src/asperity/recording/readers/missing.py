@@ -26,12 +26,12 @@ def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
     values : array, shape (n,)
         As recorded, in any unit.
     name : str
-        Of the column.
+        Name of the column.
 
     Returns
     -------
     (array, Finding or None)
-        The same array where no number is such a code.
+        The same array if it contains no such code.
     """
     kept = np.isfinite(values)
     codes: list[float] = []

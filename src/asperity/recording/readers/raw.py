@@ -72,7 +72,7 @@ class RawRecording:
     columns : sequence of RawColumn
         In the order of the file.
     findings : sequence of Finding
-        What is wrong with the file itself.
+        Findings on the file itself.
     provenance : dict
         Format, title and layout.
     start, step : float or None
@@ -192,7 +192,7 @@ def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawCol
     ----------
     name : str
     values : array
-        Of one or two dimensions; anything else is no recording.
+        Array of one or two dimensions; no other array is a recording.
     about : mapping
         Texts by name: lists of names and of units count for a matrix.
     """
@@ -251,7 +251,7 @@ def one_table(
     chosen : str or None
         The group to read; without it all, if their longest columns are of one length.
     noticed : sequence of Finding
-        What is wrong with the file: a cut is why columns are missing.
+        Findings on the file: if it was cut off, columns are missing.
 
     Raises
     ------

@@ -325,7 +325,7 @@ def _ending_of(file: BinaryIO, size: int, layout: Layout) -> _Ending:
 def _is_whole(cells: list[str], layout: Layout) -> bool | None:
     """Whether the last number is complete; None if unknown."""
     if layout.closed:
-        # The delimiter behind the last number is there.
+        # The delimiter after the last number exists.
         return True
     column = layout.width - 1
     last = digits(cells[column], layout.decimal)
@@ -385,7 +385,7 @@ def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, l
 
 
 def _numbers_of(column: pd.Series[Any], name: str) -> tuple[np.ndarray[Any, Any], list[Finding]]:
-    """Numbers of a column, NaN where a text stands among them; a column of texts as it is."""
+    """Numbers of a column, with NaN for single texts; a column of texts is returned unchanged."""
     if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=np.float64), []
     import pandas as pd

@@ -1,10 +1,10 @@
 """The stability boundary on a grid: contours of its points, located on the edges and refined.
 
-All crossings are searched together. The grid detects every piece of the boundary, open or closed,
-that separates two of its points. Continuation (`asperity.branches`) also gives bifurcation curves
+All crossings are searched together. The grid detects every line of the boundary, open or closed,
+that separates two grid points. Continuation (`asperity.branches`) also gives bifurcation curves
 that bound no stable region, but it is sequential, needs a start on each curve, and ends where the
 kind of bifurcation changes. Measured for rice-ruina over K and 0.5 to 100 Hz: 154 s for three
-curves by continuation, 43 s for the one line of the map with a grid of 40 x 40 points.
+curves by continuation, 43 s for the single line of the map with a grid of 40 x 40 points.
 """
 
 from __future__ import annotations
@@ -76,9 +76,10 @@ def trace_boundary(plane: MapPlane, grid: Answers) -> MapBoundary:
     Notes
     -----
     Marching squares on the sign of ln|m| give the edges of the grid that each line crosses, in
-    order; of a cell whose four edges are crossed the mean of the corners decides. A boundary that
-    crosses the same edge twice is not detected. On each edge the crossing is located; a line ends
-    where there is none. Then chords are halved until the boundary is within `CHORD` of each.
+    order. In a cell whose four edges are crossed, the mean of the corners decides which crossings
+    are joined. A boundary that crosses the same edge twice is not detected. On each edge the
+    crossing is located; a line ends at an edge without a located crossing. Then chords are halved
+    until the boundary is within `CHORD` of each.
     """
     contours = _contours(plane.shape, grid)
     if not contours:
@@ -90,7 +91,7 @@ def trace_boundary(plane: MapPlane, grid: Answers) -> MapBoundary:
     begins = np.concatenate([np.arange(len(contour)) == 0 for contour in contours])
     line = np.where(edges.located, np.cumsum(begins | ~edges.located), -1)
     line[edges.located & (np.bincount(line + 1)[line + 1] < 2)] = -2
-    where, points, line, place, unresolved = _refined(plane, edges, line)
+    where, points, line, place, unresolved = _halved_chords(plane, edges, line)
     # The points of all lines in order, followed by the crossings that were not located.
     on_line = line >= 0
     lost = np.flatnonzero(~edges.located)
@@ -122,7 +123,7 @@ def _contours(shape: tuple[int, int], grid: Answers) -> list[Index]:
     return contours
 
 
-def _refined(
+def _halved_chords(
     plane: MapPlane, edges: Crossings, line: Index
 ) -> tuple[Float, Answers, Index, Float, int]:
     """Halve chords until the boundary is within `CHORD` of each.
@@ -142,7 +143,7 @@ def _refined(
     points : Answers
     line : int array, shape (points,)
     place : array, shape (points,)
-        By which the points of a line are in order.
+        Sort key of the points along their line.
     unresolved : int
         Chords whose distance from the boundary is unknown.
     """
@@ -151,7 +152,7 @@ def _refined(
     chords = np.stack([first, first + 1], axis=-1)
     unresolved = 0
     for rounds_left in range(_MOST_ROUNDS, -1, -1):
-        bent, unknown, between = _bent(plane, where, chords)
+        bent, unknown, between = _chord_distances(plane, where, chords)
         unresolved += int(unknown.sum())
         if not bent.any():
             break
@@ -168,11 +169,18 @@ def _refined(
     return where, points, line, place, unresolved
 
 
-def _bent(plane: MapPlane, where: Float, chords: Index) -> tuple[Bool, Bool, Crossings]:
-    """Chords further than `CHORD` from the boundary, chords of unknown distance, and crossings.
+def _chord_distances(plane: MapPlane, where: Float, chords: Index) -> tuple[Bool, Bool, Crossings]:
+    """Distances of chords from the boundary.
 
-    The distance is measured from the middle of the chord along its perpendicular. The crossings
-    are those of the chords further than `CHORD`. A chord shorter than `CHORD` needs no distance.
+    Returns
+    -------
+    bent : bool array, shape (chords,)
+        Whether the boundary is further than `CHORD` from the middle of the chord, measured along
+        the perpendicular of the chord.
+    unknown : bool array, shape (chords,)
+        Whether the distance is unknown; False for chords shorter than `CHORD`.
+    between : Crossings
+        Points of the boundary on the perpendiculars of the bent chords.
     """
     a, b = where[chords[:, 0]], where[chords[:, 1]]
     middle, chord = (a + b) / 2, b - a

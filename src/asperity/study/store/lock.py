@@ -43,7 +43,7 @@ class StoreLock:
     token : str
         Token of this driver; its workers stop writing when the file has another token.
     descriptor : int
-        Of the open lock file.
+        File descriptor of the open lock file.
     """
 
     token: str

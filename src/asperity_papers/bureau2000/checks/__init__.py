@@ -1,4 +1,4 @@
-"""What is computed for each claim of the paper: a module for each section.
+"""The checks of the paper's claims: a module for each section.
 
 A check returns numbers by name; claims.toml says which of them are judged, and how they are
 written. The paper's experimental points are not in the text: a measurement cannot be computed, and

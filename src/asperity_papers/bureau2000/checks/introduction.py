@@ -168,7 +168,7 @@ def not_a_good_tool(machine: Machine) -> Numbers:
 
 
 def _signal(machine: Machine, V: float, omega: float) -> float:
-    """What alpha = 0.02 changes in c1/eps."""
+    """Change of c1/eps by alpha = 0.02."""
     p = machine.numbers
     point = {"omega": omega, "lambda_": p.lambda_}
     with_alpha, without = (

@@ -1,4 +1,4 @@
-"""What is computed for each claim of the paper; claims.toml has the words and the rules."""
+"""The checks of the paper's claims; claims.toml has the words and the rules."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from asperity_papers.marone1998.laboratory import Laboratory
 
 
 def model(numbers: Material) -> Laboratory:
-    """What the checks are given."""
+    """Arguments of the checks."""
     return Laboratory(numbers)

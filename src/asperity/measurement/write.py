@@ -1,4 +1,4 @@
-"""Recordings and what was measured in them, as files that are read back."""
+"""Write recordings, and measurements as tables, in files that are read back."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def write(
         A recording, or what `asperity.measure` returns of one or of several. A table has a row for
         each modulated stretch, velocity step and hold, in SI, as ``asperity measure --out`` has.
     path : str or path
-        Of a recording ``.csv``, ``.txt``, ``.h5`` or ``.tdms``, of a table ``.csv`` or ``.nc``.
+        Path of a recording (``.csv``, ``.txt``, ``.h5`` or ``.tdms``) or table (``.csv`` or
+        ``.nc``).
     units : mapping of str to str, optional
         Unit in which a channel of a recording is written, such as ``{"load": "kN"}``; SI by
         default.

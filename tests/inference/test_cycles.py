@@ -10,7 +10,7 @@ from scipy.stats import chi2
 import asperity as asp
 from asperity.errors import InputError
 from asperity.inference.answers import read_data
-from asperity.inference.cycles.cycle import CycleTerm, averaged_cycle
+from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.laws import RiceRuina
 from asperity.questions.fit import Fit
@@ -108,7 +108,7 @@ def test_derivatives_are_those_of_the_residuals():
     """Of a cycle that the law describes exactly; about noise, those of the sum of squares."""
     noisy = averaged_cycle(measured(2))
     term = CycleTerm(noisy, RiceRuina, FIXED)
-    off = np.linalg.solve(noisy.whitening, term._laid_over(term.limit_cycle(TRUTH))[1])
+    off = np.linalg.solve(noisy.whitening, term._aligned(term.limit_cycle(TRUTH))[1])
     exact = CycleTerm(replace(noisy, values=noisy.values + off), RiceRuina, FIXED)
     jacobian = exact.residuals(TRUTH).jacobian
     at_truth = term.residuals(TRUTH)

@@ -1,4 +1,4 @@
-"""A table of slide-hold-slide tests: static friction above the level of sliding, hold by hold.
+"""A table of slide-hold-slide tests: healing (static friction less sliding friction) of each hold.
 
 In the likelihood holds and reloads are integrated, with exact derivatives.
 """
@@ -27,7 +27,7 @@ from asperity.slider.named import slider_from
 from asperity.transients.hold_and_step import hold
 from asperity.units import to_si
 
-#: The column that tells such a table from others.
+#: The column that identifies a table of holds.
 HEALING = "healing"
 _KINDS = {
     "hold_time": ("time", "positive"),
@@ -42,19 +42,19 @@ _REQUIRED = ("hold_time", HEALING, "V", "K")
 
 @dataclass(frozen=True, eq=False)
 class HealingTable:
-    """Healing of an interface, one hold a row; arrays of shape (rows,), in SI.
+    """Healing of an interface, one row for each hold; arrays of shape (rows,), in SI.
 
     Attributes
     ----------
     name : str
-        What messages call the table.
+        Name of the table in messages.
     hold_time : array
-        Seconds.
+        Hold times (s).
     healing : array
-        Static friction less the level of sliding before the hold.
+        Static friction less the sliding friction before the hold.
     errors : array or None
-        Standard uncertainties of `healing`; None if they are to be estimated from what the law
-        leaves, one for all rows.
+        Standard uncertainties of `healing`. If None, one uncertainty for all rows is estimated from
+        the residuals.
     V : array
         Velocity of the drive before and after the hold (m/s).
     K : array
@@ -82,10 +82,10 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
     path : str or Path
         Columns ``hold_time``, ``healing``, ``V`` and ``K``, in SI or with the unit after the name,
         as ``K (1/um)``; ``healing_err``, the standard uncertainty, if it is known. K is over the
-        normal load, or N/m where there is a column ``W0``. Lines that begin with ``#`` are skipped,
-        and other columns.
+        normal load, or in N/m if there is a column ``W0``. Lines that begin with ``#``, and other
+        columns, are skipped.
     given : mapping of str to number or str, optional
-        Of V, K and W0 where they are the same in all rows.
+        Values of V, K and W0 if they are the same in all rows.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
     Parameters
     ----------
     columns : mapping of str to array, shape (rows,), number or text
-        As of `read_healing`; numbers are SI and hold for all rows, texts carry their unit.
+        As in `read_healing`; numbers are SI and hold for all rows, texts carry their unit.
     name : str
         What messages call the table.
 
@@ -144,7 +144,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
 
 
 def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
-    """Several tables as one.
+    """Join several tables into one.
 
     Raises
     ------
@@ -170,15 +170,15 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
     )
 
 
-#: Tables are filled up to a multiple of so many holds.
+#: Tables are padded to a multiple of this many holds.
 _ROWS = 32
 
 
 class HoldTerm(DataTerm):
     """A table of holds as a `DataTerm` of an objective.
 
-    Errors that the table does not give are one for all rows. It is `error`, at first a guess that
-    changes no estimate, and then the standard deviation of what the law leaves.
+    If the table has no errors, one `error` for all rows is used: at first a guess, which does not
+    change the estimates, and then the standard deviation of the residuals.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class HoldTerm(DataTerm):
 
     @property
     def profiled(self) -> int:
-        """The error, if it is estimated."""
+        """1 if the error is estimated, else 0."""
         return int(self.table.errors is None)
 
     @property
@@ -221,7 +221,7 @@ class HoldTerm(DataTerm):
         return {"model": model, "effective_samples": self.table.rows, **more}
 
     def estimate_error(self, values: Mapping[str, float], parameters: int) -> None:
-        """Take the error from the residuals at the estimate of so many parameters."""
+        """Set the error by the residuals at an estimate of so many parameters."""
         residuals = self.residuals(values)
         freedom = self.table.rows - parameters
         if not self.profiled or residuals is None or freedom < 1:
@@ -257,7 +257,7 @@ class HoldTerm(DataTerm):
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """Of an estimated error: the covariance scales with its square."""
+        """As in `DataTerm`: the covariance scales with the square of an estimated error."""
         spread = 2 * np.diag(covariance) ** 2 / self._freedom
         return np.zeros_like(covariance), spread
 
@@ -269,7 +269,7 @@ class HoldTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
-        """How the error was estimated, if it was."""
+        """A sentence on an estimated error."""
         if not self.profiled:
             return ()
         return (
@@ -287,7 +287,7 @@ def _with_slopes(
     V: Array,
     hold_time: Array,
 ) -> tuple[Array, Array]:
-    """Healing, and its derivatives to the named parameters, shape (names, points)."""
+    """Healing, and its derivatives with respect to the named parameters, shape (names, points)."""
 
     def of(values: dict[str, Array]) -> Array:
         slider = slider_from(law, {**given, **values, "K": K, "W0": jnp.ones_like(K)})

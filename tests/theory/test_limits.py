@@ -10,7 +10,7 @@ from asperity.laws import RiceRuina
 from asperity.loads import Harmonic
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten
-from asperity.theory.adiabatic import adiabatic_growth, adiabatic_states, even_phases
+from asperity.theory.limits import adiabatic_growth, adiabatic_states, even_phases
 
 A, B, D0, W0, V = 0.013, 0.026, 4e-7, 7.0, 1e-4
 KC = (B - A) * W0 / D0

@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.inference import compare, fit, healing_table, read_healing, sample_posterior
-from asperity.inference.holds.table import HoldTerm
+from asperity.inference.holds import HoldTerm
 from asperity.laws import RiceRuina
 from references.memory_tests import Interface
 

@@ -1,10 +1,10 @@
-"""The averaged cycle of regular stick-slip, with the covariance that its cycles show.
+"""The averaged cycle of regular stick-slip, with the covariance of its cycles.
 
-Cycles are laid over each other at the middle of the slip. The covariance of their mean is that of
-the cycles (Newey and West, Econometrica 55, 703, 1987, so that variations along the track that last
-for several cycles count): the directions in which they differ by more than noise are kept, and the
-others have their mean variance, in units of the noise (Tipping and Bishop, J. R. Stat. Soc. B 61,
-611, 1999). In the likelihood the mean is compared with the limit cycle of the law with inertia.
+Cycles are aligned at the middle of the slip. The covariance of their mean is estimated from the
+cycles, including variations along the track over several cycles (Newey and West, Econometrica 55,
+703, 1987). Directions in which cycles differ by more than noise keep their variance; all others get
+their mean variance, in units of the noise (Tipping and Bishop, J. R. Stat. Soc. B 61, 611, 1999).
+In the likelihood the mean is compared with the limit cycle of the law with inertia.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ if TYPE_CHECKING:
 
 
 REGULAR = "regular stick-slip"
-#: Cycles that are needed.
+#: Smallest number of cycles.
 _FEWEST = 12
-#: Bins of the stick, of either half of the slip, and after it; what they cover of the shortest
-#: stick, and lengths of the slip after its middle.
+#: Numbers of bins: in the stick, in each half of the slip, and after the slip.
 _STICK, _SLIP, _AFTER = 12, 6, 3
+#: The bins of the stick cover this share of the shortest stick; the last bins reach this many slip
+#: durations beyond the middle of the slip.
 _COVERED, _FOLLOWED = 0.9, 2.0
-#: Samples of a slip below which its shape is not seen.
+#: With fewer samples in a slip, its shape is not resolved.
 _RESOLVED = 4.0
 
 
@@ -44,27 +45,27 @@ class AveragedCycle:
     Attributes
     ----------
     name : str
-        What messages call the recording.
+        Name of the recording in messages.
     edges : array, shape (bins + 1,)
-        Times (s) of the bins from the middle of the slip.
+        Edges of the bins: times (s) from the middle of the slip.
     values : array, shape (bins + 1,)
         Mean force in each bin, then the mean recurrence (s).
     whitening : array, shape (bins + 1, bins + 1)
-        Matrix that gives residuals unit covariance.
+        Matrix that gives the residuals unit covariance.
     log_scale : float
         Half the log determinant of the covariance of `values`.
     cycles : int
     step : float
-        Between samples (s).
+        Sampling interval (s).
     V, W0 : float
         Velocity of the drive (m/s) and load (N).
     loading_slope : float
-        Of F/W0 (1/s).
+        Slope of F/W0 (1/s).
     slip_duration, stick_duration, drop : float
-        Means of the events (s, s, F/W0).
+        Means over the events (s, s, F/W0).
     spread, noise_spread : float
-        Standard deviation of the drops over their mean, and what the noise of the gauge explains
-        of it.
+        Standard deviation of the drops over their mean, and the part of it due to the noise of the
+        gauge.
     """
 
     name: str
@@ -85,7 +86,7 @@ class AveragedCycle:
 
     @property
     def resolved(self) -> bool:
-        """Whether samples show the shape of the slip."""
+        """Whether the samples resolve the shape of the slip."""
         return self.slip_duration >= _RESOLVED * self.step
 
 
@@ -95,7 +96,7 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
     Parameters
     ----------
     measurement : StickSlipMeasurement
-        With the velocity of the drive and the load.
+        A measurement with the velocity of the drive and the load.
     name : str
 
     Raises
@@ -109,8 +110,8 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
         (
             "W0",
             machine.load,
-            f"{Argument('fixed', 'W0', '0.3 N')}, or of a force over the weight "
-            f"{Argument('fixed', 'M', '30 g')}, whose weight it is",
+            f"{Argument('fixed', 'W0', '0.3 N')}, or for a force over the weight "
+            f"{Argument('fixed', 'M', '30 g')}, the mass that has this weight",
         ),
     ):
         if value is None:
@@ -167,13 +168,13 @@ def _middles(
         if j - i < 3:
             i, j = np.searchsorted(time, t - step), np.searchsorted(time, t + step)
         slope, at = np.polyfit(time[i:j] - t, force[i:j], 1)
-        # The crossing of a line that does not fall is none.
+        # A line that does not fall has no crossing.
         result[n] += float(np.clip((level - at) / slope, -reach, reach)) if slope < 0 else 0.0
     return result, max(2, int(2 * reach / step))
 
 
 def _edges(stick: float, slip: float, after: float, step: float) -> Float:
-    """Edges of bins: long in the stick, short in the slip, no shorter than a sample."""
+    """Edges of bins: long in the stick, short in the slip, at least one sample long."""
     nearest = min(max(slip, step), stick / 2)
     before = -np.geomspace(stick, nearest, _STICK + 1)
     count = int(min(2 * _SLIP, max(2, np.floor((nearest + min(slip, after)) / step))))
@@ -182,7 +183,7 @@ def _edges(stick: float, slip: float, after: float, step: float) -> Float:
         np.linspace(inside[-1], after, _AFTER + 1) if after > inside[-1] + step else inside[-1:]
     )
     edges = np.concatenate([before[:-1], inside, beyond[1:]])
-    # Bins shorter than a sample join the one before.
+    # A bin shorter than a sample is merged with the bin before.
     kept = [edges[0]]
     for edge in edges[1:]:
         if edge - kept[-1] > 0.999 * step:
@@ -191,7 +192,7 @@ def _edges(stick: float, slip: float, after: float, step: float) -> Float:
 
 
 def _integral(time: Float, force: Float, integral: Float, at: Float) -> Float:
-    """Integral of the force, straight between its samples, up to some times."""
+    """Integral of the force, linear between its samples, up to the times `at`."""
     i = np.clip(np.searchsorted(time, at) - 1, 0, time.size - 2)
     since, step = at - time[i], time[i + 1] - time[i]
     slope = (force[i + 1] - force[i]) / step
@@ -208,11 +209,11 @@ def _whitening(rows: Float, scales: Float) -> tuple[Float, float]:
         product = off[lag:].T @ off[:-lag] / (n - 1)
         covariance += (1 - lag / (lags + 1)) * (product + product.T)
     values, vectors = np.linalg.eigh(covariance)
-    # Eigenvalues of white noise in so few rows reach this far (Marchenko and Pastur, 1967); the
-    # weights above leave fewer of them to each element.
+    # Eigenvalues of white noise in a finite number of rows reach this limit (Marchenko and Pastur,
+    # 1967); the weights above reduce the effective number of rows.
     edge = (1 + np.sqrt(size * (1 + 2 * lags / 3) / n)) ** 2
     excess = values > edge * max(1.0, float(np.median(values)))
-    # What the noise of the gauge explains is known: no direction scatters less.
+    # The noise of the gauge is known: no direction scatters less.
     others = max(1.0, float(np.mean(values[~excess])))
     values = np.where(excess, values, others)
     whitening = np.sqrt(n) * (vectors / np.sqrt(values)) @ vectors.T / scales
@@ -223,19 +224,20 @@ def _whitening(rows: Float, scales: Float) -> tuple[Float, float]:
 CYCLE = "cycle"
 #: Tolerated error of a step: the period is then good to 1e-7, recurrences are measured to 1e-5.
 _RTOL = 1e-8
-#: Instants in a bin, and in the slip of the model; rounds of the shift in time.
+#: Times per bin, and in the slip of the model, at which the model is evaluated; rounds of the shift
+#: in time.
 _IN_BIN, _IN_SLIP, _ROUNDS = 8, 400, 8
-#: Share of a slip by which a last change of the shift is none.
+#: The shift in time has converged if it changes by less than this share of a slip.
 _NO_SHIFT = 1e-4
-#: Spread of the drops over that of the noise from which cycles differ by themselves.
+#: Cycles are irregular if the spread of the drops exceeds this multiple of the spread by noise.
 _IRREGULAR = 2.0
 
 
 class CycleTerm(DataTerm):
     """The averaged cycle of a recording as a `DataTerm` of an objective.
 
-    A constant friction and a shift in time are fitted within: neither the level of the gauge nor
-    the instant that the events are laid over each other by is known as well as the shape is.
+    The term itself fits a constant friction and a shift in time, because the level of the gauge and
+    the time of alignment are less well known than the shape.
 
     Parameters
     ----------
@@ -271,7 +273,7 @@ class CycleTerm(DataTerm):
         }
 
     def limit_cycle(self, values: Mapping[str, float]) -> LimitCycle:
-        """The cycle of the law at values of its parameters, begun at the last one."""
+        """The cycle of the law at given parameters, computed from the last cycle as a start."""
         numbers = {**self._fixed, **values, "W0": self.cycle.W0}
         cycle = limit_cycle(
             slider_from(self.law, numbers), self.cycle.V, rtol=_RTOL, near=self._near
@@ -280,17 +282,17 @@ class CycleTerm(DataTerm):
             self._near = cycle
         return cycle
 
-    def _laid_over(self, cycle: LimitCycle) -> tuple[float, Float, Float]:
-        """The middle of the model's slip where it fits best, residuals there, and their space.
+    def _aligned(self, cycle: LimitCycle) -> tuple[float, Float, Float]:
+        """Align a cycle of the model with the data.
 
         Returns
         -------
         float
-            Seconds from the peak.
+            Time of the middle of the model's slip at the best alignment (s from the peak).
         array, shape (bins + 1,)
-            Whitened.
+            Whitened residuals.
         array, shape (bins + 1, bins - 1)
-            Orthonormal columns without level and shift.
+            Orthonormal basis of residuals that level and shift do not change.
         """
         data = self.cycle
         falling = np.linspace(0, cycle.slip_duration, _IN_SLIP)
@@ -308,13 +310,13 @@ class CycleTerm(DataTerm):
         return middle, off, np.linalg.qr(columns, mode="complete")[0][:, 2:]
 
     def _instants(self, middle: float) -> Float:
-        """Times at which a cycle is evaluated: in the bins, and a sample before and after."""
+        """Times at which a cycle is evaluated: in the bins, and one sample before and after."""
         return (middle + self._times + self.cycle.step * np.array([[-1.0], [0.0], [1.0]])).ravel()
 
     def _means(self, values: Float) -> Float:
         """Means in the bins, shape (bins, ...), of values at `_instants`."""
         before, at, after = values.reshape(3, -1, _IN_BIN, *values.shape[1:]).mean(2)
-        # Samples are joined by straight lines: h^2/12 of the curvature is added.
+        # Measured means are of lines between samples: this adds h^2/12 times the curvature.
         return np.asarray((before + 10 * at + after) / 12)
 
     def residuals(
@@ -322,13 +324,13 @@ class CycleTerm(DataTerm):
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None where the law has no cycle.
 
-        The Jacobian leaves out that level and shift follow (Kaufman, BIT 15, 49, 1975): the
-        gradient of the sum of squares is exact.
+        The Jacobian neglects the change of level and shift with the parameters (Kaufman, BIT 15,
+        49, 1975); the gradient of the sum of squares is exact.
         """
         cycle = self.limit_cycle(values)
         if cycle.end is not CycleEnd.REPEATS:
             return None
-        middle, off, space = self._laid_over(cycle)
+        middle, off, space = self._aligned(cycle)
         names = list(values)
         forces, period = cycle.derivatives(self._instants(middle), names)
         slopes = np.vstack([self._means(forces), period / cycle.slips])
@@ -347,7 +349,7 @@ class CycleTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
-        """Whether cycles differ by more than the noise of the gauge."""
+        """A warning if cycles differ by more than the noise of the gauge."""
         cycle = self.cycle
         if cycle.spread <= _IRREGULAR * cycle.noise_spread:
             return ()

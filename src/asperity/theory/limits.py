@@ -1,26 +1,37 @@
-"""The averaged (high-frequency) limit: states constant over a period.
+"""Limits of fast and of slow modulation: the averaged limit and the adiabatic limit.
 
-When a period is too short for the states to move, only the means of their rates count, and with
-the mean slip rate equal to the pulling velocity the periodic orbit shrinks to a point:
+In the averaged (high-frequency) limit a period is too short for the states to change. Only the
+means of their rates count, and with the mean slip rate equal to the pulling velocity the periodic
+orbit shrinks to a point:
 
     < v_pl(f/w, state, w) > = V,      < state rates > = 0.
 
-The exponent of v_pl varies by eps mu / A, tens of units, so the mean over the load cycle is
+The exponent of v_pl varies by eps mu / A, tens of units, so that the mean over the load cycle is
 that of a narrow pulse at the weakest contact. The start comes from its Laplace (saddle-point)
 estimate, and Newton's method works on the logarithm of the mean slip rate, which is nearly linear.
+
+In the adiabatic limit the states at every phase are those of steady sliding under the present load.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from asperity.algebra.small_systems import Matrix, inverse_points
+from asperity.algebra.small_systems import (
+    Matrix,
+    inverse_points,
+    jacobian_columns,
+    spectral_abscissa,
+)
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
+from asperity.slider.problem import Problem
 
 #: Largest change of a logarithmic state in a step; the unknown is the mean of e^(-state).
 _STATE_STEP = 2.0
@@ -150,3 +161,34 @@ def _newton_step(
     change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
     moved = jnp.stack([jnp.log(slip), *change[1:]])
     return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, jnp.abs(moved).max(0)
+
+
+_NODES = 192
+
+
+def even_phases(nodes: int) -> np.ndarray:
+    """Evenly spaced phases of a period, as a column."""
+    return 2 * np.pi * np.arange(nodes)[:, None] / nodes
+
+
+@partial(jax.jit, static_argnames=("nodes",))
+def adiabatic_states(problem: Problem, *, nodes: int) -> Array:
+    """Steady states at even phases, at their pulling velocities; (size, nodes, points)."""
+    system, load = problem
+    ones = jnp.ones((nodes, jnp.shape(system.V)[-1]))
+    at = load.at(even_phases(nodes) * ones)
+    law, pull = system.slider.law, at.pull * ones
+    friction = law.mu_ss(system.V) * ones
+    mechanical = system.mechanical_states(friction, pull, jnp.log(pull), at)
+    return jnp.stack([state * ones for state in (*mechanical, *law.steady_state(system.V * pull))])
+
+
+@jax.jit
+def adiabatic_growth(problem: Problem) -> Array:
+    """Exponent by which a disturbance grows within a period, over the phases at which it does."""
+    system, load = problem
+    Y = adiabatic_states(problem, nodes=_NODES)
+    at = load.at(even_phases(_NODES) * jnp.ones(Y.shape[2]))
+    _, columns = jacobian_columns(lambda y: system.rates(y, at), Y)
+    rate = spectral_abscissa(jnp.stack(columns, axis=1))
+    return 2 * jnp.pi * jnp.maximum(rate, 0.0).mean(0)

@@ -1,4 +1,4 @@
-"""Minima of recordings under the noise of their residuals."""
+"""Minima of fits to recordings, whose noise is estimated from the residuals."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from asperity.inference.fitting.description import RIVAL
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import RunTerm
 
-#: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
+#: Largest number of rounds of estimating noise and parameters; the change (standard deviations)
+#: that ends them.
 _ROUNDS, _STILL = 8, 0.03
-#: Starts that are nearer than so many standard deviations are followed as one.
+#: Starts closer than this many standard deviations are the same.
 _ONE_END = 1.0
-#: Standard deviations of the parameters within which two starts lead to the same minimum.
+#: Two starts lead to the same minimum if they differ by fewer standard deviations.
 _ALLOWED = 5.0
-#: Relative change of the coordinates that ends the way to a minimum before the last.
+#: Tolerance of all minima but the last (relative change of the coordinates).
 _COARSE = 1e-4
-#: Evaluations under white noise, which is but a place to begin at.
+#: Evaluations under white noise, whose minimum is only a start.
 _EVALUATIONS = 30
 
 
 def under_drift(objective: Objective) -> Objective:
-    """The objective with recordings whose noise is taken for a slow drift, to search with."""
+    """The objective with a slow drift as the noise of all recordings, for the search."""
     terms = (t.under_drift() if isinstance(t, RunTerm) else t for t in objective.terms)
     return replace(objective, terms=tuple(terms), tolerance=_COARSE)
 
@@ -36,36 +37,38 @@ def under_drift(objective: Objective) -> Objective:
 def with_noise(
     objective: Objective, minima: list[Minimum], searched: Objective
 ) -> tuple[list[Minimum], bool]:
-    """Minima once the noise is that of the residual, and whether the two agree at the best.
+    """Minima with noise that is estimated from the residuals.
 
-    From each of the `minima` of `searched`, the objective under a drift, the way goes by that under
-    white noise, and straight on too where the drift does not allow that one. Each is followed under
-    the noise that its own residual shows. They are compared by the likelihood, noise included:
-    under the noise of one, which holds its misfit, another is no minimum. The objective takes the
-    noise of the best.
+    `searched` is the objective under a drift, with the given `minima`. A minimisation under white
+    noise begins at each of them; if its result is not allowed under the drift, the minimum itself
+    is used too. From each of these starts, noise and parameters are then estimated in turn. The
+    resulting minima are compared by the likelihood including the noise, because the noise of one
+    minimum includes its misfit, and other minima are none under this noise. The objective takes the
+    noise of the best minimum.
 
     Returns
     -------
     list of (array, float)
-        Best first, with the chi-squared of the best under its noise; that of the others is as much
-        higher as twice the logarithm of their likelihood is lower.
+        Minima, best first. The chi-squared of the best is that under its noise; the others exceed
+        it by twice the difference of the log likelihoods.
     bool
+        Whether noise and parameters agree at the best minimum.
     """
     starts: list[Float] = []
     for k, (u, value) in enumerate(minima):
-        # Most of the drawn starts have led to the same minimum.
+        # Most of the random starts lead to the same minimum.
         near = [v for v, other in minima[:k] if value - other < _ONE_END]
-        if len(_apart(searched, [*near, u])) == len(_apart(searched, near)):
+        if len(_distinct_starts(searched, [*near, u])) == len(_distinct_starts(searched, near)):
             continue
         white = objective.minimise(u, tolerance=_COARSE, evaluations=_EVALUATIONS).u
-        # Chi-squared of a drift says how large it is: noise has one a sample.
+        # Chi-squared per sample estimates the size of the drift: noise has 1.
         allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
-    ends: list[_End] = []
-    for u in _apart(objective, starts):
-        ends += _with_own_noise(objective, u, ends, _COARSE)
+    ends: list[_MinimumWithNoise] = []
+    for u in _distinct_starts(objective, starts):
+        ends += _estimated_in_turn(objective, u, ends, _COARSE)
     ends.sort(key=lambda end: end.deviance)
-    (best,) = _with_own_noise(ends[0].objective, ends[0].u, (), objective.tolerance)
+    (best,) = _estimated_in_turn(ends[0].objective, ends[0].u, (), objective.tolerance)
     objective.terms = best.objective.terms
     objective.forget()
     chi2 = objective.chi2(best.u)
@@ -77,8 +80,8 @@ def with_noise(
     return [Minimum(best.u, chi2), *others], best.agreed
 
 
-def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
-    """Starts without those that the data hardly tell from an earlier one: both lead to one end."""
+def _distinct_starts(objective: Objective, starts: list[Float]) -> list[Float]:
+    """Starts without those that are too close to an earlier start: both have the same minimum."""
     kept: list[Float] = []
     for u in starts:
         _, jacobian = objective.residuals(u)
@@ -87,8 +90,8 @@ def _apart(objective: Objective, starts: list[Float]) -> list[Float]:
     return kept
 
 
-class _End(NamedTuple):
-    """A minimum, and the objective under its own noise."""
+class _MinimumWithNoise(NamedTuple):
+    """A minimum, and the objective with the noise of its residuals."""
 
     u: Float
     deviance: float
@@ -96,13 +99,13 @@ class _End(NamedTuple):
     agreed: bool
 
 
-def _with_own_noise(
-    objective: Objective, u: Float, known: Sequence[_End], tolerance: float
-) -> list[_End]:
-    """Noise and parameters in turn, until the parameters stay where they are.
+def _estimated_in_turn(
+    objective: Objective, u: Float, known: Sequence[_MinimumWithNoise], tolerance: float
+) -> list[_MinimumWithNoise]:
+    """Estimate noise and parameters in turn, until the parameters stay constant.
 
-    Empty where they come to an end that is known, or will not come to one that matters: each round
-    gains a part of what the last one gained.
+    Empty if the rounds approach a known minimum, or a minimum that cannot be among the best: each
+    round gains a fraction of the gain of the last round.
     """
     lowest = min((end.deviance for end in known), default=math.inf)
     deviance = math.inf
@@ -119,21 +122,21 @@ def _with_own_noise(
             break
         begin, u = objective.ordered(begin), objective.ordered(u)
         _, jacobian = objective.residuals(u)
-        # The first noise holds the misfit of the start.
+        # The first noise includes the misfit of the start.
         if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
             return []
         before, deviance = deviance, _deviance(objective, u)
         if deviance - _ROUNDS * (before - deviance) > lowest + RIVAL:
             return []
         away = jacobian @ (u - begin)
-        # chi-squared of the change, under the noise as it is now.
+        # Chi-squared of the change under the present noise.
         if agreed := float(away @ away) < _STILL**2:
             break
-    return [_End(u, _deviance(objective, u), objective, agreed)]
+    return [_MinimumWithNoise(u, _deviance(objective, u), objective, agreed)]
 
 
 def _deviance(objective: Objective, u: Float) -> float:
-    """Twice the negative logarithm of likelihood and priors, and twice the numbers of the noise."""
+    """-2 ln of likelihood times priors, plus twice the number of parameters of the noise."""
     priors = objective.prior_residuals(u)[0]
     profiled = sum(term.profiled for term in objective.terms)
     return -2 * objective.log_likelihood(u) + float(priors @ priors) + 2 * profiled

@@ -1,1 +1,0 @@
-"""Stick-slip as data of a fit: the averaged cycle."""

@@ -1,1 +1,0 @@
-"""Healing against hold time as data of a fit."""
