@@ -80,12 +80,13 @@ def test_laws_are_compared_without_naming_what_is_free(made, pmma):
 @pytest.mark.long
 def test_a_law_with_more_parameters_than_samples_allow_leaves_the_others(tmp_path):
     whole = write(samples.velocity_steps(), tmp_path / "whole.csv").read_text().splitlines()
-    # The rule is eight samples for each free parameter, step and two more.
+    # The rule is eight samples for each free parameter, step and two more. Of the steps the one at
+    # 200 s is in these 62 samples: 64 are the fewest for two-state, 48 for the others.
     few = tmp_path / "few.csv"
     few.write_text("\n".join([whole[0], *whole[4001:10801:110]]) + "\n")
     found = answers.compare(few, ["rice-ruina", "ruina-slip", "two-state"], evidence=False)
     assert set(found.laws) == {"rice-ruina", "ruina-slip"}
-    assert "at least 72 samples" in found.not_compared["two-state"]
+    assert "at least 64 samples" in found.not_compared["two-state"]
 
 
 @pytest.mark.parametrize("law", population(["linker-dieterich", "elasto-plastic"]))

@@ -320,6 +320,7 @@ def test_a_spike_that_friction_could_be_is_told_from_it_by_the_motion():
     assert max(apart) > 3
 
 
+@pytest.mark.long
 def test_a_lag_of_the_gauge_that_is_not_given_leaves_no_samples_out():
     """A motion that the law does not have is off in many samples in a row."""
     case = CASES["loads"]
