@@ -71,6 +71,8 @@ class AxisTable(Record):
             " and no ".join(missing),
         )
         require(not missing, "", rule, f"no {got}", "add it")
+        both_ends = forms[0] != "from" or (self.count or 0) > 1
+        require(both_ends, "count", "be at least 2, for both ends", "1", "give one as values")
         return self
 
 
@@ -189,6 +191,10 @@ class Sweep(Point):
             rule = f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'"
             advice = f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it"
             require(wanted == given, name, rule, "a table" if given else "nothing", advice)
+        rule = f"be left out where solve is '{self.solve}'"
+        advice = "write solve = 'threshold' or remove it"
+        needless = self.solve != "threshold" and self.threshold != ThresholdTable()
+        require(not needless, "threshold", rule, "a table", advice)
         return self
 
     @property
