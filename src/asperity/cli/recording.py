@@ -114,7 +114,7 @@ def source_options(command: Command) -> Command:
 
 def _name_value_pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
     """Split ``NAME=VALUE`` texts at the last ``=``."""
-    pairs = []
+    pairs: list[tuple[str, str]] = []
     for text in texts:
         name, _, value = (part.strip() for part in text.rpartition("="))
         like = "velocity=speed" if option == "--column" else "Fn=N"

@@ -71,8 +71,6 @@ class AxisTable(Record):
             " and no ".join(missing),
         )
         require(not missing, "", rule, f"no {got}", "add it")
-        both_ends = forms[0] != "from" or (self.count or 0) > 1
-        require(both_ends, "count", "be at least 2, for both ends", "1", "give one as values")
         return self
 
 
