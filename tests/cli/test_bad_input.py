@@ -497,3 +497,17 @@ def test_a_law_whose_file_ends_the_program(asperity, tmp_path) -> None:
 
 def test_a_sample_without_a_name(asperity, tmp_path) -> None:
     refused(asperity("samples", "--out", tmp_path / "a.csv"), "NAME must be given with --out")
+
+
+@pytest.mark.parametrize(
+    ("axis", "sentence"),
+    [
+        ("epsilon=0:1:3", "asperity: --x must be at least 0 and below 1"),
+        ("epsilom=0:0.5:3", "asperity: --x must be a number of an operating point, got 'epsilom'"),
+        ("epsilon=0.1:0.5:99999999999", "asperity: --x must be a whole number"),
+        ("tilt=0:100:3 deg", "asperity: --x must be less than a right angle"),
+    ],
+)
+def test_an_axis_of_a_map_is_named_by_its_option(asperity, tmp_path, axis, sentence) -> None:
+    call = ("map", *OF[1:], "--law", "rice-ruina", "--out", tmp_path / "m.nc")
+    refused(asperity(*call, "--x", axis, "--y", "K=1:2:3 N/um"), sentence)
