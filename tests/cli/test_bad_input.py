@@ -511,3 +511,9 @@ def test_a_sample_without_a_name(asperity, tmp_path) -> None:
 def test_an_axis_of_a_map_is_named_by_its_option(asperity, tmp_path, axis, sentence) -> None:
     call = ("map", *OF[1:], "--law", "rice-ruina", "--out", tmp_path / "m.nc")
     refused(asperity(*call, "--x", axis, "--y", "K=1:2:3 N/um"), sentence)
+
+
+def test_inertia_without_a_mass(asperity) -> None:
+    point = [part for pair in POINT.items() for part in pair]
+    call = (*OF, *point, "--set", "M=0 kg", "--inertia")
+    refused(asperity(*call), "--set M must be positive with inertia, got 0 kg", '--set "M=1.6 kg"')
