@@ -62,6 +62,13 @@ def in_python(argument: Argument) -> str:
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
 
 
+class Key(Argument):
+    """A key of a file, which has the same name at every door."""
+
+    def __str__(self) -> str:
+        return in_python(self)
+
+
 Words = Callable[[Argument], str]
 
 _words: ContextVar[Words] = ContextVar("words", default=in_python)
@@ -212,7 +219,7 @@ def code_of_others(
         yield
     except InputError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a script may end with sys.exit()
         text = printable(" ".join(str(error).split()), 200)
         got = f"{type(error).__name__} ({text})" + (f" from {where}" if where else "")
         raise InputError(field, rule, got, advice) from error

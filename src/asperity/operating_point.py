@@ -245,6 +245,11 @@ def respond(
     """
     harmonic = not _more_modulated(values).any()
     damped = np.any(np.asarray(values.get("eta", 0.0)) > 0)
+    inertia, mass = bool(np.any(values.get("inertia", 0.0))), np.asarray(values.get("M", 0.0))
+    if inertia and not (mass > 0).all():
+        advice = f"give the mass, like {Argument('numbers', 'M', '1.6 kg')}"
+        got = f"{mass.min():g} kg" if "M" in values else "nothing"
+        raise InputError(Argument("numbers", "M"), "be positive with inertia", got, advice)
     return periodic_response(
         slider_from(law, values),
         velocity=values["V"],
@@ -257,7 +262,7 @@ def respond(
             load=_further_harmonics(values),
             **{name: values.get(name, 0.0) for name in ("pull", "pull_phase", "tilt")},
         ),
-        inertia=bool(np.any(values.get("inertia", 0.0))),
+        inertia=inertia,
         radiation_damping=values["eta"] if damped else None,
         progress=progress,
         **options,

@@ -50,8 +50,8 @@ ROW = "rice-ruina,1e-6,0.2,120"
     ],
 )
 def test_a_bad_option(asperity, option: str, value: str, parts: list[str]) -> None:
-    options = POINT | {option: value}
-    refused(asperity(*OF, *(text for pair in options.items() for text in pair)), *parts)
+    options = {OF[1]: OF[2]} | POINT | {option: value}
+    refused(asperity(OF[0], *(text for pair in options.items() for text in pair)), *parts)
 
 
 def test_a_missing_option(asperity) -> None:
@@ -425,3 +425,95 @@ def test_a_protocol_that_cannot_be_run(asperity, tmp_path: Path, text: str, part
     for part in parts:
         assert part in result.stderr.splitlines()[-1]
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("-V", "1 um/s", "-V", "2 um/s"), "-V must be given once, got '1 um/s' and '2 um/s'"),
+        (("--law", "nagata", "--law", "amontons"), "--law must be given once"),
+        (("--material", "bureau2000", "--material", "x.toml"), "--material must be given once"),
+    ],
+)
+def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> None:
+    refused(asperity("response", *options), sentence)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--window", "0:1", "--window", "1:2"), "--window must be given once"),
+        (("--unit", "load=N", "--unit", "load=kN"), "--unit load must be given once, got 'N'"),
+        (("--column", "W=load", "--load", "force"), "--column W must be given once"),
+        (("--steps", "none.txt"), "--steps must be times or a file that can be read"),
+        (("--amplitudes", "--events", "e.csv"), "--amplitudes must go without --events"),
+    ],
+)
+def test_options_of_a_recording_that_exclude_each_other(
+    asperity, tmp_path, options, sentence
+) -> None:
+    file = recording(tmp_path / "a.csv", [7.0] * 100, [3.5] * 100)
+    refused(asperity("measure", file, *options), sentence)
+
+
+def test_a_prior_is_given_once(asperity, tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(READINGS, encoding="utf-8")
+    priors = ("--prior", "A=0.01+-0.1", "--prior", "A=0.02+-0.1")
+    shown = asperity("fit", tmp_path / "t.csv", "--free", "A", *priors)
+    refused(shown, "--prior must be given once each, got 'A' twice")
+
+
+PLAN = 'law = "rice-ruina"\nmaterial = "bureau2000"\n'
+AXIS = '[parameters]\nV = "1 um/s"\nfrequency = "120 Hz"\n[axes.epsilon]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (f"seed = -1\n{PLAN}{AXIS}values = [0.1]", "asperity: seed must be at least 0"),
+        (f"rate = 1\n{PLAN}{AXIS}values = [0.1]", "asperity: rate must be a known field"),
+        (f"{PLAN}{AXIS}values = [0.1]\n[threshold]\nscan = 3", "threshold must be left out"),
+    ],
+)
+def test_a_plan_names_its_own_keys(asperity, tmp_path, text: str, sentence: str) -> None:
+    """Not the options that other commands have for fields of these names."""
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text, encoding="utf-8")
+    refused(asperity("sweep", plan, "--out", tmp_path / "s.zarr"), sentence)
+    assert list(tmp_path.iterdir()) == [plan]
+
+
+def test_a_material_names_its_own_keys(asperity, tmp_path) -> None:
+    file = tmp_path / "m.toml"
+    file.write_text("title = 'none'\n", encoding="utf-8")
+    refused(asperity("materials", file), "asperity: numbers must be given")
+
+
+def test_a_law_whose_file_ends_the_program(asperity, tmp_path) -> None:
+    file = tmp_path / "law.py"
+    file.write_text("raise SystemExit(0)\n", encoding="utf-8")
+    refused(asperity("response", "--law", f"{file}:Law"), "--law must be code that runs")
+
+
+def test_a_sample_without_a_name(asperity, tmp_path) -> None:
+    refused(asperity("samples", "--out", tmp_path / "a.csv"), "NAME must be given with --out")
+
+
+@pytest.mark.parametrize(
+    ("axis", "sentence"),
+    [
+        ("epsilon=0:1:3", "asperity: --x must be at least 0 and below 1"),
+        ("epsilom=0:0.5:3", "asperity: --x must be a number of an operating point, got 'epsilom'"),
+        ("epsilon=0.1:0.5:99999999999", "asperity: --x must be a whole number"),
+        ("tilt=0:100:3 deg", "asperity: --x must be less than a right angle"),
+    ],
+)
+def test_an_axis_of_a_map_is_named_by_its_option(asperity, tmp_path, axis, sentence) -> None:
+    call = ("map", *OF[1:], "--law", "rice-ruina", "--out", tmp_path / "m.nc")
+    refused(asperity(*call, "--x", axis, "--y", "K=1:2:3 N/um"), sentence)
+
+
+def test_inertia_without_a_mass(asperity) -> None:
+    point = [part for pair in POINT.items() for part in pair]
+    call = (*OF, *point, "--set", "M=0 kg", "--inertia")
+    refused(asperity(*call), "--set M must be positive with inertia, got 0 kg", '--set "M=1.6 kg"')

@@ -187,7 +187,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
     ("arguments", "parts"),
     [
         (("--x", "K"), ["--x must be NAME=LOW:HIGH:COUNT UNIT, got 'K'"]),
-        (("--x", "K=1:2:5"), ["axis of K must carry a unit"]),
+        (("--x", "K=1:2:5"), ["--x must carry a unit"]),
         (("--x", "epsilon=0:0.4:5", "--log-x"), ["must start above zero to be logarithmic"]),
         (("--x", "K=0.1:0.3:5 N/um"), ["axes must be two numbers, got 'K' on both"]),
         (("--x", "V=1:10:5 um/s"), ["V must be given once"]),

@@ -9,13 +9,14 @@ import click
 
 from asperity.cli.options import option, output_options, point_options, switch
 from asperity.cli.report import Output, save_figure, say
-from asperity.errors import require
+from asperity.errors import InputError, require
 from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
     import xarray
 
     from asperity.questions.point import Point
+    from asperity.study.map import Axis
 
 _EPILOG = """\b
 Examples:
@@ -70,7 +71,7 @@ def map(
     from asperity.operating_point import offered_numbers
     from asperity.outputs import output_files, require_netcdf
     from asperity.outputs.tables import Section
-    from asperity.study.map import SHOWN, Axis, write_map
+    from asperity.study.map import SHOWN, write_map
 
     one_of(show, SHOWN, "--show")
     for name, text, example in (
@@ -83,7 +84,7 @@ def map(
     output.require_picture()
     output_files({"--out": out, "--plot": output.plot})
     require_netcdf(out, "--out", "map.nc")
-    along_x, along_y = Axis.parse(str(x), log_x, "--x"), Axis.parse(str(y), log_y, "--y")
+    along_x, along_y = _axis(str(x), log_x, "--x"), _axis(str(y), log_y, "--y")
     # A material's number gives way to an axis; one that was given for this map does not.
     numbers = {
         name: number
@@ -118,6 +119,16 @@ def map(
         f"{out} says why",
     )
     return 1 if failed else 0
+
+
+def _axis(text: str, log: bool, option: str) -> Axis:
+    """The axis of an option, which messages name."""
+    from asperity.study.map import Axis
+
+    try:
+        return Axis.parse(text, log, option)
+    except InputError as error:
+        raise error.about(option) from None
 
 
 def _record(dataset: xarray.Dataset, out: Path | None) -> dict[str, Any]:

@@ -262,6 +262,9 @@ def measure(
     require(table, options, "go with --out", "no table", "name it or leave them out")
     alone = not (amplitudes and no_modulation)
     require(alone, "--amplitudes", "go without --no-modulation", "both", one)
+    alone = not amplitudes or not (events or steps or holds)
+    rule = "go without --events, --steps and --holds"
+    require(alone, "--amplitudes", rule, "both", one)
     rows_of = _file_rows(recordings, source, question, conditions)
     output.require_picture(*recordings)
     if out is not None:

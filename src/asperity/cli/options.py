@@ -55,7 +55,27 @@ class Count(click.ParamType):
         return count
 
 
-class FieldOption(click.Option):
+class OnceOption(click.Option):
+    """An option with a value, which is given once: the last of several would win without a word."""
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        """Let the parser keep every value; a switch has none."""
+        if self.is_flag:
+            super().add_to_parser(parser, ctx)
+            return
+        parser.add_option(obj=self, opts=self.opts, dest=self.name, action="append", nargs=1)
+
+    def consume_value(self, ctx: click.Context, opts: Any) -> Any:
+        """The one value, and where it is from."""
+        values = opts.get(self.name)
+        if isinstance(values, list):
+            got, option = " and ".join(f"'{value}'" for value in values), self.opts[0]
+            require(len(values) == 1, option, "be given once", got, "leave one out")
+            opts = {**opts, self.name: values[0]}
+        return super().consume_value(ctx, opts)
+
+
+class FieldOption(OnceOption):
     """An option with the default and the choices of a field of a question, which its help shows.
 
     The record is imported for the help only; without the option the default of the record applies.
@@ -90,7 +110,8 @@ def option(names: str, metavar: str | None, about: str, kind: Any = None, **more
     **more
         As in `click.option`.
     """
-    return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
+    cls = click.Option if more.get("multiple") else OnceOption
+    return click.option(*names.split(), cls=cls, metavar=metavar, help=about, type=kind, **more)
 
 
 def switch(names: str, about: str) -> Decorator:
@@ -207,6 +228,7 @@ def law_option(
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
     return click.option(
         "--law",
+        cls=OnceOption,
         metavar="NAME",
         callback=lambda context, option, text: None if text is None else known_place(text),
         help=help_text,
@@ -250,6 +272,7 @@ def _option(parameter: Parameter) -> Decorator:
     return click.option(
         *parameter.options,
         parameter.argument,
+        cls=OnceOption,
         metavar="VALUE",
         help=f'{meaning}, like "{parameter.example}".',
     )

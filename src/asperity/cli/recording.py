@@ -25,12 +25,14 @@ def listed_times(text: str, option: str) -> list[str]:
         If the file cannot be read, or there is no part.
     """
     path = Path(text)
-    if not re.fullmatch(r"[-+.\d\s,:;eE\w]*", text) or path.is_file():
+    # Times begin with a digit, a sign, a point, or the colon of an open span.
+    if (text.strip() and not re.fullmatch(r"\s*[-+.:]*\d[-+.\s,:;\w]*", text)) or path.is_file():
         try:
             lines = path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError):
             rule = "be times or a file that can be read"
-            raise InputError(option, rule, f"'{text}'", "check the name") from None
+            advice = f"check the name, or write them like {option} 12.5,60"
+            raise InputError(option, rule, f"'{text}'", advice) from None
         # Two columns are a span.
         parts = [re.sub(r"[\s,;]+", ":", line.split("#")[0].strip()) for line in lines]
     else:
@@ -89,7 +91,11 @@ def source_options(command: Command) -> Command:
         from asperity.questions.recording import Source
 
         roles = {role: others.pop(o.lstrip("-")) for role, o in COLUMN_OPTIONS.items()}
-        roles |= dict(_name_value_pairs(columns, "--column"))
+        for role, name in _name_value_pairs(columns, "--column"):
+            once = roles.get(role) is None
+            got = f"'{roles.get(role)}' and '{name}'"
+            require(once, f"--column {role}", "be given once", got, "leave one out")
+            roles[role] = name
         source = Source(
             # Columns of files without headers are chosen by number, in the digits 0 to 9.
             columns={
@@ -108,12 +114,14 @@ def source_options(command: Command) -> Command:
 
 def _name_value_pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
     """Split ``NAME=VALUE`` texts at the last ``=``."""
-    pairs = []
+    pairs: list[tuple[str, str]] = []
     for text in texts:
         name, _, value = (part.strip() for part in text.rpartition("="))
         like = "velocity=speed" if option == "--column" else "Fn=N"
         given, advice = name and value, f"write it like {option} {like}"
         require(given, option, "be NAME=VALUE", f"'{text}'", advice)
+        got = f"'{dict(pairs).get(name)}' and '{value}'"
+        require(name not in dict(pairs), f"{option} {name}", "be given once", got, "leave one out")
         pairs.append((name, value))
     return pairs
 

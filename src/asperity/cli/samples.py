@@ -8,6 +8,7 @@ import click
 
 from asperity.cli.options import Count, option, output_options
 from asperity.cli.report import Output
+from asperity.errors import require
 
 _EPILOG = """\b
 Examples:
@@ -42,6 +43,7 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
     from asperity.units import format_si
 
     if name is None:
+        require(out is None, "NAME", "be given with --out", "nothing", "name a sample of the list")
         titles = {sample: known.protocol(sample).title for sample in known.names()}
         output.answer(lambda: titles, lambda: [Section("", rows=tuple(titles.items()))], indent="")
         return

@@ -71,7 +71,7 @@ def strongest_line(
         rule = "lie within what the recording resolves"
         got = f"{time.size} samples in {time[-1] - time[0]:.6g} s{where}"
         advice = "give another frequency or a longer window"
-        raise InputError("reference.frequency", rule, got, advice)
+        raise InputError("lock_in.frequency", rule, got, advice)
     return max(present, key=lambda line: line.amplitude)
 
 

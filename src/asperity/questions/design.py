@@ -46,6 +46,10 @@ class Range(Record):
 
     @model_validator(mode="after")
     def _one_form(self) -> Range:
+        of_range = self.model_fields_set - {"values"}
+        if self.values is not None and of_range:
+            got = f"values and {', '.join(sorted(name.rstrip('_') for name in of_range))}"
+            raise InputError("", "have values, or from and to", got, "leave one out")
         if self.values is None and (self.from_ is None or self.to is None):
             raise InputError("", "have from and to", "only one end", "give both")
         if self.values is not None and not self.values:

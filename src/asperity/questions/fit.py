@@ -86,6 +86,9 @@ def _priors(value: Any) -> Any:
         rule = "be materials or priors by name"
         raise InputError("", rule, shown(value), "write it like {K = '0.2+-0.01 N/um'}")
     parts = [text.partition("=") for text in texts]
+    names = [name.strip() for name, *_ in parts]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    require(twice is None, "", "be given once each", f"'{twice}' twice", "leave one out")
     return {name.strip(): prior.strip() if equals else None for name, equals, prior in parts}
 
 

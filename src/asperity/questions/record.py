@@ -22,7 +22,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from asperity.errors import InputError, MistakesError, closest, require
+from asperity.errors import InputError, Key, MistakesError, closest, require
 from asperity.parameters.arguments import number, rising, shown as shown_value
 from asperity.parameters.toml_file import toml_content
 from asperity.units import KINDS
@@ -114,7 +114,8 @@ class Question(Record):
             try:
                 return cls(**content)
             except MistakesError as error:
-                raise cls.mistakes_error(error.errors, source) from None
+                mistakes = [mistake.about(Key(*mistake.field)) for mistake in error.errors]
+                raise cls.mistakes_error(mistakes, source) from None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A question with some fields replaced, checked as any other."""

@@ -190,6 +190,10 @@ class Sweep(Point):
             rule = f"be {'given' if wanted else 'left out'} where solve is '{self.solve}'"
             advice = f"add the table [{name}]" if wanted else f"write solve = '{name}' or remove it"
             require(wanted == given, name, rule, "a table" if given else "nothing", advice)
+        rule = f"be left out where solve is '{self.solve}'"
+        advice = "write solve = 'threshold' or remove it"
+        needless = self.solve != "threshold" and self.threshold != ThresholdTable()
+        require(not needless, "threshold", rule, "a table", advice)
         return self
 
     @property

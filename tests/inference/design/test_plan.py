@@ -85,6 +85,8 @@ def test_time_is_spent_on_settling_and_reading():
         ({"ranges__A": [0.01]}, "drive or the machine, got 'A'"),
         ({"ranges__epsilon": {"from": 0.4, "to": 0.1}}, "to must be above from"),
         ({"ranges__epsilon": {"from": 0.1}}, "must have from and to"),
+        ({"ranges__epsilon": {"values": [0.1], "levels": 3}}, "must have values, or from and to"),
+        ({"ranges__epsilon": {"values": [0.1], "from": 0.1, "to": 0.2}}, "got values and from, to"),
         ({"ranges__epsilon": {"from": 0, "to": 0.1, "spacing": "log"}}, "must be positive"),
         (
             {"ranges__epsilon": {"from": 0.1, "to": 0.4, "levels": 1}},

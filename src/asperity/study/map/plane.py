@@ -64,7 +64,9 @@ class Axis:
         object.__setattr__(self, "name", parameter.name)
         for end in ("low", "high"):
             value = getattr(self, end)
-            si = number(value, f"axis of {self.name}", parameter.kind, parameter.rule)
+            label = f"axis of {self.name}"
+            # An angle is also a text in degrees.
+            si = number(parameter.check(value, label), label, parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
         if not self._ends[0] < self._ends[1]:
             rule = "go from a smaller to a larger value"
@@ -127,10 +129,8 @@ def _parameter(name: str) -> Parameter:
     known = {n: p for n, p in known_parameters().items() if p.rule != "switch"}
     name_in_table = canonical_name(str(name), known)
     if name_in_table is None:
-        raise InputError(
-            f"axis must be a number of an operating point, got {shown(name)}; "
-            + suggestion(str(name), known)
-        )
+        rule = "be a number of an operating point"
+        raise InputError("axis", rule, shown(name), suggestion(str(name), known))
     return known[name_in_table]
 
 
