@@ -110,7 +110,7 @@ def test_stick_slip_ends_where_steady_sliding_becomes_stable():
     assert np.all(np.diff(mine.drop[:4]) < 0)
     assert mine.drop[3] > 0.01
     assert np.isnan(mine.drop[4])
-    assert "steadily" in mine.result[4]
+    assert "steady sliding" in mine.result[4]
 
 
 def test_without_inertia_a_slip_runs_away():

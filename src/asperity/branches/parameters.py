@@ -91,7 +91,7 @@ def continued_name(law: type[Law], name: str) -> str:
         If neither the law nor the experiment has a parameter of that name.
     """
     rule = "be one that continuation can change"
-    advice = "give it as modulation=asperity.loads.modulation(...) and continue in another one"
+    advice = "give it as modulation=asperity.loads.modulated(...) and continue in another one"
     require(name not in MODULATION, "parameter", rule, f"'{name}'", advice)
     known = {n: p for n, p in point_parameters(law).items() if p.path}
     return known_name(name, known)

@@ -350,7 +350,7 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
             rise = objective.chi2(point) - at.chi2
             if rise > _HIGHEST_RISE:
                 # A valley that bends may still have the right width.
-                rise = _gauss_newton_step(objective, point, i) - at.chi2
+                rise = _chi2_after_step(objective, point, i) - at.chi2
             if not _LOWEST_RISE <= rise <= _HIGHEST_RISE:
                 result.append(unknown.name)
                 break
@@ -389,7 +389,7 @@ def _differs(value: float, other: float) -> bool:
     return abs(value - other) > (1 - math.exp(-UNDETERMINED)) * max(abs(value), abs(other))
 
 
-def _gauss_newton_step(objective: Objective, u: Float, i: int) -> float:
+def _chi2_after_step(objective: Objective, u: Float, i: int) -> float:
     """Chi-squared after a Gauss-Newton step from u that keeps coordinate i."""
     r, J = objective.residuals(u)
     if not np.isfinite(r).all():
