@@ -65,7 +65,7 @@ def periodic_response(
         Modulation frequency (Hz), positive; not rad/s.
     modulation : Modulation, optional
         In place of `epsilon`: any periodic load, shear force and pulling velocity, from
-        `asperity.loads.modulation` or `asperity.loads.sampled`.
+        `asperity.loads.modulated` or `asperity.loads.sampled`.
     inertia : bool
         Whether the mass of the slider counts.
     radiation_damping : array or str, optional

@@ -68,7 +68,7 @@ MACHINE = _parameters("machine")
 #: Pulling velocity and modulation.
 DRIVE = _parameters("drive")
 
-#: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulation`.
+#: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulated`.
 #: Angles are in rad. Continuation and fits have a harmonic load and take none of them.
 MODULATION = _parameters(
     "modulation", kind="dimensionless", rule="finite", place="drive", default=0.0
