@@ -118,6 +118,11 @@ def read_data(
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
             rule = "go with one recording"
             raise InputError(name, rule, recordings, "cut the recordings beforehand")
+    # Readings in a table are final: nothing would apply a gauge or a trend to them.
+    for name in () if recordings else ("trend", "drift", "initial", "gauge", "fit_rate"):
+        value = getattr(question, name)
+        same = value == type(question).model_fields[name].default
+        require(same, name, "go with a recording", f"{value} with a table", "leave it out")
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }

@@ -365,6 +365,24 @@ def test_materials_and_priors_go_by_their_names(tmp_path, pmma) -> None:
     assert abs(own.values["D0"] - 0.5e-6) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("trend", "none"),
+        ("drift", True),
+        ("initial", "free"),
+        ("gauge", "40 Hz"),
+        ("fit_rate", "10 Hz"),
+    ],
+)
+def test_what_is_of_recordings_alone_is_refused_of_a_table(tmp_path, name, value) -> None:
+    file = tmp_path / "readings.csv"
+    file.write_text(READINGS)
+    question = Fit(data=({"file": file},), material="bureau2000", **{name: value})
+    with pytest.raises(InputError, match=f"{name} must go with a recording, got .* with a table"):
+        answer_fit(question)
+
+
 def test_a_window_of_a_table_is_refused(tmp_path) -> None:
     file = tmp_path / "readings.csv"
     file.write_text(READINGS)
