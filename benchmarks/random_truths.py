@@ -1,7 +1,7 @@
 """Fits to tables of random truths: minima missed, and coverage of the intervals.
 
     python -m benchmarks.random_truths [--law elasto-plastic] [--tables 40] [--seed 0] [--slow]
-        [--out FILE]
+        [--compare] [--out FILE]
 
 Each table has 25 to 60 rows at two to four velocities of 0.1 to 100 um/s and one to three
 frequencies of 1 Hz to 1 kHz, with mu0, A, B, D0, eps_ratio (and lambda or alpha) drawn over a
@@ -9,6 +9,7 @@ decade or two, 1 % noise in either part of the harmonics and 0.3 % in the mean; 
 is without phases. All of them are free. A minimum is missed if one begun at the truth is lower by
 0.01. With --slow, each row has a velocity of 0.3 to 10 um/s and a frequency of 0.1 to 10 Hz of its
 own, amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as stable sliding needs.
+With --compare, each table is compared with three laws, and the verdict on the true one is counted.
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ import time
 
 import numpy as np
 
-from asperity.inference import fit, table_of
+from asperity.inference import compare, fit, table_of
 from asperity.laws import get_law
 from asperity.orbit import Outcome, response_function
 
 #: Rows that are computed together, so that all tables share one compiled program.
 ROWS = 64
+
+#: Parameters that are free in a comparison, of each law those that it has.
+FREE = ("mu0", "A", "B", "D0", "eps_ratio", "alpha", "lambda")
 
 
 def log_uniform(rng, low, high, size=None):
@@ -124,6 +128,28 @@ def fitted(seed, law, response, drawn=fast_point):
     }
 
 
+def compared(seed, law, response, drawn=fast_point):
+    """The verdict of a comparison of three laws on the true one."""
+    truth, fixed, table = drawn_table(seed, law, response, drawn)
+    laws = ["rice-ruina", "linker-dieterich", "elasto-plastic"]
+    began, wall = time.process_time(), time.perf_counter()
+    result = compare(table, laws, list(FREE), fixed=fixed, evidence=False)
+    seconds, waited = time.process_time() - began, time.perf_counter() - wall
+    true = result.laws[law]
+    objective = true.fit.objective
+    return {
+        "seed": seed,
+        "left_out": list(result.left_out),
+        "excluded": true.excluded,
+        "p_value": true.fit.p_value,
+        "missed_by": true.fit.chi2 - objective.minimise(objective.coordinates(truth))[1],
+        "chi2": {name: judged.fit.chi2 for name, judged in result.laws.items()},
+        "verdict": result.verdict,
+        "seconds": seconds,
+        "wall": waited,
+    }
+
+
 def main():
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.random_truths", description=__doc__.splitlines()[0]
@@ -132,13 +158,15 @@ def main():
     parser.add_argument("--tables", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0, help="of the first table")
     parser.add_argument("--slow", action="store_true", help="modulation of 0.1 to 10 Hz")
+    parser.add_argument("--compare", action="store_true", help="compare three laws")
     parser.add_argument("--out", help="file for a line of JSON for each table")
     chosen = parser.parse_args()
     response = response_function(get_law(chosen.law), search="direct" if chosen.slow else False)
     drawn = slow_point if chosen.slow else fast_point
     rows = []
     for seed in range(chosen.seed, chosen.seed + chosen.tables):
-        rows.append(fitted(seed, chosen.law, response, drawn))
+        each = compared if chosen.compare else fitted
+        rows.append(each(seed, chosen.law, response, drawn))
         if chosen.out:
             with open(chosen.out, "a", encoding="utf-8") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
@@ -147,8 +175,12 @@ def main():
     unlikely = sum(row["p_value"] < 0.05 for row in rows)
     print(f"{chosen.law}: {len(rows)} tables, {missed} minima missed, {unlikely} with p < 0.05")
     print(
-        f"processor time: {np.median(seconds):.2f} s a fit (median), {seconds.max():.1f} s at most"
+        f"processor time: {np.median(seconds):.2f} s each (median), {seconds.max():.1f} s at most"
     )
+    if chosen.compare:
+        excluded, left = (sum(map(bool, (r[n] for r in rows))) for n in ("excluded", "left_out"))
+        print(f"true law excluded: {excluded}; rows left out of tables without outliers: {left}")
+        return
     print("| parameter | 68.3 % | 95 % |\n|---|---|---|")
     for name in rows[0]["inside"]:
         share = 100 * np.mean([row["inside"][name] for row in rows], axis=0)

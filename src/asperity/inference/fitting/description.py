@@ -24,7 +24,7 @@ from asperity.inference.fitting.intervals import (
 )
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
-from asperity.inference.objective import Objective, Residuals, log_density
+from asperity.inference.objective import Minimum, Objective, Residuals, log_density
 from asperity.inference.tables.residuals import outlying_rows
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
@@ -99,6 +99,10 @@ def described_fit(
             "rows of the slowest modulation and compare"
         )
         return replace(result, warnings=(lost, *result.warnings))
+    outliers, lower = _outliers(objective, at)
+    if lower is not None:
+        again = [lower, *minima]
+        return described_fit(objective, again, profile=profile, described=described)
     # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
@@ -153,7 +157,7 @@ def described_fit(
                 f"likelihood ({Argument('profile')}) take minutes for a recording"
             )
         )
-    return _with_warnings(_fit_with(objective, at, estimates, rivals), warnings)
+    return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
 
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
@@ -445,8 +449,8 @@ def _widened_by_minima(
     return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
 
-def _with_warnings(fit: Fit, warnings: list[str]) -> Fit:
-    """The fit with its warnings, added to those in `warnings`."""
+def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> Fit:
+    """The fit with its outliers and warnings, added to those in `warnings`."""
     if fit.dof > 0 and fit.p_value < MISFIT:
         sums = fit.observables.items()
         worst, _ = max(sums, key=lambda pair: (pair[1][0] - pair[1][1]) / math.sqrt(2 * pair[1][1]))
@@ -473,7 +477,6 @@ def _with_warnings(fit: Fit, warnings: list[str]) -> Fit:
     u = fit.objective.coordinates(fit.values)
     slopes = [r.jacobian for r in fit.residuals] + [fit.objective.prior_residuals(u)[1]]
     information = np.sum([J.T @ J for J in slopes], axis=0)
-    outliers = _outliers(fit)
     for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         warnings += term.warnings(residuals, information, outliers)
     because = {name: _why_undetermined(fit, name) for name in fit.undetermined}
@@ -495,19 +498,22 @@ def _with_warnings(fit: Fit, warnings: list[str]) -> Fit:
     return replace(fit, warnings=tuple(warnings), because=because, outliers=outliers)
 
 
-def _outliers(fit: Fit) -> tuple[int, ...]:
-    """Outliers: rows without which the law describes the table.
+def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Minimum | None]:
+    """Outliers of a table, and a lower minimum to which the fit without them leads.
 
-    In a fit together with recordings, which takes minutes, predictions are linearised.
+    Outliers are rows without which the law describes the table. A row that is steep in the
+    parameters makes several minima, of which the search may miss the lowest: the fit without that
+    row has one minimum, from which that of all rows is reached. In a fit together with recordings,
+    which takes minutes, predictions are linearised.
     """
-    objective = fit.objective
-    tables = fit.parts(LockInTerm)
+    tables = [i for i, term in enumerate(objective.terms) if isinstance(term, LockInTerm)]
     if not tables:
-        return ()
-    ((term, residuals),) = tables
+        return (), None
     if len(objective.terms) > 1:
-        return tuple(outlying_rows(residuals))
-    u = objective.coordinates(fit.values)
+        data = objective.data_residuals(at.u)
+        return tuple(outlying_rows(data[tables[0]])) if data else (), None
+    (term,) = objective.terms_of(LockInTerm)
+    u = at.u
 
     def whole(u: Float) -> Residuals | None:
         data = objective.data_residuals(u)
@@ -527,7 +533,11 @@ def _outliers(fit: Fit) -> tuple[int, ...]:
         return whole(u)
 
     now = whole(u)
-    return () if now is None else tuple(outlying_rows(now, refit))
+    outliers = () if now is None else tuple(outlying_rows(now, refit))
+    if u is at.u or not (outliers or at.p_value >= FAR_OFF):
+        return outliers, None
+    end = objective.minimise(u)
+    return outliers, end if end.chi2 < at.chi2 - _LOWER else None
 
 
 def _why_undetermined(fit: Fit, name: str) -> str:

@@ -177,21 +177,28 @@ def _by_few_rows(
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
-    ends = _minimised_from(
-        coarse, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
-    )
-    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED]]
-    ends = _minimised_from(
-        coarse, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
-    )
-    minima = _on_all_rows(objective, ends)
+    minima = _on_all_rows(objective, _roughly_minimised(coarse, starts, progress))
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
-    if not minima:
-        # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search
-        # reaches.
-        again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
-    return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
+    if minima:
+        return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
+    # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
+    again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
+    ends = _roughly_minimised(objective, again, None)
+    return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
+
+
+def _roughly_minimised(
+    objective: Objective, starts: Sequence[Float], progress: Callable[[int, int], None] | None
+) -> list[Minimum]:
+    """Minima to a coarse tolerance, best first: few evaluations choose those that are continued."""
+    ends = _minimised_from(
+        objective, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
+    )
+    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED]]
+    return _minimised_from(
+        objective, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
+    )
 
 
 def _coarse(objective: Objective) -> Objective | None:
@@ -208,10 +215,12 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
         if minima and end.chi2 > ends[0].chi2 + _CONTINUED:
             break
         near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
-        tolerance = _COARSE_TOLERANCE if _far_off(coarser, near) else None
-        if not math.isfinite(objective.chi2(near.u)):
-            # Transients do not reach orbits that are hardly stable; continuation does.
+        far_off = _far_off(coarser, near)
+        if not far_off and not math.isfinite(objective.chi2(near.u)):
+            # Transients do not reach orbits that are hardly stable; continuation does, in up to
+            # seconds a row.
             objective.search_wholly(near.u)
+        tolerance = _COARSE_TOLERANCE if far_off else None
         minima.append(objective.minimise(near.u, tolerance=tolerance))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
