@@ -167,7 +167,8 @@ def test_no_exponent_where_the_change_of_variables_is_singular(law):
     points = {"velocity": 1e-6, "epsilon": np.linspace(0.39, 0.48, 91), "frequency": 120.0}
     response = periodic_response(slider, **points)
     on_mesh = periodic_response(slider, **points, methods=("collocation",))
-    assert response.converged.all() and on_mesh.converged.all()
+    assert response.converged.all()
+    assert on_mesh.converged.all()
     np.testing.assert_allclose(response.floquet_max, on_mesh.floquet_max, rtol=1e-8)
 
 

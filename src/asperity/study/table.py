@@ -2,10 +2,10 @@
 
 Input columns are SI numbers, or have their unit in the heading, as ``V (um/s)``. They are named
 ``law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon, frequency``, and as the further
-parameters of registered laws. The output has the input columns, decimal commas written as
-points, followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives the reason;
-the other rows are solved. Rows are read, solved and written in chunks, so that memory does not grow
-with the table.
+parameters of registered laws. The output has the input columns, decimal commas written as points,
+followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives
+the reason; the other rows are solved. Rows are read, solved and written in chunks, so that memory
+does not grow with the table.
 """
 
 from __future__ import annotations
