@@ -347,6 +347,15 @@ class Drawn:
         Path(path).write_bytes(b"draws")
 
 
+def test_a_table_of_a_spreadsheet_is_shown_without_its_row_of_units(measured_here):
+    lines = "Tag;V;epsilon;mu1;", ";µm/s;%;-;", "1.2.;1,5;24;0,002;", "2.2.;2;24;0,0021;"
+    table = measured_here("\r\n".join(lines).encode("cp1252"), "t.csv")[-1]["result"]["table"]
+    assert table["header"] == ["Tag", "V (µm/s)", "epsilon (%)", "mu1", ""]
+    assert table["rows"] == [["1.2.", "1.5", "24", "0.002", ""], ["2.2.", "2", "24", "0.0021", ""]]
+    assert table["count"] == 2
+    assert table["text"] == "\r\n".join(lines)
+
+
 def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, monkeypatch):
     """Hardly modulated, the mean friction is mu0 + (A - B) ln(V/V0)."""
     table = measured_here(TABLE.encode(), "readings.csv")[-1]["result"]["table"]

@@ -174,10 +174,8 @@ def test_a_bad_table(asperity, tmp_path: Path, text: str, parts: list[str]) -> N
 
 def test_a_table_that_is_no_text(asperity, tmp_path: Path) -> None:
     table = tmp_path / "in.csv"
-    table.write_bytes(f"{HEADER},Reibflächen\n{ROW},1\n".encode("latin-1"))
-    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "not UTF-8 text")
-    table.write_bytes(f"{HEADER}\n{ROW}\n".encode("utf-16"))
-    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "UTF-8")
+    table.write_bytes(f"{HEADER}\n{ROW}\n".encode("utf-16-le"))
+    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "it is no text")
     assert list(tmp_path.iterdir()) == [table]
 
 

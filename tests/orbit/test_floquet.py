@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from asperity import Slider, periodic_response
-from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.laws import ElastoPlastic, RiceRuina, RuinaSlip
 from asperity.orbit.floquet import (
     LARGEST_LOG,
     from_logs,
@@ -157,6 +157,19 @@ def test_liouville(law, elastic, V, epsilon, frequency):
     )
     expected = trace_integral(response, V, epsilon, frequency, elastic)
     assert response.log_multipliers.real.sum() == pytest.approx(expected, rel=LIOUVILLE)
+
+
+@pytest.mark.parametrize("law", [RiceRuina, RuinaSlip])
+def test_no_exponent_where_the_change_of_variables_is_singular(law):
+    # A stiff spring, on which the force decays within a radian. Averaging reaches an exponent of
+    # another system here, for some amplitudes an unstable one.
+    slider = Slider(law(**BASE), spring=2e7, load=W0)
+    points = {"velocity": 1e-6, "epsilon": np.linspace(0.39, 0.48, 91), "frequency": 120.0}
+    response = periodic_response(slider, **points)
+    on_mesh = periodic_response(slider, **points, methods=("collocation",))
+    assert response.converged.all()
+    assert on_mesh.converged.all()
+    np.testing.assert_allclose(response.floquet_max, on_mesh.floquet_max, rtol=1e-8)
 
 
 @pytest.mark.parametrize("method", ["fourier", "collocation"])

@@ -29,6 +29,7 @@ from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
 from asperity.parameters.arguments import FilePath, typed
+from asperity.parameters.columns import marked_encoding
 from asperity.questions import fit as questions
 from asperity.questions.recording import Measurement as Measured
 from asperity.recording import Trace
@@ -82,7 +83,9 @@ def is_table(data: questions.Data) -> bool:
 def _heading(path: Path) -> list[str] | None:
     """Words of the first line that is no comment; None if the file cannot be opened."""
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
+        with path.open("rb") as mark:
+            encoding = marked_encoding(mark.read(2))
+        with path.open(encoding=encoding, errors="replace") as file:
             for line in file:
                 if line.strip() and not line.lstrip().startswith("#"):
                     return re.split(r"[,;\t\s]+", line.strip())

@@ -101,6 +101,10 @@ def _turned_back(logs: Any) -> Any:
 
 #: Estimated error of L, and size of what still varies where its periodic factor is wanted.
 _EXPONENT_ERROR, _FACTOR_ERROR = 1e-10, 1e-9
+#: Largest difference between the trace of 2 pi L and Liouville's formula. Of 20,651 orbits at
+#: numbers over decades 117 differ by more than 1e-7, half of them by more than 0.01; the larger
+#: multiplier of the others has a relative error of half of that difference.
+_LIOUVILLE = 1e-9
 _MOST_STEPS = 40
 
 
@@ -143,6 +147,9 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
     and R varies less than J by a factor of the size of L and q. A step does this with the R of the
     last one; P is the product of all 1 + q. By averaging, the error of L is the square of what
     still varies.
+
+    Where 1 + q is singular at some phase there is no such change of variables, and an L to which
+    the steps converge may be any. Its trace, which the steps keep otherwise, tells.
     """
     n = range(len(J))
     accepted = _FACTOR_ERROR if factor else _EXPONENT_ERROR
@@ -170,7 +177,9 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
     start = (J, _means(J), identity, none + 1.0, none + 1.0, 0)
     _, L, P, _, error, _ = jax.lax.while_loop(unfinished, step, start)
     stacked = 2 * jnp.pi * jnp.stack([jnp.stack(row) for row in L])
-    return FloquetForm(stacked, P, error <= accepted)
+    kept = 2 * jnp.pi * sum(row[i] for i, row in enumerate(_means(J)))
+    valid = jnp.abs(jnp.trace(stacked) - kept) <= _LIOUVILLE
+    return FloquetForm(stacked, P, (error <= accepted) & valid)
 
 
 @jax.custom_jvp

@@ -1,20 +1,34 @@
-"""Tables of a laboratory: a CSV whose headings carry units, as ``K (N/m)`` or ``V [um/s]``."""
+"""Tables of a laboratory: a CSV whose headings carry units, as ``K (N/m)`` or ``V [um/s]``.
+
+As spreadsheets of any language save it: commas, semicolons or tabs between cells, decimal points or
+commas, UTF-8, UTF-16 or the Windows code page 1252, and units in the headings or in a row below.
+"""
 
 from __future__ import annotations
 
+import codecs
 import csv
+import io
 import itertools
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from asperity.errors import Argument, InputError, require
 from asperity.parameters.toml_file import file_content
 
 _DELIMITERS = (",", ";", "\t")
+#: Bytes that are decoded at a time.
+_BLOCK = 1 << 20
 #: A name and its unit.
 _HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+_WITH_COMMA = re.compile(r"\s*[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?\s*")
+_WITH_POINT = re.compile(r"\s*[+-]?(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?\s*")
+#: Units of pure numbers.
+_NO_UNIT = ("", "-", "\u2013")
 
 
 def read_headed_columns(
@@ -30,7 +44,7 @@ def read_headed_columns(
     Parameters
     ----------
     path : Path
-        As in `csv_rows`.
+        As of `sheet`.
     numbers, texts : collection of str
         Columns that are read; others are left out.
     label : str
@@ -49,13 +63,14 @@ def read_headed_columns(
         If the file cannot be read, has no rows, a column twice, or a cell that is no number.
     """
     with readable(path, label):
-        _, rows = csv_rows(file_content(path).decode("utf-8-sig").splitlines(keepends=True))
-        heading, *cells = [[cell.strip() for cell in cells] for cells in rows] or [[]]
+        content = file_content(path)
+    table = sheet(path, set(numbers).__contains__, label=label, content=content)
+    cells = [[cell.strip() for cell in row] for row in table.rows()]
     rule = f"have a heading and {row} a row"
     require(cells, path.name, rule, "no rows", "add them")
     columns: dict[str, list[float | str]] = {}
     for name, (place, unit) in headings(
-        heading, path.name, {*numbers, *texts}.__contains__
+        table.heading, path.name, {*numbers, *texts}.__contains__
     ).items():
         column = [row[place] if place < len(row) else "" for row in cells]
         columns[name] = [
@@ -65,20 +80,179 @@ def read_headed_columns(
     return columns
 
 
-def csv_rows(lines: Iterable[str]) -> tuple[str, Iterator[list[str]]]:
-    """Delimiter and rows of a CSV, the heading first.
+@dataclass(frozen=True)
+class Sheet:
+    """A CSV, and how it is written.
 
-    Blank lines and lines that begin with ``#`` are skipped. The delimiter is the one of ``,``,
-    ``;`` and tab that gives the heading the most cells. A missing quotation mark, which would merge
-    the rows after it into one cell, is a `csv.Error`.
+    Attributes
+    ----------
+    path : Path
+    source : Path or bytes
+        Where its text is from: the file, or its content.
+    label : str
+        What messages call the argument.
+    encoding : str
+    delimiter : str
+    decimal_comma : bool
+        Whether numbers have decimal commas; `rows` have points in their place.
+    heading : list of str
+        Cells of the heading, with the units of a row of units in them.
+    units_below : bool
+        Whether there is a row of units, which `rows` leave out.
     """
-    lines = iter(lines)
+
+    path: Path
+    source: Path | bytes
+    label: str
+    encoding: str
+    delimiter: str
+    decimal_comma: bool
+    heading: list[str]
+    units_below: bool
+
+    def rows(self) -> Iterator[list[str]]:
+        """Rows below the heading, without blank lines and lines that begin with ``#``.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or a quotation mark is missing, which would merge the rows
+            after it into one cell.
+        """
+        with readable(self.path, self.label):
+            rows = _rows(self.source, self.encoding, self.delimiter)
+            for row in itertools.islice(rows, 1 + self.units_below, None):
+                yield [_with_point(cell) for cell in row] if self.decimal_comma else row
+
+
+def sheet(
+    path: Path,
+    is_number: Callable[[str], object],
+    *,
+    label: str = "data",
+    content: bytes | None = None,
+) -> Sheet:
+    """Find out how a CSV is written, from all of it.
+
+    The delimiter is the one of ``,``, ``;`` and tab that gives the heading the most cells. Numbers
+    have decimal commas where a cell is such a number and none has a decimal point: ``1,234`` next
+    to ``0.5`` may be a thousand, and is no number then. The row below the heading has units if
+    there is no number in its columns of numbers, but a text in one of them.
+
+    Parameters
+    ----------
+    path : Path
+    is_number : callable
+        Whether a column of this name has numbers.
+    label : str
+        What messages call the argument.
+    content : bytes, optional
+        The file, where it was read as a whole.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    source = path if content is None else content
+    with readable(path, label):
+        encoding = _encoding(source)
+        delimiter = _delimiter(source, encoding)
+        rows = _rows(source, encoding, delimiter)
+        heading, first = next(rows, []), next(rows, [])
+        commas = False
+        if delimiter != ",":
+            for cell in itertools.chain(first, itertools.chain.from_iterable(rows)):
+                if "," in cell and _WITH_COMMA.fullmatch(cell):
+                    commas = True
+                elif "." in cell and _WITH_POINT.fullmatch(cell):
+                    commas = False
+                    break
+    units = _units_below(heading, first, is_number)
+    if units:
+        heading = [
+            f"{name} ({units[place]})" if units.get(place) else name
+            for place, name in enumerate(heading)
+        ]
+    return Sheet(path, source, label, encoding, delimiter, commas, heading, bool(units))
+
+
+def _opened(source: Path | bytes) -> BinaryIO:
+    return io.BytesIO(source) if isinstance(source, bytes) else source.open("rb")
+
+
+def marked_encoding(beginning: bytes) -> str:
+    """UTF-16 where a text begins with its mark, else UTF-8, whose mark may stand in front."""
+    marks = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
+    return "utf-16" if beginning.startswith(marks) else "utf-8-sig"
+
+
+def _encoding(source: Path | bytes) -> str:
+    """Encoding of a text: UTF-8, UTF-16 by its mark, or else the Windows code page 1252."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with _opened(source) as file:
+        block = file.read(_BLOCK)
+        if (encoding := marked_encoding(block)) == "utf-16":
+            return encoding
+        if b"\0" in block:
+            raise UnicodeError
+        try:
+            while block:
+                decoder.decode(block)
+                block = file.read(_BLOCK)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return "cp1252"
+    return encoding
+
+
+def _delimiter(source: Path | bytes, encoding: str) -> str:
+    lines = _lines(source, encoding)
     heading = next((x for x in lines if x.strip() and not x.lstrip().startswith("#")), "")
-    delimiter = max(_DELIMITERS, key=lambda d: len(next(csv.reader([heading], delimiter=d), [])))
-    rows = csv.reader(itertools.chain([heading], lines), delimiter=delimiter, strict=True)
-    return delimiter, (
-        row for row in rows if row and row != [""] and not row[0].lstrip().startswith("#")
-    )
+    return max(_DELIMITERS, key=lambda d: len(next(csv.reader([heading], delimiter=d), [])))
+
+
+def _rows(source: Path | bytes, encoding: str, delimiter: str) -> Iterator[list[str]]:
+    """The heading and the rows, without blank lines and comments."""
+    for row in csv.reader(_lines(source, encoding), delimiter=delimiter, strict=True):
+        if row and row != [""] and not row[0].lstrip().startswith("#"):
+            yield row
+
+
+def _lines(source: Path | bytes, encoding: str) -> Iterator[str]:
+    with io.TextIOWrapper(_opened(source), encoding, newline="") as text:
+        yield from text
+
+
+def _with_point(cell: str) -> str:
+    return cell.replace(",", ".") if "," in cell and _WITH_COMMA.fullmatch(cell) else cell
+
+
+def _units_below(
+    heading: list[str], row: list[str], is_number: Callable[[str], object]
+) -> dict[int, str]:
+    """Units of the columns of numbers by their places; empty if the row is none of units."""
+    units = {}
+    for place, (name, cell) in enumerate(zip(heading, row, strict=False)):
+        match, unit = _HEADING.fullmatch(name), cell.strip()
+        if not match or not is_number(match[1]):
+            continue
+        if match[2] is not None or _is_number(unit):
+            return {}
+        units[place] = _unit(unit.strip("()[]"))
+    return units if any(units.values()) else {}
+
+
+def _unit(text: str) -> str:
+    return "" if text.strip() in _NO_UNIT else text
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(_with_point(cell))
+    except ValueError:
+        return False
+    return True
 
 
 def headings(
@@ -103,7 +277,7 @@ def headings(
     columns: dict[str, tuple[int, str]] = {}
     for place, cell in enumerate(cells):
         match = _HEADING.fullmatch(cell)
-        name, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
+        name, unit = (match[1], _unit(match[2] or "")) if match else (cell.strip(), "")
         if name and known(name):
             once, got = name not in columns, f"'{name}' twice"
             require(once, label, "have each column once", got, "remove or rename one of them")
@@ -116,8 +290,8 @@ def readable(path: Path, label: str, what: str = "CSV") -> Iterator[None]:
     """Raise an `InputError` about the argument `label` where a CSV, or `what`, cannot be read."""
     try:
         yield
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = (getattr(error, "strerror", None) or "").lower() or "not UTF-8 text"
+    except (OSError, UnicodeError, csv.Error) as error:
+        why = (getattr(error, "strerror", None) or "").lower() or "it is no text"
         if isinstance(error, csv.Error):
             why = f"{error}, check the quotation marks"
         rule, got = f"be a {what} that can be read", f"'{path}': {why}"

@@ -2,10 +2,10 @@
 
 Input columns are SI numbers, or have their unit in the heading, as ``V (um/s)``. They are named
 ``law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon, frequency``, and as the further
-parameters of registered laws. The output has the input columns unchanged, followed by
-`asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives the reason;
-the other rows are solved. Rows are read, solved and written in chunks, so that memory does not grow
-with the table.
+parameters of registered laws. The output has the input columns, decimal commas written as points,
+followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be solved ``result`` gives
+the reason; the other rows are solved. Rows are read, solved and written in chunks, so that memory
+does not grow with the table.
 """
 
 from __future__ import annotations
@@ -16,11 +16,9 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -32,7 +30,7 @@ from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
 from asperity.parameters.arguments import counted
-from asperity.parameters.columns import csv_rows, headings, readable
+from asperity.parameters.columns import headings, sheet
 from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
 
@@ -194,25 +192,25 @@ class TableSource:
 
     def __init__(self, path: Path, law: str | None, filled: Mapping[str, float]) -> None:
         self.path, self.law, self.filled = path, law or "", filled
-        with _opened(path) as stream:
-            self.delimiter, rows = csv_rows(stream)
-            self.header = next(rows, [])
-            rule, advice = "have a line of column names and rows", "give one operating point a row"
-            require(
-                any(name.strip() for name in self.header), str(path), rule, "an empty file", advice
-            )
-            self.columns, self.units = _checked_header(self.header, str(path))
-            laws: Counter[str] = Counter()
-            #: First text, and its row, of the columns in which no row so far has a number.
-            texts = {name: ("", 0) for name in self.columns if name != "law"}
-            for count, row in enumerate(rows, 1):
-                laws[self.law_of(row)] += 1
-                for name in tuple(texts):
-                    cell = "".join(row[self.columns[name] :][:1]).strip()
-                    if math.isfinite(_number(cell, known_parameters()[name])):
-                        del texts[name]
-                    elif cell and not texts[name][0]:
-                        texts[name] = cell, count
+        require_rereadable(path, "table")
+        parameters = known_parameters()
+        self._sheet = sheet(path, parameters.__contains__, label="table")
+        self.delimiter, self.header = self._sheet.delimiter, self._sheet.heading
+        rule, advice = "have a line of column names and rows", "give one operating point a row"
+        named = any(name.strip() for name in self.header)
+        require(named, str(path), rule, "an empty file", advice)
+        self.columns, self.units = _checked_header(self.header, str(path))
+        laws: Counter[str] = Counter()
+        #: First text, and its row, of the columns in which no row so far has a number.
+        texts = {name: ("", 0) for name in self.columns if name != "law"}
+        for count, row in enumerate(self._sheet.rows(), 1):
+            laws[self.law_of(row)] += 1
+            for name in tuple(texts):
+                cell = "".join(row[self.columns[name] :][:1]).strip()
+                if math.isfinite(_number(cell, parameters[name])):
+                    del texts[name]
+                elif cell and not texts[name][0]:
+                    texts[name] = cell, count
         self.rows = laws.total()
         rule = "have rows of data"
         require(self.rows, str(path), rule, "only column names", "give one operating point a row")
@@ -222,10 +220,9 @@ class TableSource:
 
     def blocks(self, size: int, skip: int = 0) -> Iterator[list[Row]]:
         """Rows of data in lists of at most `size`, without the first `skip`."""
-        with _opened(self.path) as stream:
-            rows = islice(csv_rows(stream)[1], 1 + skip, None)
-            while block := list(islice(rows, size)):
-                yield block
+        rows = islice(self._sheet.rows(), skip, None)
+        while block := list(islice(rows, size)):
+            yield block
 
     def law_of(self, row: Row) -> str:
         """Name of the law of a row, or "" if it has none."""
@@ -249,15 +246,6 @@ class TableSource:
             rule = "have the columns that its laws need"
             got = f"none for {', '.join(n for n in known_parameters() if n in missing)}"
             raise InputError(str(self.path), rule, got, "add them or name a material that has them")
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[TextIO]:
-    """The table as text; errors of reading are raised as `InputError`."""
-    require_rereadable(path, "table")
-    # utf-8-sig: spreadsheets put a byte-order mark in front.
-    with readable(path, "table"), path.open(encoding="utf-8-sig", newline="") as stream:
-        yield stream
 
 
 def _checked_header(header: Sequence[str], shown: str) -> tuple[dict[str, int], dict[str, float]]:

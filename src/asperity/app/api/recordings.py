@@ -5,7 +5,6 @@ Imports are late and few, because a new process reads each file.
 
 from __future__ import annotations
 
-import csv
 import json
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,6 +21,7 @@ from asperity.app.words import in_labels
 from asperity.errors import InputError, naming, printable
 from asperity.outputs.tables import Section
 from asperity.parameters import NAMES, OUTPUTS, Names, in_names
+from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
 from asperity.recording.extremes import thinned
@@ -214,27 +214,25 @@ def _table_in(path: Path, name: str) -> dict[str, Any] | None:
     """The text of a lock-in table; None for any other file."""
     if path.stat().st_size > LARGEST_TABLE:
         return None
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (UnicodeDecodeError, ValueError):
-        return None
-    if text.lstrip().startswith("{"):
+    content = path.read_bytes()
+    if content.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{"):
         try:
+            text = content.decode("utf-8-sig")
             mode = json.loads(text).get("mode")
         except (ValueError, RecursionError, AttributeError):
             return None
         return {"name": name, "text": text, "json": True} if mode == "modulated" else None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if len(lines) < 2:
+    try:
+        table = sheet(path, bool, content=content)
+        columns = headings(table.heading, name, {"epsilon", *OUTPUTS}.__contains__)
+        rows = list(table.rows())
+    except InputError:
         return None
-    delimiter = max((",", ";", "\t"), key=lines[0].count)
-    head = [cell.strip() for cell in lines[0].split(delimiter)]
-    if "epsilon" not in head or not set(OUTPUTS) & set(head):
+    if not rows or "epsilon" not in columns or len(columns) < 2:
         return None
-    rows = list(csv.reader(lines[1 : _MOST_LISTED + 1], delimiter=delimiter))
     return {
-        "name": name, "text": text, "json": False,
-        "header": head, "rows": rows, "count": len(lines) - 1,
+        "name": name, "text": content.decode(table.encoding), "json": False,
+        "header": table.heading, "rows": rows[:_MOST_LISTED], "count": len(rows),
     }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
-from asperity.parameters.columns import csv_rows, headings, readable
+from asperity.parameters.columns import headings, readable, sheet
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_radians, to_si
 
@@ -196,12 +196,13 @@ def read_table(
     shown = name or path.name
     require_rereadable(path, "data")
     with readable(path, "data", "file"):
-        text = file_content(path).decode("utf-8-sig")
+        content = file_content(path)
         if path.suffix.lower() == ".json":
+            text = content.decode("utf-8-sig")
             return table_of(_given(_reading(shown, text), given), name=shown)
-        _, lines = csv_rows(text.splitlines(keepends=True))
-        header, *cells = list(lines) or [[]]
-    texts, units = _columns(shown, header, cells)
+    csv = sheet(path, _has_numbers, content=content)
+    cells = list(csv.rows())
+    texts, units = _columns(shown, csv.heading, cells)
     blank = np.full(len(cells), "")
     kind, failed = texts.get(_KIND, blank), texts.get(_REASON, blank) != ""
     # A row of a campaign without modulation is a reading too.
@@ -254,6 +255,10 @@ def _is_read(name: str) -> bool:
     """Whether the reader knows a column; other columns are ignored."""
     said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
     return name in (*_TEXTS, *_OF_EPSILON) or (bool(said) and name not in _OF_RESPONSES)
+
+
+def _has_numbers(name: str) -> bool:
+    return _is_read(name) and name not in _TEXTS
 
 
 def _unit_in_si(shown: str, name: str, unit: str) -> float:
@@ -318,9 +323,10 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
         try:
             values[row] = float(cell or math.nan)
         except ValueError:
-            rule = f"have numbers in SI without unit in column {name}"
+            rule = f"have numbers without unit in column {name}"
             got = f"'{cell}' in row {row + 1}"
-            raise InputError(shown, rule, got, "write it with a decimal point") from None
+            advice = "write it with a decimal point, and the unit into the heading"
+            raise InputError(shown, rule, got, advice) from None
     return values
 
 
