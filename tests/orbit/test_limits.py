@@ -10,6 +10,7 @@ from asperity.loads import modulated
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.periodic import periodic_response
 from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import SearchOptions
 from asperity.slider.problem import checked_problem, flatten
 
 A, B, D0, W0, K, V0 = 0.013, 0.026, 4e-7, 7.0, 2e5, 1e-6
@@ -60,7 +61,7 @@ def test_no_method_is_given_a_point_outside():
     problem, _ = flatten(
         checked_problem(slider(), velocity=V, epsilon=epsilon, frequency=frequency)
     )
-    found = find_orbits(problem, len(V), harmonics=2, phases=0, progress=lambda _: None)
+    found = find_orbits(problem, SearchOptions(2))
     assert (found.method == "").all()
 
 

@@ -75,7 +75,7 @@ class Stub(Method):
 
 def search(*methods):
     problem = points(np.array([2.0, 3.0]) * KC, 40.0, 0.6)
-    return find_orbits(problem, 2, harmonics=1, phases=0, progress=lambda _: None, methods=methods)
+    return find_orbits(problem, OPTIONS, methods)
 
 
 def test_a_failed_method_keeps_the_earlier_outcome():

@@ -134,23 +134,6 @@ class Basis:
         return turned
 
 
-def solved(normal: Float, right: Float) -> Float:
-    """Solution of normal equations.
-
-    Parameters
-    ----------
-    normal : array, (p, p)
-        Symmetric, positive definite.
-    right : array, (p,) or (p, q)
-
-    Returns
-    -------
-    array
-        Array of the shape of `right`.
-    """
-    return inverted(normal) @ right
-
-
 def inverted(normal: Float) -> Float:
     """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it has none."""
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -41,10 +41,8 @@ from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, search_o
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import QuasiStatic, Slider
-from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.problem import checked_problem, flatten
-from asperity.slider.radiating import Radiating
+from asperity.slider import Slider
+from asperity.slider.problem import checked_problem, flatten, motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
 _FEWEST = 4
@@ -346,11 +344,8 @@ def response_function(
     if modulation is not None:
         modulation = checked_modulation(modulation)
     _require_rate_dependence(law_type)
-    motion: type = QuasiStatic
-    if inertia or radiation_damping:
-        elastic = law_type.elastic_length is not Law.elastic_length
-        kinds = (Inertial, StiffInertial) if inertia else (RadiatingAsperities, Radiating)
-        motion = kinds[0] if elastic else kinds[1]
+    elastic = law_type.elastic_length is not Law.elastic_length
+    motion = motion_type(inertia=inertia, damped=radiation_damping, elastic=elastic)
     coefficients = None if modulation is None else coefficients_of(modulation)
     equations = ParametrisedProblem(law_type, motion, radiation_damping, coefficients)
     defaults = {} if modulation is None or coefficients is None else load_values(modulation)

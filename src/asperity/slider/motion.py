@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.algebra.small_systems import jacobian_columns
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
@@ -69,7 +70,7 @@ class Motion(eqx.Module):
 
     @property
     def compliance_ratio(self) -> Array:
-        """L = lambda K / W0: stiffness of the spring over that of the asperities."""
+        """The ratio l = lambda K / W0: stiffness of the spring over that of the asperities."""
         return self.slider.law.elastic_length * self.slider.K / self.slider.W0
 
     @property
@@ -121,6 +122,13 @@ class Motion(eqx.Module):
     @abstractmethod
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
+
+    def steady_jacobian(self) -> Array:
+        """Derivatives [row, column] of the rates in steady sliding, shape (size, size, points)."""
+        steady = self.steady()
+        at = Excitation(jnp.ones(steady.shape[1:]))
+        _, columns = jacobian_columns(lambda Y: self.rates(Y, at), steady)
+        return jnp.stack(columns, axis=1)
 
     def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
         """Factors, shape as Y, that make the rates times them as linear in Y as possible.

@@ -18,7 +18,7 @@ from asperity.loads.programme.programme import BREAK
 from asperity.parameters.arguments import number
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
-from asperity.slider.named import equations_as_text, values_as_text
+from asperity.slider.named import equation_values, equations_as_text
 from asperity.transients.events import Event, Termination
 from asperity.transients.integration import Checkpoint, Integration
 from asperity.units import to_si
@@ -141,7 +141,7 @@ def provenance(integration: Integration) -> dict[str, Any]:
     """Version, law, parameters with units, programme, equations, tolerances and effort."""
     motion = integration.motion
     return {
-        **equations_as_text(motion, values_as_text(motion)),
+        **equations_as_text(motion, equation_values(motion)),
         "programme": repr(integration.programme),
         "method": " and ".join(sorted(integration.methods)),
         "relative_tolerance": integration.tolerances.rtol,

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -30,7 +30,7 @@ from asperity.orbit.methods.series import NODES, follows_steady_sliding, series_
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
-from asperity.orbit.solution import Solution
+from asperity.orbit.solution import SearchOptions
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
@@ -274,22 +274,17 @@ def search_orbits(
     points, index = len(wanted), np.flatnonzero(wanted)
     result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
 
-    def searched(rows: Indices, **options: Any) -> Solution:
-        counted = max(harmonics, 2)
-        return find_orbits(
-            take(problem, rows), len(rows), harmonics=counted, phases=0, progress=_idle, **options
-        )
-
     def keep(some: Indices, orbits: MeshOrbits) -> None:
         result.add(some, orbits)
         if known is not None:
             known.keep(problem, some, orbits.orbit)
 
+    part, options = take(problem, index), SearchOptions(max(harmonics, 2), intervals=MESHES[0])
     if not direct:
-        solution = searched(index, intervals=MESHES[0])
+        solution = find_orbits(part, options)
         solved = solution.converged
         result.outcome[index] = np.where(solved, int(Outcome.NOT_RESOLVED), solution.outcome)
-        numbers, part = solution.numbers[: 1 + harmonics], take(problem, index)
+        numbers = solution.numbers[: 1 + harmonics]
         rows = np.flatnonzero(solved)
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
@@ -303,8 +298,8 @@ def search_orbits(
         done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
         return index[~(done | ended[index])]
 
-    # No method at all still marks the points out of range.
-    result.outcome[index] = searched(index, methods=()).outcome
+    # A search without methods marks the points out of range.
+    result.outcome[index] = find_orbits(part, options._replace(intervals=0), methods=()).outcome
     meshes = () if coarse else MESHES
     motions = not coarse if motions is None else motions
 
@@ -342,10 +337,6 @@ def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
     with np.errstate(all="ignore"):
         mean, phasors = mean_and_harmonics(collocated(problem, orbit), orbit, harmonics)
     return np.concatenate([mean[None], phasors])
-
-
-def _idle(_: int) -> None:
-    """No report of progress."""
 
 
 # Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses

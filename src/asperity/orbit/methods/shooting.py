@@ -28,6 +28,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import jacobian_columns, solve_columns
 from asperity.loads import Excitation, Harmonic
@@ -480,9 +481,6 @@ def shot_waveform(
     By trigonometric interpolation in tau between the ends of `count` steps.
     """
     path = np.asarray(_path(problem, start, steps, count=count))
-    theta = even_phases(phases)
-    difference = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
-    k = np.arange(1, (count + 1) // 2)[:, None, None]
-    interpolate = (1 + 2 * np.cos(k * difference).sum(0)) / count
-    Y = start[:, None] + np.einsum("pk,knb->npb", interpolate, path)
-    return waveform_of(problem, Y, theta)
+    theta, nodes = even_phases(phases), 2 * np.pi * np.arange(count) / count
+    kernel = interpolation(eccentric_phase(theta[:, 0], grading), nodes)
+    return waveform_of(problem, start[:, None] + np.einsum("pk,knb->npb", kernel, path), theta)
