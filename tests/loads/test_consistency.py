@@ -121,7 +121,7 @@ def test_a_text_is_no_number() -> None:
 
 
 def test_arrays_that_do_not_broadcast() -> None:
-    with pytest.raises(InputError, match=r"arrays that broadcast, got shapes \(2,\), \(3,\)"):
+    with pytest.raises(InputError, match=r"shapes that broadcast, got \(2,\), \(3,\)"):
         checked_modulation(Skewed(np.full(2, 0.1), np.full(3, 0.1)))
 
 
