@@ -33,8 +33,9 @@ _KINDS = {
 #: J/(mol K), the molar mass of dry air of the US Standard Atmosphere 1976, in kg/mol.
 _GAS_CONSTANT, _MOLAR_MASS_AIR = 8.314462618, 28.9644e-3
 
-#: Where the continued fraction hands over to the asymptotic series, and the terms each needs to
-#: reach 1e-15 there (37 levels and 14 powers were measured at s = 30; 16 powers at s = 25).
+#: Value of s above which the asymptotic series replaces the continued fraction, and the numbers of
+#: terms with which both reach 1e-15 there (measured: 37 levels and 14 powers at s = 30; 16 powers
+#: at s = 25).
 _HANDOVER, _LEVELS, _POWERS = 30.0, 40, 16
 
 
@@ -106,11 +107,11 @@ class AirLayer:
     R : array
         Radius of the disc or of the patch of micro-contacts (m).
     gas_flow : {"continuum", "slip", "free-molecular"}
-        How the leak feels a mean free path l that is no longer small against h0 (Kn = l/h0).
-        "continuum": as if it were, the paper's Eq. (poiseuille). "slip": Poiseuille flow with
-        Maxwell's slip at diffuse walls, eta/(1 + 6 Kn), right to first order in Kn and too
-        resistive far beyond. "free-molecular": the paper's argument for 1 mbar, zero viscosity
-        where l exceeds the gap (Kn > 1), the bulk's elsewhere.
+        Flow of the leak where the mean free path l is not small against h0 (Kn = l/h0).
+        "continuum": as for small Kn, the paper's Eq. (poiseuille). "slip": Poiseuille flow with
+        Maxwell's slip at diffuse walls, eta/(1 + 6 Kn), which is right to first order in Kn and too
+        resistive at large Kn. "free-molecular": the paper's argument for 1 mbar, zero viscosity
+        where l exceeds the gap (Kn > 1), the viscosity of the bulk elsewhere.
     temperature : array
         Temperature (K); enters the mean free path only.
 

@@ -40,8 +40,9 @@ class Bifurcation:
     log_multipliers : complex array, shape (states,)
         ln|m| + i arg m by falling modulus.
     frequency : float
-        Frequency (Hz) of the mode that passes the unit circle, between 0 and half that of the
-        modulation: multipliers know frequencies only up to whole multiples of it. 0 at folds.
+        Frequency (Hz) of the mode that passes the unit circle, between 0 and half the frequency of
+        the modulation: multipliers do not tell frequencies apart that differ by whole multiples of
+        the latter. 0 at folds.
     unstable_before, unstable_after : int
         Number of multipliers outside the unit circle on the two sides, along the branch.
     index : int

@@ -164,7 +164,7 @@ def continuation(
         Numbers, no arrays.
     parameter : str
         "epsilon", "frequency", "V", "K", "W0", "M", "eta", or a parameter of the law, such as
-        "alpha" or "lambda"; as in `asperity.parameters`.
+        "alpha" or "lambda"; names as in `asperity.parameters`.
     span : pair of float or str
         Values at which the branch starts and ends. A positive parameter whose ends differ by more
         than a factor of 2 is continued by equal factors.

@@ -137,7 +137,7 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     Parameters
     ----------
     arguments : dict
-        Those of `continuation`, or more.
+        Arguments of `continuation`; further ones are ignored.
     spans : dict
         Spans by the name of the parameter; a continued velocity, epsilon, frequency or damping has
         the value at the start of its span.

@@ -135,7 +135,7 @@ class Basis:
 
 
 def inverted(normal: Float) -> Float:
-    """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it has none."""
+    """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it is singular."""
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = 1 / np.sqrt(np.diagonal(normal))
         equal = normal * scale * scale[:, None]

@@ -1,9 +1,9 @@
 """The reference of the lock-in: the modulation frequency, fitted to the load.
 
 An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the frequency is a parameter
-of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
-in a window short enough for that start, and is repeated in windows four times as long up to the
-whole one.
+of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum, in
+a window so short that the frequency of this line is accurate enough. It is repeated in windows four
+times as long each, up to the whole recording.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ of faults. With asperities of stiffness W/lambda, F_i/W is a further state,
 
     d(F_i/W)/dt = (v - v_pl) / lambda,
 
-which has no dW/dt in it and takes the stiffness away: the slider swings on the asperities near
-sqrt(W0 / (lambda M)). Without asperities v is what the friction law resists, and ln v is the state.
+without dW/dt, and the equations are no longer stiff: the slider swings on the asperities near
+sqrt(W0 / (lambda M)). Without asperities the friction law acts on v itself, and ln v is the state.
 
 Source: Bureau et al. (2000), Eqs. (8), (26)-(29).
 """

@@ -87,13 +87,13 @@ def slider_values(slider: Slider) -> dict[str, Any]:
 
 
 def law_from(law: type[Law], values: Any) -> Law:
-    """The law with the values that a mapping has by name."""
+    """The law with the values of a mapping from names of parameters to values."""
     names = law_parameters(law).items()
     return law(**{p.path.rsplit(".", 1)[-1]: values[name] for name, p in names})
 
 
 def slider_from(law: type[Law], values: Any) -> Slider:
-    """The slider with the values, SI or texts with units, that a mapping has by name.
+    """The slider with the values of a mapping from names of parameters to values.
 
     Parameters
     ----------

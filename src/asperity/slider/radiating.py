@@ -20,8 +20,9 @@ from asperity.laws import Law, State
 from asperity.loads import Excitation
 from asperity.slider.inertial import _Damped
 
-#: From velocities at which damping carries it all to those at which it carries A W takes
-#: ln(mu / A) steps, of about one unit of ln v each; from there convergence is quadratic.
+#: Number of Newton steps. From velocities at which damping carries the whole force to those at
+#: which it carries A W the method takes ln(mu / A) steps, of about one unit of ln v each; after
+#: that it converges quadratically.
 _STEPS = 14
 
 

@@ -2,14 +2,14 @@
 
     M dv/dt = F + S - F_i - eta v,      dF/dt = K (V p - v),      v = v(F_i/W, state, W)
 
-with the velocity that the law yields. It has a sign, and a logarithm on one side of rest only; the
-friction F_i/W has a value everywhere, and takes the place of v among the states:
+where the law gives v, which has a sign. ln v exists on one side of rest only; the friction F_i/W
+has a value everywhere, and takes the place of ln v among the states:
 
     d(F_i/W)/dt = [dv/dt - dv/dstate dstate/dt - dv/dw dw/dt] / [dv/d(F_i/W)].
 
-For the regularised law F_i/(A W) = asinh[v / (2 V*)], V* = V0 exp[-(mu0 + B phi) / A]: the state
-goes with v near rest and with ln v in sliding. A slider at rest creeps at the velocity at which
-friction balances the spring, to which it relaxes within M V* / (A W).
+For the regularised law F_i/(A W) = asinh[v / (2 V*)], V* = V0 exp[-(mu0 + B phi) / A]: the state is
+proportional to v near rest and linear in ln v in sliding. A slider at rest creeps at the velocity
+at which friction balances the spring; its velocity relaxes to this one within M V* / (A W).
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ orbit shrinks to a point:
     < v_pl(f/w, state, w) > = V,      < state rates > = 0.
 
 The exponent of v_pl varies by eps mu / A, tens of units, so that the mean over the load cycle is
-that of a narrow pulse at the weakest contact. The start comes from its Laplace (saddle-point)
-estimate, and Newton's method works on the logarithm of the mean slip rate, which is nearly linear.
+that of a narrow pulse at the weakest contact. The initial guess is the Laplace (saddle-point)
+estimate of this mean, and Newton's method works on the logarithm of the mean slip rate, which is
+nearly linear.
 
 In the adiabatic limit the states at every phase are those of steady sliding under the present load.
 """

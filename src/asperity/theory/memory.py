@@ -132,7 +132,7 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
     ratio : array
         New velocity over the old one, positive.
     slip : array or str
-        Since the step (m).
+        Slip since the step (m).
     """
     name, law = _one_of_three(law)
     r = jnp.asarray(obeying(ratio, "state_after_step.ratio", "dimensionless", "positive"))

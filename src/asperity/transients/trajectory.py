@@ -48,7 +48,7 @@ class SampleTimes:
         self._next, self._after = 0, -np.inf
 
     def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """The next times (s) before `end`, at most `most` of them.
+        """The next times (s) before `end`, no more than `most`.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class SampleTimes:
             self._next = self._count(t, True)
 
     def _count(self, end: float, closing: bool) -> int:
-        """How many times lie before `end`, which is one of them where the trajectory closes."""
+        """Number of times before `end`; `end` itself is counted if the trajectory closes there."""
         # A time that coincides with a break point belongs to the segment after it.
         limit = end * (1 + BREAK if closing else 1 - BREAK)
         if self._times is not None:
@@ -232,7 +232,7 @@ class Trajectory(Drawn):
 
     @property
     def age(self) -> Float | None:
-        """Age Phi of the contacts (s), theta in geophysics; None for a law whose state is none."""
+        """Age Phi of the contacts (s), theta in geophysics; None for a law without such a state."""
         law = self.motion.slider.law
         ages = (RiceRuina.state_names, LinkerDieterich.state_names)
         if not isinstance(law, RiceRuina) or law.state_names[:1] not in ages:

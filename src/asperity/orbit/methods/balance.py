@@ -55,7 +55,7 @@ _NEAR = 3e-2
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
-#: Steps that a linear system is given beyond those that the orbit took.
+#: Steps for a linear system, more than the orbit took.
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
 _AVERAGED_TOLERANCE = 1e-2
@@ -106,8 +106,8 @@ class Prepared(NamedTuple):
 class BalanceEquations(Equations):
     """The equations of an orbit on a grid, for the solver and for the implicit-function rule.
 
-    The parameters are the problem, what the last step of the solver was prepared with, and the
-    number of steps that linear systems take.
+    The parameters are the problem, the linearisation that the last step of the solver used, and
+    the number of steps that linear systems take.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ def _iterate(
     tolerance: float,
     max_steps: int,
 ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
-    """Unknowns, what their last step was prepared with, estimated error and number of steps."""
+    """Unknowns, the linearisation that their last step used, estimated error, number of steps."""
     cycle = equations.cycle(problem)
 
     def prepare(unknowns: BalanceUnknowns) -> Prepared:
@@ -420,7 +420,8 @@ def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
 
 #: Orders of the harmonics of the elastic swing.
 SWING_ORDERS = np.arange(1, 13)
-#: Share of the elastic swing below which it is beyond a resonance with the modulation.
+#: Smallest value of the elastic swing relative to rigid asperities; a smaller value means that the
+#: modulation is faster than the resonance of the elastic asperities, and the swing is not used.
 LEAST_SWING = 0.2
 
 

@@ -112,11 +112,12 @@ _CHUNK, _FEW = 240, 24
 
 #: Newton steps on a division, and the largest change of an exponent in one.
 _NEWTON_STEPS, _LARGEST_CHANGE = 12, 3.0
-#: Newton change on the coarse division below which its square is small enough to go on, and largest
-#: ones where a finer division is compared with the next, and where it is the finer of two.
+#: Largest Newton change on the coarse division, at which the finer divisions begin (the next change
+#: would be about its square); on the first of two finer divisions that are compared; and on the
+#: second of them.
 _NEAR, _CLOSED, _ACCEPTED = 2e-2, 1e-6, 1e-9
-#: Chord steps on a finer division, which shrink a change by a hundred and more, and the change
-#: below which there need be no further one.
+#: Largest number of chord steps on a finer division, each of which makes a change a hundred times
+#: smaller or more, and the change below which no further chord step is taken.
 _CHORDS, _NEARLY_CLOSED = 4, 1e-5
 #: Agreement of two divisions, relative; the finer one is then good to 2e-6 / 2^8.
 _AGREEMENT = 2e-6
