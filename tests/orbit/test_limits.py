@@ -32,7 +32,7 @@ def slider(length=1.0, time=1.0, force=1.0):
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (1e6, 1e3, 1e-2)])
-def test_points_outside_say_which_limit_and_cost_no_search_and_no_other_point(units):
+def test_points_out_of_range_name_the_limit_and_are_not_searched(units):
     length, time, _ = units
     V, epsilon, frequency = np.transpose([row[:3] for row in OUTSIDE] + INSIDE)
     with np.errstate(over="ignore"):
@@ -56,7 +56,7 @@ def test_points_outside_say_which_limit_and_cost_no_search_and_no_other_point(un
     assert counts[-1] == len(V)
 
 
-def test_no_method_is_given_a_point_outside():
+def test_no_method_gets_a_point_out_of_range():
     V, epsilon, frequency = np.transpose([row[:3] for row in OUTSIDE])
     problem, _ = flatten(
         checked_problem(slider(), velocity=V, epsilon=epsilon, frequency=frequency)

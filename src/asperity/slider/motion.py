@@ -82,9 +82,11 @@ class Motion(eqx.Module):
         """The law's states."""
         return tuple(Y[len(self.mechanical) :])
 
-    @abstractmethod
     def steady(self) -> Array:
         """States of steady sliding under constant load, shape (size, ...)."""
+        law = self.slider.law
+        mechanical = self.mechanical_states(law.mu_ss(self.V), 1.0, 0.0, Excitation(jnp.ones(())))
+        return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))
 
     @abstractmethod
     def force(self, Y: Array, at: Excitation) -> Array:
@@ -115,13 +117,19 @@ class Motion(eqx.Module):
 
     @abstractmethod
     def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
+        self, friction: Array, velocity: ArrayLike, log_slip: ArrayLike, at: Excitation
+    ) -> tuple[ArrayLike, ...]:
         """The mechanical states from F_i/W, v/V and ln(v_pl/V), without inertia."""
 
     @abstractmethod
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
+
+    def _law_rates(self, v: ArrayLike, slip: ArrayLike, Y: Array, at: Excitation) -> list[Array]:
+        """Rates of the law's states per radian, for the velocities dx/dt and v_pl over V."""
+        law = self.slider.law
+        rates = law.state_rate(self.V * v, self.V * slip, self.law_state(Y), at.w)
+        return [r / self.omega for r in rates]
 
     def steady_jacobian(self) -> Array:
         """Derivatives [row, column] of the rates in steady sliding, shape (size, size, points)."""
@@ -137,7 +145,3 @@ class Motion(eqx.Module):
         magnitude at one end of the step than at the other.
         """
         return 1.0
-
-    def _steady_states(self, *mechanical: ArrayLike) -> Array:
-        law = self.slider.law
-        return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))

@@ -23,40 +23,20 @@ from jax.typing import ArrayLike
 
 from asperity.laws import Law
 from asperity.loads import Excitation
-from asperity.slider.inertial import StiffInertial, _Damped
+from asperity.slider.inertial import Damped, StiffInertial
 from asperity.slider.motion import Motion
 
 
-class ReversingInertial(_Damped):
+class ReversingInertial(Damped):
     """Inertia without asperities, signed; states Y = (F/W0, F_i/W, *law states)."""
 
     name: ClassVar[str] = "inertial"
     mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
 
-    def steady(self) -> Array:
-        """Steady sliding."""
-        mu = self.slider.law.mu_ss(self.V)
-        return self._steady_states(mu + self.damping, mu)
-
-    def force(self, Y: Array, at: Excitation) -> Array:
-        """F/W0."""
-        return Y[0]
-
-    def log_slip(self, Y: Array, at: Excitation) -> Array:
-        """ln(v / V), forwards."""
-        law = self.slider.law
-        return law.log_velocity(Y[1], self.law_state(Y), at.w) - jnp.log(self.V)
-
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return self.slip_velocity(Y[1], Y, at)
-
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force, friction."""
-        return self._balance(friction, velocity, at), friction
 
     def friction_jump(self, Y: Array, before: Excitation, after: Excitation) -> Array:
         """Change of F_i/W where the load steps: the velocity is continuous."""

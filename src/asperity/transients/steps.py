@@ -54,9 +54,7 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def call(system: SegmentEquations, *arguments: Any) -> Any:
-        leaves, structure = jax.tree.flatten(system)
-        scalars = all(np.ndim(leaf) == 0 for leaf in leaves)
-        run = single if scalars and _elementwise(structure) else many
+        run = single if _compiles_to_one(system) else many
         return run(system, *arguments)
 
     return call
@@ -73,6 +71,11 @@ def _as_one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
             return jax.jit(within)(*arguments)
 
     return call
+
+
+def _compiles_to_one(system: SegmentEquations) -> bool:
+    leaves, structure = jax.tree.flatten(system)
+    return all(np.ndim(leaf) == 0 for leaf in leaves) and _elementwise(structure)
 
 
 @cache
