@@ -24,7 +24,7 @@ from asperity.orbit.batches import take
 from asperity.orbit.methods import collocation, series
 from asperity.orbit.methods.branch_following import MESHES, BranchFollowing
 from asperity.orbit.search import METHODS, find_orbits
-from asperity.orbit.solution import Method, Solution
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.problem import Problem
 from benchmarks.residual import LAWS, draw, problem_of
 
@@ -107,16 +107,7 @@ def solve(
     begun = time.process_time()
     for start in range(0, len(rows), _SLICE):
         part = rows[start : start + _SLICE]
-        parts.append(
-            find_orbits(
-                take(problem, part),
-                len(part),
-                harmonics=2,
-                phases=0,
-                progress=lambda _: None,
-                methods=methods,
-            )
-        )
+        parts.append(find_orbits(take(problem, part), SearchOptions(2), methods))
     seconds = time.process_time() - begun
     return jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts), seconds
 

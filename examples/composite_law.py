@@ -1,12 +1,12 @@
 """A friction law written outside the package: the composite law of Kato and Tullis (2001).
 
-Friction as in Rice-Ruina (Eq. 1 of Bureau et al. 2000). Contacts age below a velocity Vc, as in the
-ageing law, and above it the state moves with slip only, as in the slip law:
+Friction is that of Rice-Ruina (Eq. 1 of Bureau et al. 2000). Below a velocity Vc contacts age, as
+in the ageing law; above it the state changes with slip only, as in the slip law:
 
     dPhi/dt = exp(-v / Vc) - (v Phi / D0) ln(v Phi / D0).
 
-The law's equations are all there is to write:
-periodic response, stability and linear response come with the package.
+Only the equations of the law are written here. Periodic response, stability and linear response are
+computed by the package.
 """
 
 from typing import ClassVar
@@ -44,7 +44,7 @@ class Composite(Law):
         return (ageing - slip,)
 
     def steady_state(self, v):
-        """Of x ln x = exp(-v/Vc), x = v Phi/D0, by Newton's method on ln x."""
+        """The solution of x ln x = exp(-v/Vc), x = v Phi/D0, by Newton's method on ln x."""
         log_x = target = jnp.exp(-v / self.Vc)
         for _ in range(6):
             x = jnp.exp(log_x)

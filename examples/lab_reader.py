@@ -1,4 +1,4 @@
-"""A reader of a laboratory's own format, found by asperity without a change to it.
+"""A reader for the file format of a laboratory, which asperity uses without being changed.
 
 The recorder writes a line ``GAUGEBOX 1``, a line with the sampling rate, and a line for each
 channel with its name, unit and gain; then 16-bit counts, channel after channel in each row. With
@@ -6,8 +6,8 @@ channel with its name, unit and gain; then 16-bit counts, channel after channel 
     [project.entry-points."asperity.readers"]
     gaugebox = "lab_reader"
 
-in the ``pyproject.toml`` of the package that this module is installed by, `asperity.read` and
-``asperity measure`` take such files as any others.
+in the ``pyproject.toml`` of the package that contains this module, `asperity.read` and
+``asperity measure`` read such files like all others.
 """
 
 from pathlib import Path
@@ -21,7 +21,7 @@ MARK = b"GAUGEBOX 1\n"
 
 
 def is_format(path: Path) -> bool:
-    """Whether a file is of this format: by what it holds, never by its name."""
+    """Whether a file is of this format, decided by its content and not by its name."""
     with path.open("rb") as file:
         return file.read(len(MARK)) == MARK
 

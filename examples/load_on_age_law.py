@@ -1,7 +1,7 @@
-"""A law of one's own: elastic asperities, and an age that feels the load.
+"""A law written outside the package: elastic asperities, and an age that depends on the load.
 
 The elasto-plastic law of Bureau et al. (2000) with the ageing law of Linker and Dieterich (1992),
-to ask how a modulation of the load acts on the age (`load_on_age.toml`)::
+for the question how a modulation of the load acts on the age (`load_on_age.toml`)::
 
     F_i / W = mu0 + A ln(v_plastic / V0) + B ln(V0 Phi / D0)
     dPhi/dt = 1 - (dx/dt) Phi / D0 - (alpha / B) (dW/dt / W) Phi

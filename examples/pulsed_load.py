@@ -2,8 +2,8 @@
 
     W / W0 = exp(a cos theta) / I_0(a),      theta = omega t,
 
-of mean 1 and positive for any a. Its harmonics are 2 I_n(a) / I_0(a), with the modified Bessel
-functions; for small a it is the harmonic load of epsilon = a.
+with the mean 1 and positive for any a. The harmonics are 2 I_n(a) / I_0(a), with the modified
+Bessel functions I_n; for small a the load is harmonic, with epsilon = a.
 """
 
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ from asperity.loads import Excitation, Modulation, sampled
 
 
 class Pulses(Modulation):
-    """Pulses of the load, the sharper the larger `a` is."""
+    """Pulses of the load; a larger `a` makes them sharper."""
 
     a: ArrayLike
 

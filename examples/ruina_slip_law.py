@@ -1,7 +1,7 @@
 """Ageing or slip? Two laws with one linear response, distinguished by the mean under modulation.
 
-Friction is that of Eq. (1) of Bureau et al. (2000) in both. The state grows at rest in the ageing
-law, and moves only while the slider slips in that of Ruina (1983):
+Both have the friction of Eq. (1) of Bureau et al. (2000). The state grows at rest in the ageing
+law, and changes only while the slider slips in the law of Ruina (1983):
 
     dPhi/dt = 1 - v Phi / D0        dPhi/dt = -(v Phi / D0) ln(v Phi / D0).
 """

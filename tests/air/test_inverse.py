@@ -15,7 +15,7 @@ LAYER = AirLayer(P0=1e5, h0=6.5e-6, eta=1e-5, R=3.9e-2)
 
 # Below a radius of 3 mm the air hardly matters, and the inverse is ill-posed.
 @given(st.floats(-2.5, 0))
-def test_radius_round_trip(log_R):
+def test_the_inverse_finds_the_radius(log_R):
     ratio = effective_modulation(120.0, **SLIDER, layer=replace(LAYER, R=10**log_R))
     answer = patch_radius(float(ratio), 120.0, **SLIDER, layer=LAYER)
     assert answer.found
@@ -24,7 +24,7 @@ def test_radius_round_trip(log_R):
 
 
 @given(st.floats(-8, -4))
-def test_gap_round_trip(log_h):
+def test_the_inverse_finds_the_gap(log_h):
     ratio = effective_modulation(120.0, **SLIDER, layer=replace(LAYER, h0=10**log_h))
     answer = gap(float(ratio), 120.0, **SLIDER, layer=LAYER)
     assert answer.solutions == pytest.approx((10**log_h,), rel=1e-8)
@@ -54,7 +54,7 @@ def test_a_resonance_far_narrower_than_the_scan_is_found():
     np.testing.assert_allclose(back, 1000.0, rtol=1e-8)
 
 
-def test_what_cannot_be_reached_says_what_can():
+def test_a_fraction_out_of_reach_has_the_reachable_range():
     answer = patch_radius(1.2, 120.0, **SLIDER, layer=LAYER)
     assert not answer.found
     assert answer.solutions == ()

@@ -147,7 +147,7 @@ def test_gamma_is_as_printed():
     assert abs(LAYER.gamma(omega) * LAYER.R) == pytest.approx(LAYER.squeeze(omega), rel=1e-14)
 
 
-def test_gas_flow_models():
+def test_gas_flow_models_have_their_viscosities():
     flows = {flow: replace(LAYER, gas_flow=flow) for flow in ("slip", "free-molecular")}
     assert flows["slip"].effective_viscosity == pytest.approx(1e-5 / (1 + 6 * LAYER.knudsen))
     assert flows["free-molecular"].effective_viscosity == 1e-5
@@ -216,30 +216,30 @@ def layer(R=R_STATED, **change):
     return AirLayer(**{"P0": 1e5, "h0": 6.5e-6, "eta": 1e-5, "R": R, **change})
 
 
-def test_stiffnesses():
+def test_the_stiffness_of_the_layer_is_that_of_the_paper():
     assert layer(R_AREA).stiffness == pytest.approx(7.5e7, abs=0.05e7)
     # "one order of magnitude larger than kappa_z" is a factor of 4.3
     assert layer(R_AREA).stiffness / CONTACT.stiffness == pytest.approx(4.31, abs=0.005)
 
 
-def test_resonance_and_inertia():
+def test_resonance_and_effect_of_inertia_are_those_of_the_paper():
     frequency = CONTACT.omega0(1.6) / (2 * np.pi)
     assert frequency == pytest.approx(530, abs=5)
     assert (120 / frequency) ** 2 == pytest.approx(5.2e-2, abs=0.05e-2)
 
 
-def test_squeeze_number():
+def test_the_squeeze_number_is_that_of_the_paper():
     omega = 2 * np.pi * 120
     assert layer().gamma(omega) * R_STATED == pytest.approx(4 * (1 - 1j), abs=0.06)
 
 
-def test_borne_fraction_in_air():
+def test_the_fraction_in_air_is_that_of_the_paper():
     assert effective_modulation(120, **SLIDER, layer=layer()) == pytest.approx(0.24, abs=0.005)
     for R in (R_STATED, R_AREA):
         assert effective_modulation(200, **SLIDER, layer=layer(R)) == pytest.approx(0.23, abs=0.005)
 
 
-def test_vacuum_and_ratio():
+def test_the_fraction_in_vacuum_and_the_ratio_are_those_of_the_paper():
     # 1.169, stated as 1.2
     assert effective_modulation(200, **SLIDER) == pytest.approx(1.2, abs=0.05)
     assert air_vacuum_ratio(200, **SLIDER, layer=layer()) == pytest.approx(0.20, abs=0.005)
@@ -247,7 +247,7 @@ def test_vacuum_and_ratio():
     assert air_vacuum_ratio(200, **SLIDER, layer=layer(R_AREA)) == pytest.approx(0.194, abs=5e-4)
 
 
-def test_patch():
+def test_a_patch_of_25_mm_gives_both_measured_fractions():
     assert effective_modulation(120, **SLIDER, layer=layer(2.5e-2)) == pytest.approx(0.48, abs=5e-3)
     assert np.pi * 2.5e-2**2 / 49e-4 == pytest.approx(0.4, abs=0.05)
     (radius,) = patch_radius(0.48, 120, **SLIDER, layer=layer()).solutions
@@ -256,7 +256,7 @@ def test_patch():
     assert air_vacuum_ratio(200, **SLIDER, layer=layer(radius)) == pytest.approx(0.4, abs=0.01)
 
 
-def test_one_millibar():
+def test_a_layer_at_1_mbar_acts_as_vacuum():
     thin = layer(R_AREA, P0=100.0)
     # "two orders of magnitude below the multicontact one"
     assert thin.stiffness / CONTACT.stiffness == pytest.approx(4.3e-3, abs=0.05e-3)
@@ -271,7 +271,7 @@ def test_one_millibar():
         assert modulation == pytest.approx(vacuum, rel=6e-3)
 
 
-def test_shear_viscosity():
+def test_the_printed_shear_viscosity_lacks_a_factor_A():
     arguments = {"W0": 7.0, "A": 0.013, "layer": layer(R_AREA)}
     printed = shear_viscosity_ratio(1e-4, **arguments, as_printed=True)
     assert printed == pytest.approx(1e-7, abs=0.5e-7)

@@ -83,7 +83,7 @@ def test_mindlin_ratio_never_reaches_the_printed_one():
         (lambda: NormalContact("7 m", 4e-7), "NormalContact.W0 must be a force"),
         (lambda: NormalContact(7j, 4e-7), "NormalContact.W0 must be a force"),
         (lambda: NormalContact([7.0, [7.0]], 4e-7), "NormalContact.W0 must be a rectangular"),
-        (lambda: NormalContact(np.ones(2), np.ones(3)), "broadcast together, got .2,. and .3,.;"),
+        (lambda: NormalContact(np.ones(2), np.ones(3)), "broadcast, got .2,., .3,.;"),
         (lambda: CONTACT.closure([7.0, -1.0]), "NormalContact.load .* got -1 N;"),
         (
             lambda: CONTACT.closure_harmonics(1.0),

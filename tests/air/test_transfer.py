@@ -25,7 +25,7 @@ LAYER = AirLayer(P0=1e5, h0=6.5e-6, eta=1e-5, R=3.9e-2)
 F0 = float(NormalContact(7.0, 0.4e-6).omega0(1.6)) / (2 * np.pi)
 
 
-def test_printed_formula():
+def test_the_fraction_is_the_printed_formula():
     omega = 2 * np.pi * np.array([20.0, 120.0, 200.0, 900.0])
     omega0 = np.sqrt(SLIDER["W0"] / (SLIDER["lambda_z"] * SLIDER["M"]))
     z = (1 - 1j) / np.sqrt(2) * np.sqrt(12 * 1e-5 * omega / (1e5 * 6.5e-6**2)) * 3.9e-2
@@ -35,7 +35,7 @@ def test_printed_formula():
     np.testing.assert_allclose(computed, printed, rtol=1e-12)
 
 
-def test_vacuum():
+def test_without_a_layer_it_is_a_vacuum():
     f = np.array([0.0, 120.0, 200.0, 700.0])
     expected = 1 / np.abs(1 - (f / F0) ** 2)
     np.testing.assert_allclose(effective_modulation(f, **SLIDER), expected, rtol=1e-13)
@@ -94,7 +94,7 @@ def test_everything_broadcasts():
 
 
 @given(*(st.floats(-3, 3) for _ in range(3)))
-def test_units_do_not_matter(a, b, c):
+def test_the_transfer_function_does_not_depend_on_the_units(a, b, c):
     length, mass, second = 10**a, 10**b, 10**c
     force = mass * length / second**2
     slider = {"W0": 7.0 * force, "M": 1.6 * mass, "lambda_z": 0.4e-6 * length}
@@ -141,7 +141,7 @@ def _simulate(frequency, eps, layer=LAYER, cells=60, periods=14):
 
 
 @pytest.mark.parametrize("frequency", [120.0, 400.0])
-def test_against_the_full_equations_marched_in_time(frequency):
+def test_the_transfer_function_is_that_of_the_full_equations_integrated_in_time(frequency):
     # Second-order cells and eps = 1e-3 leave a few parts in 1e4: modulus AND sign of the phase.
     simulated, _ = _simulate(frequency, eps=1e-3)
     expected = transfer_function(frequency, **SLIDER, layer=LAYER)

@@ -47,7 +47,7 @@ def kinds(branch):
     return [b.kind for b in branch.bifurcations]
 
 
-def test_a_branch_turns_back_and_goes_on(hysteresis):
+def test_a_branch_is_followed_through_its_folds(hysteresis):
     assert kinds(hysteresis) == ["fold", "fold", "period doubling"]
     assert hysteresis.completed
     assert hysteresis.parameter[-1] == pytest.approx(0.03, rel=1e-12)
@@ -57,7 +57,7 @@ def test_a_branch_turns_back_and_goes_on(hysteresis):
         assert abs(turn - fold.index) <= 1
 
 
-def test_folds_are_where_shooting_has_them(hysteresis, resonance):
+def test_folds_agree_with_shooting(hysteresis, resonance):
     for fold in hysteresis.bifurcations[:2]:
 
         def defect(unknowns):
@@ -75,7 +75,7 @@ def test_folds_are_where_shooting_has_them(hysteresis, resonance):
         assert fold.value == pytest.approx(found[2], rel=LOCATION)
 
 
-def test_period_doubling_is_where_shooting_has_it(hysteresis, resonance):
+def test_period_doubling_agrees_with_shooting(hysteresis, resonance):
     doubling = hysteresis.bifurcations[2]
     state = doubling.critical.point.orbit.centre[:, 0]
     here = resonance.crossing(
@@ -107,12 +107,12 @@ def test_the_doubled_branch_obeys_the_equations(hysteresis, resonance):
     np.testing.assert_allclose(branch.multipliers[-1], expected, rtol=1e-7)
 
 
-def test_only_a_period_doubling_doubles(hysteresis):
+def test_a_doubled_branch_needs_a_period_doubling(hysteresis):
     with pytest.raises(InputError, match="must be a period doubling, got a fold"):
         asp.doubled_branch(hysteresis, hysteresis.bifurcations[0])
 
 
-def test_neimark_sacker_is_where_shooting_has_it(stabilised, rapid):
+def test_neimark_sacker_agrees_with_shooting(stabilised, rapid):
     (bifurcation,) = stabilised.bifurcations
     state, _ = rapid.followed(0.13, 6)
     here = rapid.crossing(lambda m: np.linalg.det(m) - 1, 0.13, 0.136, state)
@@ -127,7 +127,7 @@ def test_neimark_sacker_is_where_shooting_has_it(stabilised, rapid):
     assert bifurcation.error < LOCATION
 
 
-def test_a_planted_shift_is_seen(stabilised, rapid):
+def test_a_planted_shift_of_a_bifurcation_is_detected(stabilised, rapid):
     state, _ = rapid.followed(0.13, 6)
     here = rapid.crossing(lambda m: np.linalg.det(m) * (1 + 1e-7) - 1, 0.13, 0.136, state)
     (bifurcation,) = stabilised.bifurcations
@@ -157,7 +157,7 @@ def test_points_of_a_branch_are_those_of_the_other_solver(stabilised):
     ("parameter", "start", "end"),
     [("K", 1.5e5, 4e5), ("A", 0.011, 0.02), ("velocity", 1e-6, 1e-5), ("W0", 5.0, 9.0)],
 )
-def test_any_parameter_may_move(rapid, parameter, start, end):
+def test_any_parameter_can_be_continued(rapid, parameter, start, end):
     fixed = {"velocity": rapid.V, "epsilon": 0.05, "frequency": rapid.frequency}
     branch = asp.continuation(rapid.slider, parameter=parameter, span=(start, end), **fixed)
     assert branch.completed
@@ -175,7 +175,7 @@ def test_any_parameter_may_move(rapid, parameter, start, end):
     assert np.abs(branch.multipliers[-1]).max() == pytest.approx(np.abs(expected).max(), rel=1e-8)
 
 
-def test_a_dataset_holds_units_and_provenance(hysteresis, tmp_path):
+def test_a_dataset_has_units_and_provenance(hysteresis, tmp_path):
     data = hysteresis.to_dataset()
     assert all({"units", "long_name"} <= set(v.attrs) for v in data.variables.values())
     assert data.attrs["continued_parameter"] == "epsilon"

@@ -61,7 +61,7 @@ def test_modulation_stabilises_softer_springs(stiffness):
     assert all("leaves" in end for end in curve.result)
 
 
-def test_inside_the_boundary_is_where_shooting_has_it(stiffness, slow):
+def test_the_boundary_inside_the_rectangle_agrees_with_shooting(stiffness, slow):
     (curve,) = stiffness.curves
     for i in np.linspace(1, len(curve.x) - 2, 3).astype(int):
         here = dataclasses.replace(slow, K=curve.y[i])
@@ -119,7 +119,7 @@ def test_a_dataset_of_curves_has_units(stiffness):
     assert set(data.kind.values) == {"Neimark-Sacker"}
 
 
-def test_two_different_parameters_are_needed(slow):
+def test_equal_parameters_are_refused(slow):
     with pytest.raises(InputError, match="y must differ from x"):
         asp.stability_boundary(
             slow.slider,

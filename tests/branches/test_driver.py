@@ -73,7 +73,7 @@ def test_a_step_that_turns_or_misses_too_much_is_taken_shorter(limit):
     assert turns.max() < 0.42
 
 
-def test_a_curve_that_ends_is_left_there_and_steps_are_counted():
+def test_a_curve_ends_with_its_reason_and_steps_are_limited():
     def half_line(x, y):  # its end is come nearer to by ever shorter steps
         return y - (0.0 if x < 1 else math.nan)
 
@@ -110,7 +110,7 @@ class Lines(Curves):
         return ["arrived" if self.at[row] >= 1 else "" for row in rows]
 
 
-def test_curves_that_are_followed_together_take_steps_of_their_own():
+def test_curves_followed_together_have_separate_step_lengths():
     lines = Lines([0, 3, 9, 0])
     assert follow(lines, np.full(4, 0.1), rows=np.array([0, 1, 2])) == [
         *("arrived", "arrived"),

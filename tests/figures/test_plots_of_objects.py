@@ -59,7 +59,7 @@ def test_a_notebook_shows_the_picture_without_pyplot() -> None:
     assert size["width"] == figure.get_size_inches()[0] * figure.dpi
 
 
-def test_other_names_are_refused() -> None:
+def test_a_file_in_place_of_the_set_of_names_is_refused() -> None:
     response = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.1, frequency=120.0)
     with pytest.raises(InputError, match="names must be one of friction, geophysics"):
         response.plot("picture.png")

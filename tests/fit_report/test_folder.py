@@ -32,7 +32,7 @@ def found():
     return fit(table, "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
 
 
-def test_the_folder_holds_the_fit(found, tmp_path):
+def test_the_folder_has_page_json_and_material(found, tmp_path):
     folder = tmp_path / "report"
     write_report(folder, found)
     assert sorted(p.name for p in folder.iterdir()) == ["fit.json", "material.toml", "report.html"]

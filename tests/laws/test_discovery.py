@@ -47,7 +47,7 @@ def test_a_law_in_a_file_is_known_by_its_name(law_file) -> None:
     assert known_law("rice-ruina") == "rice-ruina"
 
 
-def test_a_law_in_a_module(law_file, monkeypatch) -> None:
+def test_a_law_in_a_module_is_known_by_its_name(law_file, monkeypatch) -> None:
     monkeypatch.syspath_prepend(str(law_file.parent))
     assert known_law("my_law:Mine") == "mine"
     sys.modules.pop("my_law")
@@ -77,7 +77,7 @@ def test_a_wrong_place_is_one_sentence(law_file, place: str, message: str) -> No
     assert message in str(error.value)
 
 
-def test_a_law_without_all_of_its_equations(tmp_path) -> None:
+def test_a_law_without_all_of_its_equations_is_refused(tmp_path) -> None:
     path = tmp_path / "half.py"
     path.write_text(
         "from asperity.laws import Law\nclass Half(Law):\n    name = 'half'\n"
@@ -97,7 +97,7 @@ def install(folder: Path, name: str, value: str) -> None:
     (info / "entry_points.txt").write_text(f"[asperity.laws]\n{name} = {value}\n")
 
 
-def test_a_law_of_an_installed_package(law_file, monkeypatch) -> None:
+def test_a_law_of_an_installed_package_is_known_by_its_name(law_file, monkeypatch) -> None:
     install(law_file.parent, "mine", "my_law:Mine")
     monkeypatch.syspath_prepend(str(law_file.parent))
     importlib.invalidate_caches()
@@ -106,7 +106,7 @@ def test_a_law_of_an_installed_package(law_file, monkeypatch) -> None:
     sys.modules.pop("my_law")
 
 
-def test_a_broken_installed_law_spoils_nothing_else(law_file, monkeypatch) -> None:
+def test_a_broken_installed_law_does_not_affect_others(law_file, monkeypatch) -> None:
     install(law_file.parent, "other", "my_law:Mine")
     monkeypatch.syspath_prepend(str(law_file.parent))
     importlib.invalidate_caches()
@@ -211,7 +211,7 @@ def test_sound_laws_pass_with_any_number_of_points() -> None:
 
 
 @pytest.mark.parametrize("law", sorted(registered()))
-def test_the_laws_of_the_package_would_pass(law) -> None:
+def test_the_laws_of_the_package_pass_the_checks_of_a_users_law(law) -> None:
     kind = type("Copy", (registered()[law],), {"__module__": "elsewhere"})
     every = {"A": 0.013, "B": 0.026, "alpha": 0.2, "c": 0.2, "V1": 1e-8, "V2": 1e-4, "mu0": 0.5}
     own = {n: every.get(n, 1e-6) for n in law_parameters(kind)}

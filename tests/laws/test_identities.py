@@ -285,7 +285,7 @@ def check_kinematics(system: QuasiStatic) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_law(name):
+def test_every_law_obeys_the_identities(name):
     """All identities of one call, with the published slope and step of the load."""
     example = EXAMPLES[name]
     law = example.law(get_law(name))
@@ -302,16 +302,16 @@ def test_every_law(name):
 
 @pytest.mark.parametrize("name", INVERTIBLE)
 @pytest.mark.parametrize("check", [check_age_velocity, check_no_memory, check_limits])
-def test_every_rate_dependent_law(check, name):
+def test_every_rate_dependent_law_has_its_age_velocity_memory_and_limits(check, name):
     check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
 
 
 @pytest.mark.parametrize("name", ["amontons", "elasto-plastic", "two-state"])
-def test_the_motion_in_other_units(name):
+def test_the_motion_does_not_depend_on_the_units(name):
     check_units(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
 
 
-def test_kinematics():
+def test_slider_and_plastic_velocity_obey_the_kinematics():
     check_kinematics(quasi_static(EXAMPLES["elasto-plastic"].law(ElastoPlastic)))
 
 
@@ -332,7 +332,7 @@ def test_every_registered_law_has_an_example():
     assert set(EXAMPLES) <= set(registered())
 
 
-def test_a_law_without_an_example_is_noticed(monkeypatch):
+def test_a_law_without_an_example_is_detected(monkeypatch):
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
 
     class Forgotten(RiceRuina):
@@ -450,7 +450,7 @@ class LoadFollowedAtOnce(PrakashClifton):
         (LoadFollowedAtOnce, "prakash-clifton", check_load_step),
     ],
 )
-def test_planted_mistake_is_caught(mistake, name, check):
+def test_a_planted_mistake_is_detected(mistake, name, check):
     with pytest.raises(AssertionError):
         check(EXAMPLES[name].law(mistake), EXAMPLES[name])
 
@@ -476,7 +476,7 @@ class Unfinished(RiceRuina):
         (Unfinished, {"steady sliding", "element-wise", "derivatives", "units"}),
     ],
 )
-def test_one_call_names_what_a_law_breaks(mistake, broken):
+def test_one_call_names_every_broken_identity(mistake, broken):
     with pytest.raises(identities.BrokenIdentityError, match="breaks") as found:
         check_law(mistake(**RATE_AND_STATE))
     assert broken <= set(found.value.broken)
@@ -493,7 +493,7 @@ class CompliancesSwapped(QuasiStatic):
 
 
 @pytest.mark.parametrize("mistake", [LoadRateDropped, CompliancesSwapped])
-def test_planted_mistake_in_the_kinematics_is_caught(mistake):
+def test_a_planted_mistake_in_the_kinematics_is_detected(mistake):
     right = quasi_static(EXAMPLES["elasto-plastic"].law(ElastoPlastic))
     wrong = mistake(right.slider, right.V, right.omega)
     assert isinstance(wrong, eqx.Module)
@@ -506,7 +506,7 @@ class SecondLengthIgnored(TwoState):
         return (self.approach(v_plastic, state[0], self.D0),) * 2
 
 
-def test_parameters_that_are_not_exchangeable_are_caught():
+def test_parameters_that_are_not_exchangeable_are_detected():
     identities.exchange(EXAMPLES["two-state"].law(TwoState))
     with pytest.raises(AssertionError, match="D2, B2 is another law"):
         identities.exchange(EXAMPLES["two-state"].law(SecondLengthIgnored))

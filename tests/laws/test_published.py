@@ -34,7 +34,7 @@ CASES = {
 }
 
 
-def test_every_law_with_a_rate_is_here():
+def test_every_rate_dependent_law_is_compared_with_its_publication():
     own = {
         name
         for name, law in registered().items()
@@ -119,7 +119,7 @@ def test_rates_and_slip_are_those_of_the_published_equations(reference, name):
         ("prakash-clifton", {"V_star": 2e-7}),
     ],
 )
-def test_other_equations_are_told_apart(reference, name, mistake):
+def test_planted_other_equations_are_detected(reference, name, mistake):
     with pytest.raises(AssertionError, match="Not equal to tolerance"):
         compare(reference, name, **mistake)
 

@@ -85,7 +85,7 @@ class TestRestAndReversal:
         slopes = jax.vmap(jax.grad(lambda f: jnp.exp(law.log_velocity(f, STATE, 1.0))))(below)
         np.testing.assert_array_equal(slopes, 0.0)
 
-    def test_other_laws_have_the_exponential(self):
+    def test_the_velocity_of_other_laws_is_the_exponential_of_its_logarithm(self):
         law = RiceRuina(**BASE)
         friction = np.array([-0.2, 0.0, 0.6])
         expected = 1e-6 * np.exp((friction - 0.5 - 0.026 * 0.7) / 0.013)
@@ -110,7 +110,7 @@ def test_contacts_at_rest_age_by_all_laws_but_the_slip_law():
     np.testing.assert_allclose(prz, growth / 2, rtol=1e-12)
 
 
-def test_states_relax_over_their_own_lengths():
+def test_each_state_relaxes_over_its_memory_length():
     """At constant velocity the slip law's states decay exponentially with the slip."""
     law = TwoState(**BASE, B2=0.01, D2=5e-6)
     steady = law.steady_state(V)
@@ -122,7 +122,7 @@ def test_states_relax_over_their_own_lengths():
         np.testing.assert_allclose(rates, expected, rtol=1e-12)
 
 
-def test_two_states_have_their_own_thresholds_of_stability():
+def test_eigenvalues_of_the_two_state_law_are_those_linearised_by_hand():
     """Eigenvalues of steady sliding, linearised by hand in (F/W0, phi, phi2)."""
     A, B, B2, D0, D2 = 0.013, 0.026, 0.01, 4e-7, 5e-6
     found = linear(TwoState(**BASE, B2=B2, D2=D2)).eigenvalues[0]
@@ -216,7 +216,7 @@ def by_lambert(law, friction, log_age):
 
 
 @pytest.mark.parametrize("drag", [1e-9, 1e-3, 1.0])
-def test_it_is_lamberts_function(drag):
+def test_the_inverse_of_a_viscous_law_is_lamberts_function(drag):
     law = Viscous(**BASE, drag=drag)
     log_age = np.random.default_rng(1).uniform(-8, 8, SPEEDS.shape)
     friction = law.friction(SPEEDS, (log_age,), 1.0)
@@ -232,7 +232,7 @@ def test_it_is_lamberts_function(drag):
 
 @pytest.mark.parametrize("law", [RiceRuina(**BASE), Regularised(**BASE)], ids=["log", "asinh"])
 @pytest.mark.parametrize("log_age", [-30.0, 0.0, 30.0])
-def test_any_velocity_is_found(law, log_age):
+def test_the_inverse_finds_any_velocity(law, log_age):
     state = (jnp.full(SPEEDS.shape, log_age),)
     found = Law.log_velocity(law, law.friction(SPEEDS, state, 1.0), state, 1.0)
     # Where friction saturates, at a vanishing force, ln v is as good as ln of the force.
@@ -300,7 +300,7 @@ def test_derivatives_to_the_third_order(v):
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_it_compiles_and_maps():
+def test_the_inverse_works_within_jit_and_vmap():
     law = Viscous(**BASE, drag=1e-3)
     state = (jnp.linspace(-3, 3, 4),)
     friction = jnp.linspace(0.4, 0.6, 4)

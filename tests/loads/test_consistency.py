@@ -100,12 +100,12 @@ class Fails(Skewed):
         (NotScaled, r"scaled\(0\) must be a constant load"),
     ],
 )
-def test_a_load_that_contradicts_itself(load, message: str) -> None:
+def test_a_load_that_contradicts_itself_is_refused(load, message: str) -> None:
     with pytest.raises(InputError, match=message):
         checked_modulation(load(0.5))
 
 
-def test_a_load_is_checked_wherever_it_comes_in() -> None:
+def test_a_load_is_checked_by_every_function_that_takes_it() -> None:
     slider = asp.Slider(asp.materials.load("bureau2000").law("rice-ruina"), spring=2e5, load=7.0)
     with pytest.raises(InputError, match="mean 1"):
         asp.periodic_response(slider, velocity=1e-6, frequency=120.0, modulation=Heavier(0.5))
@@ -115,17 +115,17 @@ def test_a_load_is_checked_wherever_it_comes_in() -> None:
         Programme(CyclicLoading(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
 
 
-def test_a_text_is_no_number() -> None:
+def test_a_field_with_a_text_is_refused() -> None:
     with pytest.raises(InputError, match="numbers for its fields, got '24 %'"):
         checked_modulation(Harmonic("24 %"))
 
 
-def test_arrays_that_do_not_broadcast() -> None:
-    with pytest.raises(InputError, match=r"arrays that broadcast, got shapes \(2,\), \(3,\)"):
+def test_arrays_that_do_not_broadcast_are_refused() -> None:
+    with pytest.raises(InputError, match=r"shapes that broadcast, got \(2,\), \(3,\)"):
         checked_modulation(Skewed(np.full(2, 0.1), np.full(3, 0.1)))
 
 
-def test_one_bad_point_among_many_is_found() -> None:
+def test_one_bad_point_among_many_is_refused() -> None:
     a = np.full(300, 0.1)
     assert checked_modulation(Skewed(a)) is not None
     a[280] = 1.0
@@ -138,7 +138,7 @@ def test_pulses_of_any_width_pass(a: float) -> None:
     assert checked_modulation(Skewed(a)).a == a
 
 
-def test_a_kink_is_no_fault() -> None:
+def test_a_load_with_a_kink_passes() -> None:
     class Triangle(Skewed):
         even = True
 
@@ -155,6 +155,6 @@ def test_a_kink_is_no_fault() -> None:
     assert checked_modulation(Triangle(0.4)).a == 0.4
 
 
-def test_the_package_s_own_loads_pass_as_they_are() -> None:
+def test_loads_of_the_package_pass_unchanged() -> None:
     own = modulated(0.2, load={2: (0.1, 0.3)}, pull=0.1, tilt="5 deg")
     assert checked_modulation(own) is own

@@ -26,7 +26,7 @@ def channels(time):
     return [rng.standard_normal(time.size), np.cos(2 * np.pi * 61.3 * time)]
 
 
-def test_columns_are_what_they_are_called() -> None:
+def test_columns_are_those_of_their_definition() -> None:
     assert abs(BASIS.columns(TIME) - plain(BASIS, TIME)).max() < 1e-11
 
 
@@ -79,7 +79,7 @@ def test_uneven_clocks_are_summed_as_written_down(clock, harmonics, degree) -> N
         assert abs(moments - part @ np.stack(parts, axis=1)).max() < allowed
 
 
-def test_merged_blocks_are_fewer_and_the_same() -> None:
+def test_merged_blocks_have_the_same_sums() -> None:
     found = sums(BASIS, TIME, channels(TIME), blocks=900)
     fewer = merged(found, 50)
     assert 45 <= fewer.count.size <= 55
@@ -87,7 +87,7 @@ def test_merged_blocks_are_fewer_and_the_same() -> None:
         assert a == pytest.approx(b, rel=1e-9, abs=1e-9)
 
 
-def test_pieces_are_the_whole() -> None:
+def test_joined_pieces_have_the_sums_of_the_whole() -> None:
     whole = sums(BASIS, TIME, channels(TIME), blocks=64)
     values = channels(TIME)
     pieces = join(

@@ -25,7 +25,7 @@ CASES = {
 @pytest.mark.parametrize(
     "case", population(["shared by both", *(c for c in CASES if c != "shared by both")])
 )
-def test_intervals_cover_the_truth(truth, red_noise, case) -> None:
+def test_intervals_contain_the_truth_as_often_as_they_state(truth, red_noise, case) -> None:
     n, dt, frequency, rho, of_load, of_force, shared = CASES[case]
     truth = truth.but(frequency=frequency, drift=1e-3)
     time = np.arange(n) * dt
@@ -92,7 +92,7 @@ def test_the_frequency_is_as_good_as_theory_allows(truth) -> None:
     assert np.std(errors) == pytest.approx(bound, rel=0.2)
 
 
-def test_coloured_noise_is_taken_where_it_acts(truth, red_noise) -> None:
+def test_coloured_noise_is_estimated_at_each_harmonic(truth, red_noise) -> None:
     n, dt, rho, sigma = 4000, 1e-3, 0.97, 0.05
     time = np.arange(n) * dt
     load, force = truth.load(time), truth.force(time)
@@ -140,7 +140,7 @@ def test_noise_that_both_channels_share_is_known_to_be_shared(truth) -> None:
     assert both.uncertainty("im1") < 1e-3 * both.uncertainty("epsilon")
 
 
-def test_an_ellipse_that_excludes_zero() -> None:
+def test_uncertainties_and_ellipse_follow_from_the_covariance() -> None:
     covariance = np.diag([1e-8, 4e-8])
     phasor = Phasor(3e-4 + 4e-4j, covariance, 60.0)
     assert phasor.amplitude == pytest.approx(5e-4)

@@ -33,7 +33,7 @@ def check(reading, truth, exact=EXACT) -> None:
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_every_clock(truth, clock) -> None:
+def test_harmonics_are_exact_for_every_clock(truth, clock) -> None:
     time = CLOCKS[clock]
     # Rounding of the stamps themselves: 1e-12 s of a late clock is 1e-9 of a period.
     exact = 1e-9 if clock == "a late start" else EXACT
@@ -41,7 +41,7 @@ def test_every_clock(truth, clock) -> None:
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_the_load_s_own_harmonics_bias_nothing(truth, clock) -> None:
+def test_harmonics_of_the_load_do_not_bias_the_reading(truth, clock) -> None:
     time = CLOCKS[clock]
     truth = truth.but(load_harmonics=(0.01 + 0.02j, -0.004j))
     reading = lock_in(time, truth.load(time), truth.force(time), harmonics=3)
@@ -63,7 +63,7 @@ def test_drift_is_fitted_and_its_mean_kept(truth, detrend, power) -> None:
         assert reading.drift[1, 0] == pytest.approx(0.6 * truth.W0, rel=EXACT)
 
 
-def test_drift_of_both_channels(truth) -> None:
+def test_drift_of_both_channels_is_fitted(truth) -> None:
     u = np.linspace(-1, 1, EVEN.size)
     load, force = truth.load(EVEN) + 0.05 * u, truth.force(EVEN) - 0.1 * u
     reading = lock_in(EVEN, load, force)
@@ -72,13 +72,13 @@ def test_drift_of_both_channels(truth) -> None:
 
 
 @pytest.mark.parametrize("error", [1e-4, -3e-3, 0.04, -0.05])
-def test_a_wrong_start_is_put_right(truth, error) -> None:
+def test_a_wrong_initial_frequency_is_corrected(truth, error) -> None:
     start = truth.frequency * (1 + error)
     reading = lock_in(EVEN, truth.load(EVEN), truth.force(EVEN), frequency=start)
     check(reading, truth)
 
 
-def test_what_an_error_of_the_frequency_costs(truth) -> None:
+def test_an_error_of_the_frequency_lowers_the_amplitude_unless_it_is_fitted(truth) -> None:
     # pi times error times frequency times duration, at the ends of ten seconds: 0.19 rad, and
     # an amplitude lower by sinc of it.
     time = np.arange(10_000) * 1e-3
@@ -90,7 +90,7 @@ def test_what_an_error_of_the_frequency_costs(truth) -> None:
     check(lock_in(time, load, force, frequency=wrong), truth)
 
 
-def test_few_periods_of_a_slow_modulation(truth) -> None:
+def test_few_periods_of_a_slow_modulation_are_read(truth) -> None:
     truth = truth.but(frequency=0.83)
     time = np.arange(900) * 5e-3
     check(lock_in(time, truth.load(time), truth.force(time)), truth)
@@ -127,7 +127,7 @@ def test_a_load_that_is_recorded_as_negative_is_the_same_load(truth) -> None:
         assert other.uncertainty(name) == pytest.approx(one.uncertainty(name), rel=1e-9)
 
 
-def test_plain_averages_would_be_wrong(truth) -> None:
+def test_plain_averages_over_part_periods_are_wrong(truth) -> None:
     # The mistake that the lock-in is for: a window of part periods, multiplied and averaged.
     time = EVEN[:1237]
     force = truth.force(time) / truth.W0
@@ -171,7 +171,7 @@ def test_without_noise_the_truth_is_fitted(truth, detrend, even, draws) -> None:
 
 
 @draws(6, 30)
-def test_harmonics_settle_too(truth, draws) -> None:
+def test_settling_harmonics_are_fitted(truth, draws) -> None:
     """mu1 and mu2 are those that the response settles to, within their uncertainties."""
     off, without = [], []
     for seed in range(draws):

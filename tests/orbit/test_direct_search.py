@@ -66,7 +66,7 @@ def integrated(epsilon):
     return spectrum[0].real, 2 * spectrum[1:]
 
 
-def test_orbits_with_slip_events_are_those_on_which_motions_settle(monkeypatch):
+def test_orbits_with_slip_events_are_the_final_periods_of_transients(monkeypatch):
     strong = np.array([0.55, 0.9, 0.95])
     known = KnownOrbits(strong.size)
     values = DIRECT(at(epsilon=strong), known)
@@ -172,7 +172,7 @@ def test_an_orbit_that_no_motion_settles_on_is_kept_by_the_whole_search_for_the_
     np.testing.assert_allclose(values.harmonics[1], whole.harmonics[0], rtol=1e-8)
 
 
-def test_points_out_of_range_are_named_so():
+def test_points_out_of_range_have_that_outcome():
     values = DIRECT(at(epsilon=np.array([0.2, 0.9995])), KnownOrbits(2))
     assert values.outcome.tolist() == [Outcome.CONVERGED, Outcome.OUT_OF_RANGE]
     assert np.isnan(values.mean_friction[1])

@@ -49,7 +49,7 @@ def similar(triangle):
         ([[0.6, 0.0], [0.0, 0.6]], [0.6, 0.6]),
     ],
 )
-def test_pairs(triangle, expected):
+def test_two_multipliers_are_the_eigenvalues_of_the_matrix(triangle, expected):
     triangle = np.array(triangle)
     found = logs(similar(triangle), np.log(np.linalg.det(triangle)))
     # The root of a small difference: a double eigenvalue is known to half the digits.
@@ -66,14 +66,14 @@ def test_a_pair_separated_by_more_than_round_off():
     np.testing.assert_allclose(from_logs(negative), [-1e5, -1e-30], rtol=1e-11)
 
 
-def test_the_scale_of_the_matrix():
+def test_the_logarithmic_scale_of_the_matrix_adds_to_the_logarithms():
     matrix, scale = similar(np.diag([0.8, 0.1])), 50.0
     found = logs(matrix, np.log(0.08) + 2 * scale, log_scale=scale)
     np.testing.assert_allclose(found.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_overflow_keeps_the_modulus_and_gives_up_the_argument(sign):
+def test_a_multiplier_that_overflows_keeps_its_modulus_and_has_no_argument(sign):
     scale = 800.0
     found = logs(sign * similar(np.diag([0.8, 0.1])), np.log(0.08) + 2 * scale, log_scale=scale)
     kept = without_lost_arguments(found)
@@ -107,11 +107,11 @@ def test_a_determinant_that_the_matrix_cannot_have_gives_no_multipliers():
     np.testing.assert_allclose(logs(50 * matrix, np.log(0.08 * 2500)).real, np.log([40.0, 5.0]))
 
 
-def test_one_state_is_its_determinant():
+def test_the_multiplier_of_one_state_is_the_determinant():
     np.testing.assert_allclose(logs([[0.5]], -3.0), [-3.0])
 
 
-def test_three_states():
+def test_three_multipliers_are_the_eigenvalues_of_the_matrix():
     basis = np.array([[1.0, 0.2, 0.3], [0.0, 1.0, -0.5], [0.4, 0.1, 1.0]])
     block = np.array([[0.3, 0.4, 0.0], [-0.4, 0.3, 0.0], [0.0, 0.0, -0.9]])
     found = from_logs(logs(basis @ block @ np.linalg.inv(basis), 0.0, log_scale=2.0))
@@ -147,7 +147,9 @@ def trace_integral(response, V, epsilon, frequency, elastic):
     ("law", "elastic"),
     [(RiceRuina(**BASE), 0.0), (ElastoPlastic(**BASE, lambda_=LAMBDA), LAMBDA)],
 )
-def test_liouville(law, elastic, V, epsilon, frequency):
+def test_the_product_of_the_multipliers_obeys_liouvilles_formula(
+    law, elastic, V, epsilon, frequency
+):
     response = periodic_response(
         Slider(law, spring=K, load=W0),
         velocity=V,
@@ -173,7 +175,7 @@ def test_no_exponent_where_the_change_of_variables_is_singular(law):
 
 
 @pytest.mark.parametrize("method", ["fourier", "collocation"])
-def test_growth_within_a_fast_period(method):
+def test_multipliers_of_small_modulation_are_those_of_steady_sliding(method):
     # K = Kc/10 and V/(w D0) = 0.1: steady sliding grows fivefold a period.
     A, B, D0, V = BASE["A"], 4 * BASE["A"], BASE["D0"], 1e-5
     stiffness, nu = 0.1 * (B - A), 0.1
@@ -226,7 +228,7 @@ def test_multipliers_beyond_what_a_coarse_mesh_resolves(reference):
     assert np.all((bound > LARGEST_LOG) & (bound <= expected[~resolved, 0].real))
 
 
-def test_threshold_of_stability(reference):
+def test_the_threshold_amplitude_agrees_with_shooting(reference):
     # PHYSICS: modulation stabilises sliding at K/Kc = 0.88; the crossing is near eps = 0.1329.
     slider = Slider(RiceRuina(**BASE), spring=K, load=W0)
 
@@ -259,7 +261,7 @@ def test_threshold_of_stability(reference):
         (complex(np.nan, 0.0), ""),
     ],
 )
-def test_what_a_leading_multiplier_stands_for(multiplier, kind):
+def test_the_mode_is_the_bifurcation_of_the_leading_multiplier(multiplier, kind):
     logs = np.log(np.array([multiplier], dtype=complex))
     assert kind_of_crossing(logs)[0] == kind
 

@@ -10,6 +10,7 @@ from asperity.loads import modulated
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.periodic import periodic_response
 from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import SearchOptions
 from asperity.slider.problem import checked_problem, flatten
 
 A, B, D0, W0, K, V0 = 0.013, 0.026, 4e-7, 7.0, 2e5, 1e-6
@@ -31,7 +32,7 @@ def slider(length=1.0, time=1.0, force=1.0):
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (1e6, 1e3, 1e-2)])
-def test_points_outside_say_which_limit_and_cost_no_search_and_no_other_point(units):
+def test_points_out_of_range_name_the_limit_and_are_not_searched(units):
     length, time, _ = units
     V, epsilon, frequency = np.transpose([row[:3] for row in OUTSIDE] + INSIDE)
     with np.errstate(over="ignore"):
@@ -55,12 +56,12 @@ def test_points_outside_say_which_limit_and_cost_no_search_and_no_other_point(un
     assert counts[-1] == len(V)
 
 
-def test_no_method_is_given_a_point_outside():
+def test_no_method_gets_a_point_out_of_range():
     V, epsilon, frequency = np.transpose([row[:3] for row in OUTSIDE])
     problem, _ = flatten(
         checked_problem(slider(), velocity=V, epsilon=epsilon, frequency=frequency)
     )
-    found = find_orbits(problem, len(V), harmonics=2, phases=0, progress=lambda _: None)
+    found = find_orbits(problem, SearchOptions(2))
     assert (found.method == "").all()
 
 

@@ -212,12 +212,12 @@ def integrate(rates, start, case, scale, stiff, **options):
     return solution
 
 
-def test_the_period_closes(found):
+def test_the_integrated_orbit_closes_after_a_period(found):
     gap = (found.solution.y[:, -1] - found.start) / found.scale
     assert np.abs(gap).max() < 1e-6
 
 
-def test_mean_and_harmonics(found):
+def test_mean_and_harmonics_are_those_of_the_integrated_force(found):
     t = np.arange(SAMPLES) / SAMPLES / found.case.f
     spectrum = np.fft.rfft(found.force(t, found.solution.sol(t))) / SAMPLES
     assert found.response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
@@ -225,7 +225,7 @@ def test_mean_and_harmonics(found):
     np.testing.assert_allclose(found.response.harmonics[:2], 2 * spectrum[1:3], rtol=2e-7)
 
 
-def test_multipliers(found):
+def test_multipliers_are_those_of_the_integrated_monodromy_matrix(found):
     """By complex steps in the start; where SciPy's method must be implicit, by real ones."""
     case, columns = found.case, []
     for j, size in enumerate(found.scale):
@@ -243,7 +243,7 @@ def test_multipliers(found):
 
 
 @pytest.mark.parametrize("elastic", [True, False])
-def test_without_mass_or_damping_the_quasi_static_answer_returns(elastic):
+def test_for_vanishing_mass_and_damping_the_response_is_quasi_static(elastic):
     """Differences vanish in proportion to the mass, and to the damping."""
     drive = {"velocity": 1e-6, "epsilon": 0.24, "frequency": 120.0}
     plain = asp.periodic_response(slider(elastic), **drive)

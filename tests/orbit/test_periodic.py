@@ -129,7 +129,9 @@ def test_every_registered_law_is_tested():
 
 
 @pytest.mark.parametrize("name", BEYOND)
-def test_laws_beyond_the_paper(reference, name):
+def test_other_laws_have_the_mean_harmonics_and_multipliers_of_their_published_equations(
+    reference, name
+):
     """Mean, harmonics and multipliers of their published equations."""
     law, variant = FURTHER[name]
     V, epsilon, frequency = np.transpose(MILD + [STRONG] * (name == "ruina-slip"))[..., None]
@@ -150,16 +152,16 @@ def test_laws_beyond_the_paper(reference, name):
     assert reference.disagreement(response, shot).max() < PROMISED
 
 
-def test_all_points_converge(case):
+def test_every_reference_point_converges(case):
     name, response, _ = case
     assert list(response.result) == ["converged"] * len(POINTS[name])
 
 
-def test_mean_harmonics_and_multipliers_of_the_integration(reference, case):
+def test_mean_harmonics_and_multipliers_are_those_of_the_integration(reference, case):
     assert reference.disagreement(*case[1:]).max() < PROMISED
 
 
-def test_waveform_of_the_integration(case):
+def test_the_waveform_is_that_of_the_integration(case):
     _, response, shot = case
     force = response.waveform[0, :, :: SAMPLES // SEGMENTS]
     swing = np.ptp(force, axis=1, keepdims=True)
@@ -199,7 +201,7 @@ def test_force_follows_slow_modulation_and_lags_fast_modulation_by_a_quarter_per
 
 
 @pytest.mark.parametrize("name", ["rice-ruina", "elasto-plastic"])
-def test_the_two_methods_agree(name):
+def test_the_fast_and_the_robust_method_agree(name):
     random = np.random.default_rng(20260)
     count = 96
 
@@ -231,7 +233,7 @@ def test_the_two_methods_agree(name):
     assert multiplier_error(fast.multipliers, robust.multipliers)[both].max() < PROMISED
 
 
-def test_pulses_too_narrow_for_the_fast_method(reference):
+def test_pulses_too_narrow_for_the_fast_method_are_solved_by_the_robust_one(reference):
     # The force is resolved by its grid, and the slip rate, hence the multipliers, is not quite.
     names = ("mu0", "A", "B", "D0", "K", "W0", "V", "epsilon", "frequency")
     points = [
@@ -269,7 +271,7 @@ class TestShapes:
         # Chunks run until their slowest point is done: more steps may be taken in company.
         assert (error / response.mu1).max() < PROMISED
 
-    def test_axes_broadcast_and_every_point_is_its_own(self):
+    def test_axes_broadcast_and_points_do_not_depend_on_each_other(self):
         V, epsilon = np.array([1e-7, 1e-6]), np.array([0.1, 0.24, 0.3])
         grid = respond("rice-ruina", V[:, None], epsilon, 120.0)
         assert grid.mean_friction.shape == (2, 3)
@@ -415,7 +417,7 @@ def test_bad_input_is_refused_in_one_sentence(changed, said):
     assert not message.endswith(".")
 
 
-def test_a_point_that_fails_says_why_and_costs_no_other():
+def test_a_point_that_fails_has_a_reason_and_does_not_affect_others():
     # K < Kc at a quarter of the stick-slip frequency: the branch turns back at small eps.
     V, epsilon, frequency = np.transpose([FAST[5], (1e-5, 0.24, 1.0), FOLLOWED[0]])
     counts = []

@@ -110,12 +110,12 @@ def test_no_mistake_no_alarm(reference, truth, law):
 
 
 @pytest.mark.parametrize(("law", "mistaken"), MISTAKEN)
-def test_mistaken_laws(reference, truth, law, mistaken):
+def test_planted_mistakes_in_laws_are_detected(reference, truth, law, mistaken):
     errors = reference.disagreement(solve(mistaken), truth[law][1])
     assert caught(errors).all()
 
 
-def test_load_rate_forgotten_in_the_elastic_force(reference, truth, monkeypatch):
+def test_a_forgotten_load_rate_in_the_elastic_force_is_detected(reference, truth, monkeypatch):
     original = QuasiStatic.rates
 
     def forgetful(self, Y, at):
@@ -141,7 +141,7 @@ def test_load_rate_forgotten_in_the_elastic_force(reference, truth, monkeypatch)
         ("mean_friction", lambda m: m * (1 + 3e-8)),
     ],
 )
-def test_mistaken_readings(reference, truth, field, change):
+def test_planted_mistakes_in_results_are_detected(reference, truth, field, change):
     response, expected = truth[RiceRuina]
     wrong = dataclasses.replace(response, **{field: change(getattr(response, field))})
     assert (reference.disagreement(wrong, expected).max(axis=1) > PROMISED).all()

@@ -59,7 +59,7 @@ def ageing_over_lengths(count):
 
 
 @pytest.mark.parametrize("states", [1, 2, 3, 5])
-def test_laws_of_as_many_states_against_scipy(states):
+def test_laws_of_any_number_of_states_have_the_orbits_of_scipy(states):
     """The spring's elongation and the law's states, in the equations written out once more."""
     lengths, epsilon = np.arange(1, states), 0.2
     slider = asp.Slider(
@@ -165,7 +165,7 @@ def test_a_random_orbit_obeys_the_equations(law, seed):
 
 
 @pytest.mark.parametrize("planted", ["V", "omega"])
-def test_an_orbit_of_other_equations_is_seen(planted):
+def test_an_orbit_of_equations_changed_by_a_thousandth_is_detected(planted):
     found = random_orbit("rice-ruina", 0)
     other = {planted: 1.001 * getattr(found.motion, planted)}
     with pytest.raises(AssertionError):

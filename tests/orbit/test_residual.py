@@ -38,7 +38,7 @@ def answers(batch):
     return rows, r.waveform[:, rows], r.mean_friction[rows], r.harmonics[rows]
 
 
-def test_most_of_the_range_converges(batch):
+def test_most_points_of_the_range_converge(batch):
     # Without a periodic orbit at K < Kc there is nothing to converge to; that is under a tenth.
     assert batch.response.converged.mean() > 0.9
 
@@ -50,7 +50,7 @@ def test_every_converged_point_obeys_the_equations(batch):
     assert resolved.mean() > 0.97
 
 
-def test_numbers_of_a_point_that_converged_are_given(batch):
+def test_a_point_that_converged_has_numbers(batch):
     rows = batch.response.converged
     logs = batch.response.log_multipliers[rows].real
     assert np.isfinite(batch.response.harmonics[rows]).all()
@@ -59,7 +59,7 @@ def test_numbers_of_a_point_that_converged_are_given(batch):
     assert (np.isfinite(logs[:, 1]) | (logs[:, 0] > 709)).all()
 
 
-def test_numbers_of_a_point_that_failed_are_not_given(batch):
+def test_a_point_that_failed_has_no_numbers(batch):
     failed = ~batch.response.converged
     assert failed[-1]
     assert np.isnan(batch.response.mean_friction[failed]).all()
@@ -97,7 +97,7 @@ def lifted(waveform, mean, harmonics):
 
 
 @pytest.mark.parametrize("planted", [shifted, swollen, too_fast, conjugated, lifted])
-def test_planted_wrong_answers_are_caught(batch, planted):
+def test_planted_wrong_responses_are_detected(batch, planted):
     rows, waveform, mean, harmonics = answers(batch)
     modulated = (batch.numbers["epsilon"][rows] > 0.05) & (np.ptp(waveform[0], axis=1) > 1e-9)
     rows, waveform = rows[modulated], waveform[:, modulated]

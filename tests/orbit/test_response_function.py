@@ -86,7 +86,7 @@ def fast_model(law):
         [*WITH_MULTIPLIERS, *(n for n in RATE_DEPENDENT if n not in WITH_MULTIPLIERS)], short=3
     ),
 )
-def test_derivatives_of_every_law(law):
+def test_derivatives_of_every_law_agree_with_differences(law):
     assert worst_difference(fast_model(law), point(law)) < DIFFERENCES
 
 
@@ -119,7 +119,7 @@ class TestElastoPlastic:
     def arrays(self):
         return {n: v * np.ones(4) for n, v in self.parameters.items()}
 
-    def test_values_of_the_periodic_response(self):
+    def test_values_are_those_of_periodic_response(self):
         law = ElastoPlastic(
             **{f"{n}_" if n == "lambda" else n: BASE[n] for n in law_parameters(ElastoPlastic)}
         )
@@ -164,7 +164,7 @@ class TestElastoPlastic:
         along = sum((np.asarray(gradient[n]) * tangents[n]).sum() for n in parameters)
         assert along == pytest.approx((cotangent * np.asarray(moved)).sum().real, rel=ROUND_OFF)
 
-    def test_second_derivatives(self):
+    def test_second_derivatives_agree_with_differences(self):
         @jax.jit
         def along(epsilon, direction):
             """Gradient of the sum of the means, and its change along a direction."""
@@ -185,7 +185,7 @@ class TestElastoPlastic:
         expected = (4 * fine - coarse) / (3 * epsilon)
         np.testing.assert_allclose(np.diag(hessian), expected, rtol=1e-7)
 
-    def test_new_numbers_compile_nothing(self):
+    def test_other_values_of_parameters_compile_nothing(self):
         self.model(self.parameters)
         self.model.value_and_jacobian(self.parameters)
         count = 0
@@ -204,7 +204,7 @@ class TestElastoPlastic:
             jax.monitoring.unregister_event_duration_listener(listen)
         assert count == 0
 
-    def test_fewer_points_are_filled_up_and_give_the_same(self):
+    def test_padded_calls_give_the_same_values(self):
         wide = response_function("elasto-plastic", least_points=5)
         assert [wide.compiled_points(n) for n in (1, 8, 9)] == [8, 8, 16]
         few = {n: v[:3] if np.ndim(v) else v for n, v in self.parameters.items()}
@@ -212,7 +212,7 @@ class TestElastoPlastic:
         np.testing.assert_allclose(force(found), force(expected), rtol=ROUND_OFF)
         assert found.mean_friction.shape == (3,)
 
-    def test_point_that_is_not_found_is_not_a_number_and_harms_no_other(self):
+    def test_a_point_without_an_orbit_is_nan_and_does_not_affect_others(self):
         # Slow modulation, which the fast method leaves to the search.
         moved = self.parameters | {"frequency": np.array([120.0, 0.01, 120.0, 120.0])}
         values, jacobian = self.model.value_and_jacobian(moved)
@@ -223,7 +223,7 @@ class TestElastoPlastic:
             assert np.isfinite(np.delete(numbers.mean_friction, 1)).all()
             assert np.isfinite(np.delete(numbers.harmonics, 1, axis=0)).all()
 
-    def test_traced_value_against_its_rule(self):
+    def test_a_traced_value_that_breaks_its_rule_is_invalid(self):
         moved = self.arrays() | {"A": np.array([0.013, -0.013, 0.013, 0.013])}
         outcome = jax.jit(lambda p: self.plain(p).outcome)(moved)
         found, invalid = Outcome.CONVERGED, Outcome.INVALID
@@ -248,7 +248,7 @@ class TestElastoPlastic:
         with pytest.raises(InputError, match="got none for K, epsilon"):
             self.model(given)
 
-    def test_numbers_give_numbers(self):
+    def test_parameters_without_axes_give_values_without_axes(self):
         values = self.model(self.parameters | {"V": 1e-6, "epsilon": 0.24})
         assert values.mean_friction.shape == ()
         assert values.harmonics.shape == (2,)
@@ -274,7 +274,7 @@ class TestInertiaAndDamping:
         parameters = point(law, eta=2e4)
         assert worst_difference(self.model(law), parameters, [*NAMES, "M", "eta"]) < DIFFERENCES
 
-    def test_values_of_the_periodic_response(self, law):
+    def test_values_are_those_of_periodic_response(self, law):
         # Damping and harmonics for which other tests have the methods compiled.
         eta, elastic = 500.0, law == "elasto-plastic"
         values, _ = self.model(law).value_and_jacobian(point(law, eta=eta))
@@ -296,7 +296,7 @@ class TestInertiaAndDamping:
 DAMPED = response_function("rice-ruina", radiation_damping=True, search=False)
 
 
-def test_derivatives_with_damping_alone():
+def test_derivatives_with_damping_alone_agree_with_differences():
     assert worst_difference(DAMPED, point("rice-ruina", eta=2e4), [*NAMES, "eta"]) < DIFFERENCES
 
 

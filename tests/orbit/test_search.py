@@ -34,7 +34,7 @@ def points(stiffness, frequency, epsilon):
         (Outcome.NOT_RESOLVED, 3e-8, 0.4),
     ],
 )
-def test_what_nothing_could_hold_is_called_too_unstable(lost, share, said):
+def test_failed_points_with_large_growth_are_too_unstable(lost, share, said):
     # D0/V = 4 ms and a period of 10 s: far below Kc disturbances grow by far more than e^15.
     problem = points(np.array([2.0, 2.0, 0.1]) * KC, 0.1, 0.4)
     solution = Solution.empty(2, 3, OPTIONS)
@@ -47,7 +47,7 @@ def test_what_nothing_could_hold_is_called_too_unstable(lost, share, said):
     assert solution.detail[0] == share
 
 
-def test_a_branch_may_run_ahead_a_little_where_it_is_about_to_arrive():
+def test_a_branch_close_to_arriving_may_exceed_the_runaway_limit_a_little():
     fastest = RUNAWAY + np.array([0.2, 0.2, 0.9, -0.1])
     still = continues(np.array([0.995, 0.9, 0.995, 0.9]), fastest)
     assert still.tolist() == [True, False, False, True]
@@ -75,7 +75,7 @@ class Stub(Method):
 
 def search(*methods):
     problem = points(np.array([2.0, 3.0]) * KC, 40.0, 0.6)
-    return find_orbits(problem, 2, harmonics=1, phases=0, progress=lambda _: None, methods=methods)
+    return find_orbits(problem, OPTIONS, methods)
 
 
 def test_a_failed_method_keeps_the_earlier_outcome():
@@ -92,7 +92,7 @@ def test_points_go_from_method_to_method_until_one_solves_them():
     assert solution.method.tolist() == ["stub", "stub"]
 
 
-def test_a_point_whose_branch_was_not_followed_is_not_said_to_have_one():
+def test_a_point_whose_branch_was_not_followed_has_no_outcome_of_a_branch():
     """Slow modulation, for which the fast method alone does not iterate."""
     law = asp.laws.RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
     response = asp.periodic_response(

@@ -91,7 +91,7 @@ def found(request):
     return request.param, result
 
 
-def test_names_and_shapes(found):
+def test_derivatives_have_the_names_and_shapes_of_the_parameters(found):
     name, result = found
     expected = (*law_parameters(LAWS[name][0]), "K", "W0", "M", "V", "frequency", "epsilon")
     assert result.parameters == expected
@@ -102,7 +102,7 @@ def test_names_and_shapes(found):
 
 
 @pytest.mark.parametrize(("found", "row"), CASES, indirect=["found"])
-def test_every_output_by_every_parameter(found, row):
+def test_every_derivative_agrees_with_differences(found, row):
     name, result = found
     numbers = numbers_of(name, DRIVES[name][row])
     expected = differences(name, DRIVES[name][row])
@@ -117,14 +117,14 @@ def test_every_output_by_every_parameter(found, row):
     assert worst.max() < DIFFERENCES, dict(zip(numbers, worst.max(1), strict=True))
 
 
-def test_mass_changes_nothing_without_inertia(found):
+def test_derivatives_to_the_mass_vanish_without_inertia(found):
     _, result = found
     at = result.parameters.index("M")
     for output in (*SCALARS, "log_multipliers"):
         assert not getattr(result, output)[..., at].any()
 
 
-def test_dimensions_of_the_derivatives(found):
+def test_derivatives_obey_scaling_of_length_time_and_force(found):
     # F/W0 has no unit: lengths, times and forces may be scaled without any effect.
     name, result = found
     numbers = numbers_of(name, np.transpose(DRIVES[name]))
@@ -145,7 +145,7 @@ def test_dimensions_of_the_derivatives(found):
             assert (np.abs(terms.sum(0)) < 1e-9 * np.abs(terms).max(0)).all()
 
 
-def test_small_modulation(found):
+def test_derivatives_at_small_modulation_are_those_of_perturbation_theory(found):
     name, _ = found
     epsilon = 1e-4
     numbers = numbers_of(name, (1e-5, 120.0, epsilon))

@@ -129,7 +129,7 @@ def test_threshold_makes_the_determinant_vanish():
     assert cf.critical_stiffness_inertial(p) > cf.critical_stiffness(p)
 
 
-def test_numbers_of_the_paper():
+def test_closed_forms_give_the_numbers_of_the_paper():
     """Kc, omega_c = 25 1/s at 10 um/s, omega_0 = 360 1/s (353.6 with M = 1.6 kg), mu/A."""
     p = central(V=1e-5, M=1.6)
     np.testing.assert_allclose(cf.critical_stiffness(p), 2.275e5, rtol=1e-12)
@@ -150,7 +150,7 @@ def test_inertia_is_negligible_where_the_text_says_so():
     assert abs(ratio[1] - 1) > 0.4
 
 
-def test_age_to_velocity_ratio():
+def test_the_age_to_velocity_ratio_is_that_of_the_exact_response():
     """From the exact response; the printed form holds only where (B - A)/A = 1."""
     for p in (central(), central(omega=3.0), central(B=0.052)):
         response = ageing_response(p)
@@ -276,7 +276,7 @@ def limit(name, V, epsilon):
 
 @pytest.mark.parametrize("V", [1e-6, 1e-5])
 @pytest.mark.parametrize("name", LAWS)
-def test_mean_of_the_scalar_equation(name, V):
+def test_the_averaged_mean_solves_the_scalar_equation(name, V):
     response = averaged_response(Slider(LAWS[name], spring=K, load=W0), velocity=V, epsilon=EPSILON)
     assert response.converged.all()
     expected = [limit(name, V, e)[1] for e in EPSILON]
@@ -303,7 +303,7 @@ def test_elastic_asperities_modulate_the_force_at_any_frequency():
     np.testing.assert_allclose(response.phase1, 0.0, atol=1e-4)
 
 
-def test_plateau_of_the_first_harmonic():
+def test_the_first_harmonic_has_its_plateau():
     V = np.array([1e-7, 1e-6, 1e-5])
     law = ElastoPlastic(**BASE | {"B": A}, lambda_=LAMBDA)  # mu_ss the same at any velocity
     response = averaged_response(Slider(law, spring=K, load=W0), velocity=V, epsilon=0.005)
@@ -314,7 +314,7 @@ def test_plateau_of_the_first_harmonic():
 
 # How well the limit stands in for 120 Hz, from eps = 0.24 up; three times worse at eps = 0.05.
 @pytest.mark.parametrize(("V", "known"), [(1e-6, 2e-6), (1e-5, 2e-4)])
-def test_drop_at_120_hz(V, known):
+def test_the_averaged_limit_has_the_drop_at_120_hz(V, known):
     slider = Slider(LAWS["rice-ruina"], spring=K, load=W0)
     full = periodic_response(slider, velocity=V, epsilon=EPSILON[1:3], frequency=120.0)
     fast = averaged_response(slider, velocity=V, epsilon=EPSILON[1:3])

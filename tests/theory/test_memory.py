@@ -27,13 +27,13 @@ def test_states_relax_over_the_memory_length(name):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_the_critical_stiffness_of_the_three_laws(name):
+def test_the_critical_stiffness_of_three_laws_is_the_closed_form(name):
     assert memory.critical_stiffness(law(name), 2e-6) == pytest.approx((B - A) / D0, rel=1e-9)
     assert memory.critical_stiffness(law(name, A=0.01), 2e-6) == 0
     assert closed_forms.critical_stiffness_form(name, elastic=False, inertia=False)
 
 
-def test_the_critical_stiffness_of_other_laws():
+def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
     """Elastic asperities by their closed forms; of two states as the larger of two alike."""
     lengths = {"D0": D0, "lambda_": 2e-6}
     small = closed_forms.SmallModulation(
@@ -50,7 +50,7 @@ def test_the_critical_stiffness_of_other_laws():
 
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("ratio", [0.01, 0.5, 10.0, 1e4])
-def test_the_state_after_a_step(name, ratio):
+def test_the_state_after_a_step_is_the_integrated_one(name, ratio):
     V = ratio * V0
 
     def rate(u, y):
@@ -70,7 +70,7 @@ def test_the_slip_laws_state_is_odd_in_the_step():
 
 
 @pytest.mark.parametrize("k", [2e3, 7.4e4])
-def test_a_long_hold_of_the_ageing_law(k):
+def test_healing_after_a_long_hold_is_the_integrated_one(k):
     """The next order makes the error several times smaller, and it falls with the hold time."""
     times = np.array([1e4, 1e7])
     interface = Interface("rice-ruina", A, B, D0, k)
@@ -90,7 +90,7 @@ def test_the_reload_slip_has_no_gap_at_equal_lengths():
     assert np.ptp(np.asarray(at.healing)) < 1e-6
 
 
-def test_the_limits_of_the_healing_rate():
+def test_the_healing_rate_tends_to_its_limit():
     """Slopes of long holds by SciPy: at the limit, near it, and far from it, as the table says."""
 
     def rate(name, time, k=2e3, **changes):
@@ -108,7 +108,7 @@ def test_the_limits_of_the_healing_rate():
     assert rate("ruina-slip", 1e11, k=5e2, A=0.012) == pytest.approx(1, abs=0.1)
 
 
-def test_what_has_no_closed_form_is_said():
+def test_laws_without_a_closed_form_are_refused():
     with pytest.raises(InputError, match="rice-ruina, ruina-slip or perrin"):
         memory.healing_rate_limit(law("regularised"))
     with pytest.raises(InputError, match="ageing law"):

@@ -101,7 +101,7 @@ def test_equals_an_integration_of_the_published_equations(reference, name, V, fr
         ("elasto-plastic-age", {"ageing": "slider"}),
     ],
 )
-def test_integration_tells_mistaken_equations_apart(reference, name, mistake):
+def test_the_integration_detects_planted_mistakes(reference, name, mistake):
     V, frequency = 1e-5, 20.0
     printed = reference.Printed(V=V, frequency=frequency, **{**LAWS[name][1], **mistake})
     difference = coefficients_at(name, V, frequency) / reference.expansion(printed) - 1
@@ -140,7 +140,7 @@ class TwoAges(RiceRuina):
         return 2 * super().steady_state(v)
 
 
-def test_a_law_with_more_states_than_two():
+def test_a_law_with_three_states_is_expanded_too():
     point = {"velocity": np.resize([1e-6, 1e-5], POINTS), "frequency": 7.0}
     two = perturbation_response(Slider(TwoAges(**BASE), spring=K, load=W0), **point)
     one = perturbation_response(Slider(RiceRuina(**BASE), spring=K, load=W0), **point)

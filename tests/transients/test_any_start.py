@@ -66,7 +66,7 @@ def assert_ended(slider, programme, **options):
 @pytest.mark.parametrize(
     "law", population([*SUITE, *(name for name in LAWS if name not in SUITE)], short=len(SUITE))
 )
-def test_any_start_ends(law):
+def test_any_start_ends_with_numbers_or_a_reason(law):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD).states[0]
     for states in starts(len(steady), 8, LAWS.index(law), steady):
@@ -80,7 +80,7 @@ def test_any_start_ends(law):
         ("elasto-plastic", {"inertia": True}), ("regularised", {"inertia": True}),
     ],
 )  # fmt: skip
-def test_any_start_ends_with_inertia_or_damping(law, options):
+def test_any_start_with_inertia_or_damping_ends_with_numbers_or_a_reason(law, options):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD, **options).states[0]
     for states in starts(len(steady), 6, 7, steady):
@@ -95,7 +95,7 @@ def test_states_beyond_the_exponential_are_refused(states):
         asp.transient(slider_of("rice-ruina"), HOLD, initial=states)
 
 
-def test_a_force_that_the_law_does_not_know_is_refused():
+def test_a_force_at_which_the_law_is_not_defined_is_refused():
     for law in ("rice-ruina", "elasto-plastic", "ruina-slip"):
         with pytest.raises(asp.InputError, match="take a law that is, such as 'regularised'"):
             asp.transient(slider_of(law), HOLD, initial=[-0.2, 0.0])
@@ -131,7 +131,7 @@ def test_far_from_steady_sliding_the_motion_is_that_of_scipy(seed):
     assert found.states[:, 1] == pytest.approx(exact.y[1], rel=1e-6, abs=1e-7)
 
 
-def test_compiled_steps_return_however_many_are_rejected(monkeypatch):
+def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
     """A trial that is never accurate, and one whose length is no number."""
     import jax
     import jax.numpy as jnp

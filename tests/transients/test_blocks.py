@@ -47,7 +47,7 @@ def test_blocks_are_the_whole_in_pieces(slider, sampling) -> None:
     assert np.all(np.diff(whole.time) > 0)
 
 
-def test_samples_lie_where_they_were_asked_for(slider) -> None:
+def test_samples_lie_at_the_requested_times(slider) -> None:
     found = transient(slider, PROGRAMME, sampling="1 kHz")
     np.testing.assert_array_equal(found.time, np.arange(1001) / 1000)
     np.testing.assert_allclose(found.load, PROGRAMME.load(found.time), rtol=1e-13)
@@ -55,7 +55,7 @@ def test_samples_lie_where_they_were_asked_for(slider) -> None:
     np.testing.assert_array_equal(transient(slider, PROGRAMME, sampling=times).time, times)
 
 
-def test_an_interrupted_run_goes_on_where_it_was(slider) -> None:
+def test_an_interrupted_run_is_resumed_from_its_checkpoint(slider) -> None:
     whole = transient(slider, PROGRAMME, sampling="1 kHz")
     reported = []
 
@@ -164,7 +164,9 @@ def test_a_short_motion_resolves_its_ringing(ringing) -> None:
     ],
     ids=["slide", "ramp of the load", "ramp of the velocity"],
 )
-def test_thirty_million_years(physical, mass, step, load, velocity) -> None:
+def test_thirty_million_years_of_slow_changes_are_steady_sliding(
+    physical, mass, step, load, velocity
+) -> None:
     """So slow that it is steady sliding at every instant."""
     experiment = physical.Experiment(M=mass, lambda_=6.2e-7)
     programme = Programme(step, load=W0, velocity=V)
@@ -176,7 +178,7 @@ def test_thirty_million_years(physical, mass, step, load, velocity) -> None:
     assert found.displacement[-1] == pytest.approx(way, rel=1e-9)
 
 
-def test_hardly_any_mass_is_like_none(physical) -> None:
+def test_a_tiny_mass_is_like_no_mass(physical) -> None:
     """Steps far beyond the limit of stability are refused however small their estimated error."""
     programme = Programme(Slide(1.0), Hold(10.0), load=W0, velocity=V)
     times = np.linspace(1.1, 11, 10)
@@ -190,7 +192,7 @@ def test_hardly_any_mass_is_like_none(physical) -> None:
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-7)
 
 
-def test_an_end_out_of_reach_is_an_outcome(ringing) -> None:
+def test_an_end_that_needs_too_many_steps_terminates_the_run(ringing) -> None:
     programme = Programme(Modulate(AGES, 0.2, 120.0), load=W0, velocity=V)
     found = transient(ringing.slider, programme, sampling=[0.0, 1.0], inertia=True)
     assert found.termination.kind == "too many steps"
@@ -200,7 +202,7 @@ def test_an_end_out_of_reach_is_an_outcome(ringing) -> None:
 
 
 @pytest.mark.parametrize("rise", [0.0, 0.9 * AGES], ids=["grazing", "rising"])
-def test_the_loss_of_contact_is_not_searched_for_ages(ringing, rise) -> None:
+def test_the_search_for_loss_of_contact_is_short_in_a_long_step(ringing, rise) -> None:
     """A modulation by 100 % grazes zero between the instants of any search."""
     epsilon, phase = (1.5, 0.0) if rise else (1.0, 0.3)
     programme = Programme(
@@ -217,7 +219,7 @@ def test_more_rows_than_memory_holds_are_refused_at_once(ringing) -> None:
             transient(ringing.slider, programme, sampling=float(rate))
 
 
-def test_a_limit_of_steps_is_kept(ringing) -> None:
+def test_the_largest_number_of_steps_is_obeyed(ringing) -> None:
     programme = Programme(Slide(0.2), Modulate(2.0, 0.2, 120.0), load=W0, velocity=V)
     options = {"sampling": [0.0], "inertia": True}
     whole = transient(ringing.slider, programme, **options)

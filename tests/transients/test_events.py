@@ -16,7 +16,7 @@ def finite(found) -> bool:
     return all(np.isfinite(c).all() for c in columns)
 
 
-def test_stick_slip_with_inertia(physical) -> None:
+def test_stick_slip_with_inertia_agrees_with_scipy(physical) -> None:
     """Period and range of the force, over cycles of slip at a thousand times the drive."""
     p = physical.Experiment(K=1e5, M=1.6)
     start, V = p.steady(1e-5, 7.0), 1.1e-5
@@ -123,7 +123,7 @@ def test_reversal_is_named_where_the_law_has_none(physical) -> None:
     assert finite(found)
 
 
-def test_steady_sliding_is_noticed(physical) -> None:
+def test_steady_sliding_is_an_event(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("2 s"), Slide("30 s", "3 um/s"), **START)
     found = transient(p.slider, programme, steady_tolerance=1e-4, sampling="100 Hz")

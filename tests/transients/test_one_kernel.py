@@ -29,10 +29,10 @@ class Sorting(asp.laws.RiceRuina):
         return jnp.sort(jnp.stack([found, found]), axis=0)[0]
 
 
-def goes_well(law: asp.laws.Law, programme: Programme, **options: Any) -> bool:
+def compiles_to_one(law: asp.laws.Law, programme: Programme, **options: Any) -> bool:
     slider = asp.Slider(law, spring=1e6, load=7.0, mass=1.6)
     motion = checked_integration(slider, programme, **options).motion
-    return one_kernel._goes_well(SegmentEquations(motion, programme.segments[0]))
+    return one_kernel._compiles_to_one(SegmentEquations(motion, programme.segments[0]))
 
 
 @pytest.mark.parametrize("options", [{}, {"inertia": True}], ids=["quasi-static", "inertial"])
@@ -46,19 +46,19 @@ def goes_well(law: asp.laws.Law, programme: Programme, **options: Any) -> bool:
     ],
     ids=lambda law: law.name,
 )
-def test_laws_in_closed_form_are_one_kernel(law: asp.laws.Law, options: dict) -> None:
-    assert goes_well(law, MODULATED, **options)
+def test_laws_in_closed_form_are_compiled_to_one_kernel(law: asp.laws.Law, options: dict) -> None:
+    assert compiles_to_one(law, MODULATED, **options)
 
 
-def test_tables_loops_and_sorting_are_not() -> None:
+def test_tables_loops_and_sorting_are_not_compiled_to_one_kernel() -> None:
     law = asp.laws.RiceRuina(**COMMON)
     t = np.linspace(0, 1, 5)
-    assert not goes_well(law, Programme(Follow(t, 7 + t), **START))
-    assert not goes_well(law, MODULATED, radiation_damping=1e4)  # Newton's method within
-    assert not goes_well(Sorting(**COMMON), MODULATED)
+    assert not compiles_to_one(law, Programme(Follow(t, 7 + t), **START))
+    assert not compiles_to_one(law, MODULATED, radiation_damping=1e4)  # Newton's method within
+    assert not compiles_to_one(Sorting(**COMMON), MODULATED)
 
 
-def test_a_law_that_is_none_gives_what_its_twin_gives() -> None:
+def test_a_law_that_is_not_one_kernel_gives_the_same_motion() -> None:
     forces = [
         transient(asp.Slider(law(**COMMON), spring=1e6, load=7.0), MODULATED, sampling=1e3).force
         for law in (asp.laws.RiceRuina, Sorting)

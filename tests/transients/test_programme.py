@@ -91,7 +91,7 @@ PERIODIC = Periodic(load=((0.2, 0.0), (0.0, 0.1)), shear=((0.05, 0.0),), pull=((
     ],
     ids=lambda step: type(step).__name__,
 )
-def test_rates_and_ways_belong_to_values(step) -> None:
+def test_slopes_and_positions_are_derivatives_and_integrals_of_the_values(step) -> None:
     (segment,) = Programme(step, **START).segments
     h = 1e-6
     for t in (0.0137, 0.1771, 0.3313):

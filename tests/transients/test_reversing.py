@@ -43,7 +43,7 @@ def scipy_force(mu0: float, phases: list[tuple], eta: float = 0.0) -> tuple[np.n
     return np.concatenate(times), np.concatenate(forces)
 
 
-def test_a_hold_of_seconds_and_sliding_again() -> None:
+def test_a_hold_at_rest_agrees_with_scipy() -> None:
     times, force = scipy_force(0.5, [(0.2, W, V), (2.0, W, 0.0), (0.5, W, V)])
     programme = Programme(Slide(0.2, V), Hold(2.0), Slide(0.5, V), **START)
     found = transient(slider(0.5), programme, sampling=times, inertia=True)
@@ -54,7 +54,7 @@ def test_a_hold_of_seconds_and_sliding_again() -> None:
 
 
 @pytest.mark.parametrize("eta", [None, 2e3])
-def test_reversal_there_and_back_and_a_step_of_the_load(eta: float | None) -> None:
+def test_reversals_and_a_step_of_the_load_agree_with_scipy(eta: float | None) -> None:
     # So little friction that SciPy's v can pass through rest.
     phases = [(0.1, W, V), (0.6, W, -V), (0.3, 9.0, -V), (0.6, 9.0, V)]
     times, force = scipy_force(0.1, phases, eta or 0.0)
@@ -83,7 +83,7 @@ def test_friction_of_the_paper_reversed_is_friction_mirrored() -> None:
     assert reversal == pytest.approx(0.5 + steady / (K * V), rel=0.02)
 
 
-def test_a_start_from_rest_without_force() -> None:
+def test_a_slider_at_rest_sticks_until_the_spring_is_loaded() -> None:
     # Stuck, the spring takes up all of the drive.
     programme = Programme(Slide(1.5, V), load=W, velocity=0.0)
     found = transient(slider(0.5), programme, initial=[0.0, 0.0, 0.0], inertia=True, sampling=100.0)
@@ -93,7 +93,7 @@ def test_a_start_from_rest_without_force() -> None:
     assert found.velocity[-1] == pytest.approx(V, rel=0.05)
 
 
-def test_a_law_with_a_jump_at_rest_stops_there_and_names_the_way_out() -> None:
+def test_a_law_with_a_jump_at_rest_ends_the_run_with_advice() -> None:
     law = asp.laws.CutOff(mu0=0.5, A=A, B=B, D0=D0, V0=V0, V1=1e-8, V2=1e-2)
     programme = Programme(Slide(0.2, V), Slide(3.0, -V), **START)
     found = transient(

@@ -59,7 +59,7 @@ def mixed_phases(physical) -> list:
         ("elasto-plastic", {"lambda_": LAMBDA, "eta": 1e3}, "LSODA"),
     ],
 )
-def test_steps_holds_and_ramps(physical, law, more, method) -> None:
+def test_steps_holds_and_ramps_agree_with_scipy(physical, law, more, method) -> None:
     p = physical.Experiment(**more)
     phases, programme = mixed_phases(physical), MIXED
     if p.M and p.lambda_:  # resonance at 400 Hz: SciPy takes minutes for the whole of it
@@ -74,7 +74,7 @@ def test_steps_holds_and_ramps(physical, law, more, method) -> None:
     np.testing.assert_allclose(found.displacement, true.x, rtol=0, atol=CLOSE * p.W0 / p.K)
 
 
-def test_modulation_switched_on(physical) -> None:
+def test_a_modulation_that_begins_suddenly_agrees_with_scipy(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Modulate("0.2 s", 0.24, "120 Hz"), **START)
     times = np.linspace(0, 0.2, 1001)
@@ -88,7 +88,7 @@ def test_modulation_switched_on(physical) -> None:
     assert found.displacement[0] < 0
 
 
-def test_a_recorded_load(physical) -> None:
+def test_a_recorded_load_agrees_with_scipy(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     t = np.linspace(0, 0.1, 9)
     W = 7 + np.sin(30 * t)
@@ -219,7 +219,7 @@ def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
     assert found.velocity[-1] < 0 < found.velocity[0]
 
 
-def test_it_goes_on_from_given_states(physical) -> None:
+def test_a_run_continues_from_the_states_of_another(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     whole = transient(p.slider, MIXED, sampling=[0.4, 0.5, 1.0, 1.5])
     rest = Programme(Slide("1 s"), load="9 N", velocity="1 um/s")
@@ -227,7 +227,7 @@ def test_it_goes_on_from_given_states(physical) -> None:
     np.testing.assert_allclose(again.force, whole.force[1:], rtol=1e-9)
 
 
-def test_the_dataset_says_everything(physical) -> None:
+def test_the_dataset_has_units_events_and_provenance(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     found = transient(p.slider, MIXED, sampling="10 Hz")
     assert isinstance(found, Trajectory)
@@ -244,7 +244,7 @@ def test_the_dataset_says_everything(physical) -> None:
     assert data.attrs["relative_tolerance"] == 1e-9
 
 
-def test_of_its_file_is_read_what_an_instrument_records(physical, tmp_path) -> None:
+def test_the_file_of_a_trajectory_is_read_as_a_recording(physical, tmp_path) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     steady = Programme(Slide("2 s"), load="7 N", velocity="3 um/s")
     transient(p.slider, steady, sampling="10 Hz").to_dataset().to_netcdf(
@@ -271,12 +271,12 @@ def test_of_its_file_is_read_what_an_instrument_records(physical, tmp_path) -> N
         ({"inertia": True}, "slider.M must be positive"),
     ],
 )
-def test_bad_questions_are_named(physical, options, words) -> None:
+def test_bad_arguments_are_refused_in_one_sentence(physical, options, words) -> None:
     with pytest.raises(InputError, match=words):
         transient(physical.Experiment(lambda_=LAMBDA).slider, MIXED, **options)
 
 
-def test_questions_without_an_answer_are_named(physical) -> None:
+def test_arguments_without_a_solution_are_refused(physical) -> None:
     rice = physical.Experiment().slider
     with pytest.raises(InputError, match=r"programme.velocity must be positive for a start"):
         transient(rice, Programme(Hold("1 s"), load=7.0, velocity=0.0))

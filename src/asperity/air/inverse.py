@@ -1,9 +1,9 @@
 """The patch radius, or the gap, that gives a measured eps_eff/eps.
 
-Eq. (40) of Bureau, Baumberger and Caroli (2000) read backwards. Below the vacuum resonance
-the fraction falls with R and rises with h0; above it the layer's stiffness may bring the slider
-back to resonance, and then two radii give one fraction. The bracket is therefore cut at every
-extremum and each monotone piece searched.
+Eq. (40) of Bureau, Baumberger and Caroli (2000), solved for R or h0. Below the vacuum resonance the
+fraction falls with R and rises with h0. Above it the stiffness of the layer may bring the slider
+back to resonance, and then two radii give one fraction. The bracket is therefore divided at every
+extremum, and each monotone part is searched.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from asperity.errors import InputError, require
 _SCAN = 513
 #: Differences of ln(eps_eff/eps) below this are round-off on a plateau, not an extremum.
 _FLAT = 1e-12
-#: A root must give the fraction back to this relative accuracy: a jump of "free-molecular"
-#: changes sign without being one.
+#: At a root the fraction must agree with the measured one to this relative accuracy: at a jump of
+#: "free-molecular" the difference changes sign without a root.
 _CLOSE = 1e-8
 
 

@@ -18,10 +18,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.air.normal_contact import Real, as_real, check_shapes
+from asperity.air.normal_contact import Real, as_real
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError
-from asperity.parameters.arguments import one_of
+from asperity.parameters.arguments import broadcast_shape, one_of
 
 GasFlow = Literal["continuum", "slip", "free-molecular"]
 #: Kind of quantity of the fields of a layer.
@@ -33,8 +33,9 @@ _KINDS = {
 #: J/(mol K), the molar mass of dry air of the US Standard Atmosphere 1976, in kg/mol.
 _GAS_CONSTANT, _MOLAR_MASS_AIR = 8.314462618, 28.9644e-3
 
-#: Where the continued fraction hands over to the asymptotic series, and the terms each needs to
-#: reach 1e-15 there (37 levels and 14 powers were measured at s = 30; 16 powers at s = 25).
+#: Value of s above which the asymptotic series replaces the continued fraction, and the numbers of
+#: terms with which both reach 1e-15 there (measured: 37 levels and 14 powers at s = 30; 16 powers
+#: at s = 25).
 _HANDOVER, _LEVELS, _POWERS = 30.0, 40, 16
 
 
@@ -106,11 +107,11 @@ class AirLayer:
     R : array
         Radius of the disc or of the patch of micro-contacts (m).
     gas_flow : {"continuum", "slip", "free-molecular"}
-        How the leak feels a mean free path l that is no longer small against h0 (Kn = l/h0).
-        "continuum": as if it were, the paper's Eq. (poiseuille). "slip": Poiseuille flow with
-        Maxwell's slip at diffuse walls, eta/(1 + 6 Kn), right to first order in Kn and too
-        resistive far beyond. "free-molecular": the paper's argument for 1 mbar, zero viscosity
-        where l exceeds the gap (Kn > 1), the bulk's elsewhere.
+        Flow of the leak where the mean free path l is not small against h0 (Kn = l/h0).
+        "continuum": as for small Kn, the paper's Eq. (poiseuille). "slip": Poiseuille flow with
+        Maxwell's slip at diffuse walls, eta/(1 + 6 Kn), which is right to first order in Kn and too
+        resistive at large Kn. "free-molecular": the paper's argument for 1 mbar, zero viscosity
+        where l exceeds the gap (Kn > 1), the viscosity of the bulk elsewhere.
     temperature : array
         Temperature (K); enters the mean free path only.
 
@@ -136,7 +137,7 @@ class AirLayer:
             if not np.all(np.isfinite(np.square(self.R))):
                 rule, got = "have a square that is a finite number", f"{np.max(self.R):g} m"
                 raise InputError("AirLayer.R", rule, got, "give the radius of the contact patch")
-        check_shapes("AirLayer.fields", *(getattr(self, field) for field in _KINDS))
+        broadcast_shape("AirLayer.fields", *(getattr(self, field) for field in _KINDS))
         one_of(self.gas_flow, get_args(GasFlow), "AirLayer.gas_flow")
 
     @property
@@ -174,7 +175,7 @@ class AirLayer:
     def squeeze(self, omega: ArrayLike) -> Real:
         """Return s = |gamma R| = sqrt(12 eta w R^2/(P0 h0^2)) at `omega` = w (rad/s)."""
         w = as_real("layer.omega", omega, "dimensionless", "not negative")
-        check_shapes("layer.omega", w, self.P0, self.h0, self.eta, self.R, self.temperature)
+        broadcast_shape("layer.omega", w, self.P0, self.h0, self.eta, self.R, self.temperature)
         s: Real = np.sqrt(12 * self.effective_viscosity * w / self.P0) * (self.R / self.h0)
         return s
 
@@ -214,7 +215,7 @@ class AirLayer:
         """
         radius = as_real("layer.r", r, "length", "not negative")
         s = self.squeeze(omega)
-        check_shapes("layer.r", radius, s, self.R)
+        broadcast_shape("layer.r", radius, s, self.R)
         rho = np.asarray(radius / self.R)
         if (rho > 1).any():
             worst = float(np.max(np.broadcast_to(radius, rho.shape)[rho > 1]))
@@ -260,6 +261,6 @@ def shear_viscosity_ratio(
     """
     velocity = as_real("shear.V", V, "velocity")
     load, rate = as_real("shear.W0", W0, "force"), as_real("shear.A", A, "dimensionless")
-    check_shapes("shear arguments", velocity, load, rate, layer.eta, layer.R, layer.h0)
+    broadcast_shape("shear arguments", velocity, load, rate, layer.eta, layer.R, layer.h0)
     printed: Real = layer.eta * layer.area * velocity / (load * layer.h0)
     return printed if as_printed else printed / rate

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.parameters import obeying
+from asperity.parameters.arguments import broadcast_shape
 
 #: A number or an array of numbers, in SI.
 Real: TypeAlias = float | Float
@@ -30,17 +31,6 @@ def as_real(label: str, value: ArrayLike, kind: str, rule: str = "positive") -> 
     """`asperity.parameters.obeying` as a float or a new float array."""
     array = np.array(obeying(value, label, kind, rule))
     return array if array.ndim else float(array)
-
-
-def check_shapes(label: str, *values: ArrayLike) -> None:
-    """Refuse `values` that do not broadcast."""
-    shapes = [np.shape(v) for v in values]
-    try:
-        np.broadcast_shapes(*shapes)
-    except ValueError:
-        listed = " and ".join(str(s) for s in dict.fromkeys(shapes) if s)
-        rule = "have shapes that broadcast together"
-        raise InputError(label, rule, listed, "give arrays of one shape") from None
 
 
 @dataclass(frozen=True)
@@ -66,7 +56,7 @@ class NormalContact:
     def __post_init__(self) -> None:
         load = as_real("NormalContact.W0", self.W0, "force")
         length = as_real("NormalContact.lambda_z", self.lambda_z, "length")
-        check_shapes("NormalContact.lambda_z", load, length)
+        broadcast_shape("NormalContact.lambda_z", load, length)
         object.__setattr__(self, "W0", load)
         object.__setattr__(self, "lambda_z", length)
 
@@ -159,7 +149,7 @@ class NormalContact:
             When eps is not in [0, 1).
         """
         eps = np.asarray(as_real("NormalContact.epsilon", epsilon, "dimensionless", "amplitude"))
-        check_shapes("NormalContact.epsilon", eps, self.lambda_z)
+        broadcast_shape("NormalContact.epsilon", eps, self.lambda_z)
         rho = (eps / (1 + np.sqrt((1 - eps) * (1 + eps))))[..., np.newaxis]
         order = np.arange(1, count + 1)
         length = np.asarray(self.lambda_z)[..., np.newaxis]
@@ -167,7 +157,7 @@ class NormalContact:
 
     def _beta(self, amplitude: ArrayLike) -> Real:
         a = as_real("NormalContact.amplitude", amplitude, "length", "not negative")
-        check_shapes("NormalContact.amplitude", a, self.lambda_z)
+        broadcast_shape("NormalContact.amplitude", a, self.lambda_z)
         return a / self.lambda_z
 
 
@@ -209,5 +199,5 @@ def normal_length(lambda_: ArrayLike, length_ratio: ArrayLike) -> Real:
     """
     shear = as_real("material.lambda_", lambda_, "length")
     ratio = as_real("material.length_ratio", length_ratio, "dimensionless")
-    check_shapes("material.length_ratio", shear, ratio)
+    broadcast_shape("material.length_ratio", shear, ratio)
     return shear / ratio

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.air.layer import AirLayer
-from asperity.air.normal_contact import NormalContact, Real, as_real, check_shapes
+from asperity.air.normal_contact import NormalContact, Real, as_real
 from asperity.errors import InputError
+from asperity.parameters.arguments import broadcast_shape
 
 
 def transfer_function(
@@ -65,7 +66,7 @@ def transfer_function(
     fields: tuple[Real, ...] = ()
     if layer is not None:
         fields = (layer.P0, layer.h0, layer.eta, layer.R, layer.temperature)
-    check_shapes("modulation.frequency", f, mass, contact.W0, contact.lambda_z, *fields)
+    broadcast_shape("modulation.frequency", f, mass, contact.W0, contact.lambda_z, *fields)
     with np.errstate(all="ignore"):
         omega = 2 * np.pi * np.asarray(f)
         denominator = 1 - mass * omega**2 / contact.stiffness + 0j

@@ -1,9 +1,10 @@
 """Predictor-corrector continuation: the driver of all curves of solutions.
 
 From a point of a curve the next one is predicted at a distance along it and corrected. A step
-counts if the corrector has converged, the curve turns little and the corrected point lies near the
-predicted one; else it is tried again, shorter. What is solved, and where a curve ends, is up to the
-curves: branches of orbits in a parameter or in the amplitude, boundaries in the plane of two.
+is accepted if the corrector has converged, the curve turns little and the corrected point lies near
+the predicted point; otherwise a shorter step is tried. Subclasses of `Curves` say what is solved
+and where a curve ends: branches of orbits in a parameter or in the amplitude, boundaries in the
+plane of two parameters.
 
 Source: E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods (2003),
 chapters 2 and 6.
@@ -155,8 +156,8 @@ def follow(
     Returns
     -------
     list of str
-        Why each curve ends: what `accept` says, `STUCK` where no step is short enough, or `STEPS`
-        where `most` were tried. Empty for curves that are not followed.
+        Why each curve ends: the reason from `accept`, `STUCK` where no step is short enough, or
+        `STEPS` after `most` steps. Empty for curves that are not followed.
     """
     control, length = curves.control, np.array(length, float)
     failures = np.zeros(length.size, int)

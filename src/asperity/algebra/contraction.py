@@ -31,9 +31,10 @@ def contracted(
 ) -> Any:
     """Solve y = right + contract(y) by repetition; NaN at points where it does not converge.
 
-    All points take the same number of steps before it is looked how much they still change: a test
-    at every step would cost as much as the step when derivatives in many directions are solved for
-    together. Where one is not done then but on its way, all take as many steps again.
+    All points take a round of the same number of steps before their last changes are tested: when
+    derivatives in many directions are solved for together, a test at every step would cost as much
+    as the step. If a point has not converged but its changes become smaller, all points take
+    another round.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def contracted(
     right : pytree of arrays
         Arrays of shape (points,), (..., points) or, with `points_first`, (points, ...).
     steps : int
-        That are enough, as a rule.
+        Number of steps in a round.
     """
 
     def step(_: Any, y: Any) -> Any:
@@ -121,7 +122,7 @@ def implicit_solution(equations: Equations, parameters: Any, solution: Any) -> A
     equations : Equations
     parameters : pytree of arrays
     solution : pytree of arrays
-        Unknowns that solve the equations to round-off; a derivative of theirs does not count.
+        Unknowns that solve the equations to round-off; derivatives that they carry are ignored.
 
     Returns
     -------

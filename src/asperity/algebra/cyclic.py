@@ -66,8 +66,8 @@ class Border(NamedTuple):
 def solve_bordered(maps: Array, rhs: Array, border: Border) -> tuple[Array, Array]:
     """Solve d_{i+1} - T_i d_i = r_i + p column_i, d_M = d_0, with the equation of the border.
 
-    The elimination runs once for all; what closes it is one system for d_0 and p together, so that
-    a fold, where the periodic recurrence alone is singular, makes no difference.
+    After the elimination there is one system for d_0 and p together. It is regular at a fold, where
+    the periodic recurrence alone is singular.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A grid over a period that is symmetric about zero, and integration on this grid."""
+"""Grids over a period: one that is symmetric about zero, integration, and interpolation."""
 
 from __future__ import annotations
 
@@ -38,3 +38,11 @@ def antiderivative(integral: Any, rate: Any) -> Any:
     odd = (matrix[:, :half] + matrix[:, half:]) @ (one + other)
     even = (matrix[:, :half] - matrix[:, half:]) @ (one - other)
     return rate.__array_namespace__().concatenate([even + odd, even - odd])
+
+
+def interpolation(phases: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Matrix of trigonometric interpolation from even nodes to phases, (phases, nodes)."""
+    count = len(nodes)
+    k = np.arange(1, (count + 1) // 2)[:, None, None]
+    kernel: np.ndarray = (1 + 2 * np.cos(k * (phases[:, None] - nodes)).sum(0)) / count
+    return kernel

@@ -8,7 +8,7 @@ ever (seen with jaxlib 0.10.2 on two cores).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -87,6 +87,24 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
     """Product of two matrices of separate entries."""
     columns = list(zip(*b, strict=True))
     return [[sum(x * y for x, y in zip(row, c, strict=True)) for c in columns] for row in a]
+
+
+def apply(matrix: Matrix, vector: Sequence[Array]) -> tuple[Array, ...]:
+    """Product of a matrix of separate entries and a vector."""
+    return tuple(sum(a * x for a, x in zip(row, vector, strict=True)) for row in matrix)
+
+
+def averaged(matrix: Matrix, weights: Array) -> Matrix:
+    """Weighted sum of each entry over its first axis."""
+    return [[weights @ entry for entry in row] for row in matrix]
+
+
+def jacobian(push: Callable[..., Sequence[Array]], like: Sequence[Array]) -> Matrix:
+    """Entries [i][j] of a linear map of several element-wise changes, shapes as `like`."""
+    one, zero = jnp.ones_like(like[0]), jnp.zeros_like(like[0])
+    n = range(len(like))
+    columns = [push(*(one if i == j else zero for i in n)) for j in n]
+    return [[columns[j][i] for j in n] for i in n]
 
 
 def add(a: Matrix, b: Matrix) -> Matrix:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Complex, Float
-from asperity.branches.parameters import fixed_as_text
 from asperity.orbit.floquet import from_logs
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion
@@ -41,14 +40,15 @@ class Bifurcation:
     log_multipliers : complex array, shape (states,)
         ln|m| + i arg m by falling modulus.
     frequency : float
-        Frequency (Hz) of the mode that passes the unit circle, between 0 and half that of the
-        modulation: multipliers know frequencies only up to whole multiples of it. 0 at folds.
+        Frequency (Hz) of the mode that passes the unit circle, between 0 and half the frequency of
+        the modulation: multipliers do not tell frequencies apart that differ by whole multiples of
+        the latter. 0 at folds.
     unstable_before, unstable_after : int
         Number of multipliers outside the unit circle on the two sides, along the branch.
     index : int
         The bifurcation lies between this point of the branch and the next.
     critical : BranchOrbit
-        The critical orbit, from where branches are switched.
+        The critical orbit, from which a doubled branch starts.
     """
 
     kind: str
@@ -123,13 +123,13 @@ class Branch(Displayed):
     result : str
         Reason why the branch ends.
     completed : bool
-        Whether it ended at an end of the span.
+        Whether the branch ends at an end of the span.
     motion : Motion
         Equation of motion, with the slider; the continued parameter has its value at the start.
     fixed : dict
-        Parameters of the operating point that were kept fixed, SI.
+        The other parameters of the operating point, SI.
     origin : BranchOrigin
-        Line and operating point that other branches are switched to from.
+        Line and operating point, from which a doubled branch starts.
     last : ContinuationPoint
         The last orbit, on its mesh.
     """
@@ -236,9 +236,8 @@ class Branch(Displayed):
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, equation of motion, fixed parameters, and why the branch ends."""
-        fixed = fixed_as_text(type(self.motion.slider.law), self.fixed)
         return {
-            **equations_as_text(self.motion, fixed),
+            **equations_as_text(self.motion, self.fixed),
             "continued_parameter": self.name,
             "periods": self.periods,
             "result": self.result,

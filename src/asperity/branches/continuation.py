@@ -22,13 +22,13 @@ from asperity.arrays import Float
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
 from asperity.branches.parameters import (
     ContinuedParameter,
-    held_parameters,
+    fixed_parameters,
     line_through,
     moving_parameter,
     one_problem,
-    starting_orbit,
 )
 from asperity.branches.steps import (
+    INTERVALS,
     BranchFollower,
     BranchOrbit,
     LocatedBifurcation,
@@ -45,9 +45,6 @@ from asperity.orbit.mesh.newton import Change
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import Slider
 from asperity.slider.problem import Problem
-
-#: Mesh intervals of a branch of simple period; a bifurcation is solved on three times as many.
-INTERVALS = 216
 
 _RESULTS = {
     "end": "the branch reaches the end of the span, {value:.6g}{unit}",
@@ -115,7 +112,7 @@ class BranchRecorder:
             result=_RESULTS[why].format(value=values[-1], unit=unit, steps=steps),
             completed=why in ("end", "start"),
             motion=problem.system,
-            fixed=held_parameters(problem, self.moving.name),
+            fixed=fixed_parameters(problem, self.moving.name),
             origin=BranchOrigin(self.follower, self.moving, problem),
             last=self.branch_orbits[-1].point,
         )
@@ -167,7 +164,7 @@ def continuation(
         Numbers, no arrays.
     parameter : str
         "epsilon", "frequency", "V", "K", "W0", "M", "eta", or a parameter of the law, such as
-        "alpha" or "lambda"; as in `asperity.parameters`.
+        "alpha" or "lambda"; names as in `asperity.parameters`.
     span : pair of float or str
         Values at which the branch starts and ends. A positive parameter whose ends differ by more
         than a factor of 2 is continued by equal factors.
@@ -219,20 +216,13 @@ def continuation(
     problem = one_problem(locals(), {parameter: span})
     moving = moving_parameter(problem, parameter, span)
     follower = BranchFollower(line_through(problem, (moving,), (0.0,), (1.0,)), harmonics)
-    orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)
-    start = None if orbit is None else follower.begin(orbit, 0.0, INTERVALS)
+    start = follower.begin()
     if start is None:
-        raise _no_orbit(moving)
+        got = f"none at {moving.name} = {moving.start:g} {moving.unit}".rstrip()
+        advice = "start elsewhere, such as at a small epsilon"
+        raise InputError("span", "start where there is a periodic orbit", got, advice)
     recorder = BranchRecorder(follower, moving, start, counted(progress, most_steps))
     return recorder.branch(recorder.follow_branch(most_steps), problem)
-
-
-def _no_orbit(moving: ContinuedParameter) -> InputError:
-    unit = f" {moving.unit}" if moving.unit else ""
-    return InputError(
-        f"span must start where there is a periodic orbit, got none at {moving.name} = "
-        f"{moving.start:g}{unit}; start elsewhere, such as at a small epsilon"
-    )
 
 
 #: Distances from the bifurcation at which a doubled orbit is tried (change of the log slip rate).
@@ -240,7 +230,7 @@ _DISTANCES = (0.05, 0.02, 0.1, 0.2)
 
 
 class Repeated(Modulation):
-    """A modulation run through twice while theta runs from 0 to 2 pi.
+    """Two periods of a modulation while theta rises from 0 to 2 pi.
 
     Parameters
     ----------
@@ -320,7 +310,11 @@ def doubled_branch(
     follower, moving, problem = branch.origin
     simple = follower.finer(bifurcation.critical.point, INTERVALS)
     twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
-    start = None if simple is None else _doubled_orbit_near(follower, twice, simple)
+    start = None
+    if simple is not None:
+        point = _doubling_direction(follower.line, simple.point.orbit, simple.point.t)
+        tried = (twice.step(point, distance)[0] for distance in _DISTANCES)
+        start = next((doubled for doubled in tried if doubled is not None), None)
     if start is None:
         rule, got = "have a doubled orbit next to it", "none by Newton's method"
         raise InputError("bifurcation", rule, got, "continue in another parameter")
@@ -338,19 +332,6 @@ def _doubled_line(line: ParameterLine) -> ParameterLine:
     return ParameterLine(
         doubled(line.origin, 0.5), doubled(line.added, 0.5), doubled(line.growth, 1.0)
     )
-
-
-def _doubled_orbit_near(
-    follower: BranchFollower, twice: BranchFollower, simple: BranchOrbit
-) -> BranchOrbit | None:
-    """A doubled orbit near the critical simple orbit."""
-    point = simple.point
-    start = _doubling_direction(follower.line, point.orbit, point.t)
-    for distance in _DISTANCES:
-        branch_orbit, _ = twice.step(start, distance)
-        if branch_orbit is not None:
-            return branch_orbit
-    return None
 
 
 def _doubling_direction(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:

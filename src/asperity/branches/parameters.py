@@ -1,6 +1,6 @@
-"""Control parameters by name, and the lines on which one or two of them move.
+"""Continued parameters by name, and the lines on which one or two of them move.
 
-An operating point of continuation is checked here, and its first orbit computed.
+The operating point of a continuation is checked here.
 """
 
 from __future__ import annotations
@@ -9,18 +9,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import jax
 import numpy as np
 
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.orbit.mesh.arclength import ParameterLine, still
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number
 from asperity.slider import Slider
-from asperity.slider.named import equation_parameters, value_of, with_value
+from asperity.slider.named import equation_parameters, equation_values, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
@@ -125,12 +122,6 @@ def line_through(
     return ParameterLine(origin, added, growth)
 
 
-def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
-    """The constant parameters with their units."""
-    known = point_parameters(law)
-    return "; ".join(f"{n} = {value!r} {known[n].unit}".rstrip() for n, value in fixed.items())
-
-
 def _end(parameter: Parameter, value: Any, field: str) -> float:
     """An end of a span, checked by the rule of the parameter."""
     checked = number(value, field, parameter.kind, parameter.rule)
@@ -146,10 +137,10 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     Parameters
     ----------
     arguments : dict
-        Those of `continuation`, or more.
+        Arguments of `continuation`; further ones are ignored.
     spans : dict
-        Spans by the name of the parameter: velocity, epsilon, frequency and damping that are
-        continued stand at the start of theirs.
+        Spans by the name of the parameter; a continued velocity, epsilon, frequency or damping has
+        the value at the start of its span.
 
     Raises
     ------
@@ -175,21 +166,7 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     return flat
 
 
-def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
-    """An orbit of the single point of `problem` on a mesh of `intervals`; None without one."""
-    solution = find_orbits(
-        jax.tree.map(np.asarray, problem),
-        1,
-        harmonics=2,
-        phases=0,
-        progress=lambda _: None,
-        intervals=intervals,
-    )
-    return solution.orbit if solution.converged[0] else None
-
-
-def held_parameters(problem: Problem, *moving: str) -> dict[str, float]:
+def fixed_parameters(problem: Problem, *moving: str) -> dict[str, float]:
     """Parameters of the operating point, SI, without those that move."""
-    named = equation_parameters(*problem)
-    values = {name: value_of(problem, p) for name, p in named.items() if name not in moving}
-    return {name: float(np.ravel(value)[0]) for name, value in values.items()}
+    values = equation_values(*problem).items()
+    return {name: float(np.ravel(value)[0]) for name, value in values if name not in moving}

@@ -20,15 +20,12 @@ from numpy.typing import NDArray
 
 from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.branches.continuation import INTERVALS
 from asperity.branches.parameters import (
     ContinuedParameter,
-    fixed_as_text,
-    held_parameters,
+    fixed_parameters,
     line_through,
     moving_parameter,
     one_problem,
-    starting_orbit,
 )
 from asperity.branches.steps import (
     BranchFollower,
@@ -97,17 +94,15 @@ class TracedBoundary(NamedTuple):
 
 
 class ParameterPlane(NamedTuple):
-    """Two parameters of an operating point, and the observables of each orbit."""
+    """The plane of two parameters of an operating point."""
 
     problem: Problem
     parameters: tuple[ContinuedParameter, ContinuedParameter]
-    harmonics: int
 
     def follower(self, at: Any, direction: Any) -> BranchFollower:
         """A follower of branches along a line through the plane."""
-        return BranchFollower(
-            line_through(self.problem, self.parameters, at, direction), self.harmonics
-        )
+        line = line_through(self.problem, self.parameters, at, direction)
+        return BranchFollower(line, harmonics=1)
 
 
 def trace_boundary(
@@ -222,8 +217,8 @@ def critical_point(
     """The point of a boundary on the line through `guess`, from the orbit of a point nearby."""
     guess, direction = np.asarray(guess, float), np.asarray(direction, float)
     follower = plane.follower(guess, direction)
-    # At a fold the orbit is no regular function of the parameters: the parameters become unknowns,
-    # and the plane perpendicular to the branch fixes the orbit.
+    # At a fold the orbit is not a regular function of the parameters: the parameter becomes an
+    # unknown, and the plane perpendicular to the branch fixes the orbit.
     start = follower.at(known.point, 0.0) if kind != "fold" else follower.across(known.point, 0.0)
     if start is None:
         return None
@@ -325,7 +320,7 @@ class StabilityBoundary(Displayed):
     curves : tuple of BoundaryCurve
     motion : Motion
     fixed : dict
-        Parameters that were kept fixed, SI.
+        The other parameters of the operating point, SI.
     """
 
     names: tuple[str, str]
@@ -372,8 +367,7 @@ class StabilityBoundary(Displayed):
                 "kind of the bifurcation",
             ),
         }
-        fixed = fixed_as_text(type(self.motion.slider.law), self.fixed)
-        return xarray.Dataset(data, attrs=equations_as_text(self.motion, fixed))
+        return xarray.Dataset(data, attrs=equations_as_text(self.motion, self.fixed))
 
 
 @typed
@@ -446,7 +440,7 @@ def stability_boundary(
     )
     rule, got = "differ from x", f"'{y}' for both"
     require(parameters[0].name != parameters[1].name, "y", rule, got, "choose another parameter")
-    plane = ParameterPlane(problem, parameters, 1)
+    plane = ParameterPlane(problem, parameters)
     report = counted(progress, 2 * lines)
     curves: list[TracedBoundary] = []
     for at, direction in _scan_lines(lines):
@@ -459,7 +453,7 @@ def stability_boundary(
         (parameters[0].unit, parameters[1].unit),
         tuple(_boundary_curve(plane, curve) for curve in curves),
         problem.system,
-        held_parameters(problem, *(p.name for p in parameters)),
+        fixed_parameters(problem, *(p.name for p in parameters)),
     )
 
 
@@ -477,8 +471,7 @@ def _crossings(
 ) -> list[tuple[Any, BoundaryPoint]]:
     """Bifurcations on a line; an empty list if there is no orbit at its start."""
     follower = plane.follower(at, direction)
-    orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)
-    start = None if orbit is None else follower.begin(orbit, 0.0, INTERVALS)
+    start = follower.begin()
     if start is None:
         return []
     points = []

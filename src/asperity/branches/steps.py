@@ -14,13 +14,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
 from asperity.algebra.continuation import STEPS, Attempt, Curves, StepControl, follow
 from asperity.arrays import Complex, Float, Index
-from asperity.orbit.floquet import log_multipliers
+from asperity.orbit.floquet import FOLD, kind_of_crossing, log_multipliers
 from asperity.orbit.mesh.arclength import (
     ArclengthStep,
     ContinuationPoint,
@@ -32,7 +33,11 @@ from asperity.orbit.mesh.arclength import (
 from asperity.orbit.mesh.equations import read_orbit
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change, remeshed
+from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import SearchOptions
 
+#: Mesh intervals of a branch of simple period; a bifurcation is solved on three times as many.
+INTERVALS = 216
 #: A step is accepted if Newton's last change is below this; the error is about its square.
 _CONVERGED = 1e-6
 _NEWTON_STEPS = 10
@@ -122,17 +127,20 @@ class BranchFollower(NamedTuple):
         orbit = seen[root] if root in seen else self.step(start.point, root)[0]
         return None if orbit is None else (orbit, root)
 
-    def begin(self, orbit: Orbit, t: float, intervals: int) -> BranchOrbit | None:
-        """An orbit at `t` on a mesh of `intervals`, in the direction of rising t."""
-        at = np.array([t])
-        orbit = remeshed(self.line.at(at), orbit, intervals)
-        none = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
-        bare = ContinuationPoint(orbit, at, none, np.ones_like(orbit.centre))
-        branch_orbit = self.at(bare, t)
-        if branch_orbit is None:
+    def begin(self) -> BranchOrbit | None:
+        """An orbit at t = 0, in the direction of rising t; None where the search finds none."""
+        zero = np.zeros(1)
+        problem = jax.tree.map(np.asarray, self.line.at(zero))
+        solution = find_orbits(problem, SearchOptions(2, intervals=INTERVALS))
+        if not solution.converged[0]:
             return None
-        point = first_point(self.line, branch_orbit.point.orbit, at)
-        return branch_orbit._replace(direction=float(point.tangent.t[0]), point=point)
+        orbit = remeshed(problem, solution.orbit, INTERVALS)
+        tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
+        start = self.at(ContinuationPoint(orbit, zero, tangent, np.ones_like(orbit.centre)), 0.0)
+        if start is None:
+            return None
+        point = first_point(self.line, start.point.orbit, zero)
+        return start._replace(direction=float(point.tangent.t[0]), point=point)
 
     def at(self, point: ContinuationPoint, t: float) -> BranchOrbit | None:
         """The orbit at the coordinate `t`, from the orbit of a point nearby."""
@@ -149,7 +157,7 @@ class BranchFollower(NamedTuple):
         """The orbit in the plane across the branch at a point, on a mesh of `intervals`."""
         orbit = remeshed(self.line.at(point.t), point.orbit, intervals)
         carried = interpolated(point.tangent.nodes, point.orbit.mesh, orbit.mesh)
-        slopes = np.zeros(orbit.slopes.shape)  # not used by a step of no length
+        slopes = np.zeros(orbit.slopes.shape)  # a step of length zero does not use them
         tangent = Change(carried, slopes, point.tangent.t)
         return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
 
@@ -276,11 +284,9 @@ def bifurcations_between(
 
 
 def kind_of(log: complex) -> Kind:
-    """Bifurcation of a multiplier on the unit circle."""
-    angle = abs(np.angle(np.exp(1j * log.imag)))
-    if angle < _REAL:
-        return "branch point"
-    return "period doubling" if np.pi - angle < _REAL else "Neimark-Sacker"
+    """Bifurcation of a multiplier on the unit circle; "branch point" where it is +1."""
+    (kind,) = kind_of_crossing(np.array([log]), real=_REAL)
+    return "branch point" if kind == FOLD else kind
 
 
 def criterion(kind: Kind, index: int) -> Callable[[BranchOrbit], float]:

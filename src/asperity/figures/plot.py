@@ -104,7 +104,7 @@ class Item(_Part):
     ----------
     kind : str
         "line" of a curve; "band" between the lowest and the highest of `curves`; "points" with bars
-        of 95 %; "value" and "range" that a text states at one abscissa; "remark" on what it states;
+        of 95 %; "value" and "range" that a text states at one abscissa; "remark" on such a value;
         "text"; "marker"; "slope", a line through the origin; "level" and "limit", a line across at
         an ordinate or abscissa; "zone" and "strip", the area between two of them; "key", an entry
         of a legend alone.
@@ -115,7 +115,7 @@ class Item(_Part):
     where : mapping
         Values of columns that select the points.
     x, y : number or name of a number
-        Where it is; two of them are ends.
+        Position of the item; two numbers are its ends.
     times : number or name of a number
         Factor on the abscissa.
     aside : float

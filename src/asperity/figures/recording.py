@@ -157,7 +157,7 @@ def _draw_recording(axis: Axes, measurement: Measurement) -> None:
     keys = [
         Patch(color=_LOAD, label="load"),
         Patch(color=_FITTED, label="force"),
-        Patch(color=STATED_FILL, alpha=0.35, label="what is read"),
+        Patch(color=STATED_FILL, alpha=0.35, label="part that is measured"),
     ]
     axis.legend(handles=keys, loc="upper right", ncols=3, handlelength=1.2)
 
@@ -204,7 +204,7 @@ def _draw_residual(axis: Axes, measurement: Measurement) -> None:
         xlabel="frequency (Hz)",
         ylabel="amplitude of $F/W_0$",
     )
-    axis.plot([], [], color=_MEASURED, label="what is left")
+    axis.plot([], [], color=_MEASURED, label="residual")
     axis.legend(loc="upper right", ncols=2)
 
 

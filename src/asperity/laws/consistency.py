@@ -22,7 +22,8 @@ from asperity.parameters.arguments import shown
 #: Velocities (m/s) at which a law is evaluated.
 _SPEEDS = (1e-8, 1e-6, 1e-5, 1e-3)
 
-#: Rates in steady sliding over those at twice the velocity: a law may solve for its steady state.
+#: Largest rate in steady sliding over that at twice the velocity; not zero, because a law may
+#: compute its steady state by iteration.
 _STEADY = 1e-4
 
 _PAGE = "see the page 'Write your own law'"

@@ -1,9 +1,10 @@
 """The velocity at which a law without closed-form inverse carries a given force.
 
-Newton's method on ln v, in which rate-and-state laws are close to linear, kept by bisection between
-velocities that are known to be too low and too high. The search is not differentiated: two plain
-Newton steps that follow it are, and since each doubles the order to which the velocity is known,
-first, second and third derivatives come out exact, in forward and in reverse mode.
+Newton's method on ln v, in which rate-and-state laws are close to linear. Bisection keeps ln v
+between a velocity that is known to be too low and one that is too high. The search itself is not
+differentiated. Two plain Newton steps follow it, and these are: each doubles the order to which the
+velocity is exact, so that first, second and third derivatives are exact, in forward and in reverse
+mode.
 """
 
 from __future__ import annotations

@@ -116,9 +116,9 @@ class Law(Displayed, eqx.Module):
     def velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Slip velocity (m/s) at which the law carries the force `friction` = F_i/W.
 
-        The exponential of `log_velocity`, unless the law is defined at rest and in reversed
-        motion: such a law overrides this with a velocity that has the sign of the force, or is
-        zero, and is finite for friction <= 0.
+        The exponential of `log_velocity`. A law that is defined at rest and in reversed motion
+        overrides this method: its velocity has the sign of the force or is zero, and is finite for
+        friction <= 0.
         """
         return jnp.exp(self.log_velocity(friction, state, w))
 

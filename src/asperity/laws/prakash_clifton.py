@@ -32,8 +32,8 @@ class PrakashClifton(RiceRuina):
     L : float
         Slip over which the force follows the load (m).
     V_star : float
-        Velocity that adds to slip in the relaxation (m/s), not negative: L/V_star is its time at
-        rest. With 0 the load is remembered for as long as there is no slip.
+        Velocity that is added to the slip velocity in the relaxation (m/s), not negative: at rest
+        the relaxation takes the time L/V_star. With 0 there is no relaxation without slip.
     mu0, A, B, D0, V0 : float
         As in `RiceRuina`.
     """

@@ -6,8 +6,8 @@ A package makes its laws known in its ``pyproject.toml``::
     composite = "mylab.friction:Composite"
 
 and a file or module that is not installed is named on the command line, ``--law
-path/to/file.py:Composite`` or ``--law mylab.friction:Composite``. Naming a place runs its code, so
-that tables and protocols, which others may have written, cannot name one.
+path/to/file.py:Composite`` or ``--law mylab.friction:Composite``. This runs the code of the file or
+module. Tables and protocols, which other people may have written, therefore cannot name one.
 """
 
 from __future__ import annotations

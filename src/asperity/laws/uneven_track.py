@@ -6,12 +6,13 @@ with n wavenumbers whose density is the spectrum
 
     S(k) = s^2 (p - 1) l / (1 + k l)^p,        integral of S over k > 0 = s^2,
 
-flat below 1/l and a power law beyond: l is the length over which the level forgets itself, p = 2
-that of a self-affine profile of Hurst exponent 1/2. The n wavenumbers are the quantiles of S in n
-equal shares, each at a fixed random place within its share, and the phases are fixed: there is one
-track, which never repeats, and x0 is where on it the slider begins (spectral representation:
-Shinozuka and Jan, J. Sound Vib. 25, 111, 1972). The level is the law's mu0 and thus part of the
-equation of motion; the position is one more state of the law, in units of l.
+constant below k = 1/l and a power law above it: l is the correlation length of the level, and p = 2
+is the exponent of a self-affine profile of Hurst exponent 1/2. S is divided into n equal parts, and
+each wavenumber lies at a fixed random place within one part; the phases are fixed too. There is
+therefore only one track, which never repeats, and x0 is the place on it at which the slider begins
+(spectral representation: Shinozuka and Jan, J. Sound Vib. 25, 111, 1972). The level is the law's
+mu0 and thus part of the equation of motion; the position is one more state of the law, in units
+of l.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def on_uneven_track(
     exponent : float
         p of the spectrum, above 1.
     origin : float or str
-        Where on the track the slider begins (m): far apart, places are independent.
+        Place on the track at which the slider begins (m); levels at places far apart are
+        independent.
 
     Returns
     -------

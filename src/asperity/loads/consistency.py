@@ -10,7 +10,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import InputError, code_of_others
 from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import broadcast_shape, shown
 
 #: Numbers of samples of the period; a fault counts if it remains with more samples.
 _SAMPLES = (64, 1024, 16384)
@@ -24,7 +24,7 @@ _MEAN, _SLOPE = 1e-3, 2e-2
 
 
 def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modulation:
-    """A modulation whose members agree with each other.
+    """Check that the members of a modulation agree with each other, and return it.
 
     Parameters
     ----------
@@ -37,11 +37,10 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
     Raises
     ------
     InputError
-        If its fields are no numbers or arrays that broadcast; if over a
-        period a value is not finite, W does not stay positive, the mean of W/W0 or of the pull
-        is not 1, `w_slope` is not the derivative of `w`, `amplitude` is not that of the first
-        harmonic, `scaled(0)` is not steady sliding, a member fails, or the load is not `even` and
-        says so.
+        If its fields are not numbers or arrays that broadcast; if over a period a value is not
+        finite, W does not stay positive, the mean of W/W0 or of the pull is not 1, or `w_slope` is
+        not the derivative of `w`; if `amplitude` is not that of the first harmonic, `scaled(0)` is
+        not steady sliding, or `even` is True for a load that is not even; or if a member fails.
     """
     leaves, structure = jax.tree.flatten(modulation)
     for leaf in leaves:
@@ -49,13 +48,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
             raise InputError(name, "have numbers for its fields", shown(leaf), "give them in SI")
     if type(modulation) in (Harmonic, Periodic):
         return modulation
-    try:
-        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
-    except ValueError:
-        raise InputError(
-            f"{name} must have arrays that broadcast, got shapes "
-            f"{', '.join(str(np.shape(leaf)) for leaf in leaves)}; give arrays of one shape"
-        ) from None
+    shape = broadcast_shape(name, *leaves)
     flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
     rule = "have members that work on arrays of jax.numpy"
     page, where = "see the page 'Write your own load'", type(modulation).__name__

@@ -214,7 +214,7 @@ def modulated(
     pull : array or str
         Amplitude of the pulling velocity over its mean (dimensionless).
     pull_phase : array or str
-        Its phase against the load (rad).
+        Phase of the pulling velocity against the load (rad).
     tilt : array or str
         Angle between the direction in which the modulated force acts and the interface's normal
         (rad, in (-pi/2, pi/2)), positive where a growing load also pushes the slider along

@@ -45,10 +45,11 @@ from asperity.lock_in.settling import Settling, find_settlings, without
 
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
-#: Share of a window whose frequency is fitted before that of all of it.
+#: Share of the window on which the frequency is fitted first.
 _FIRST_SHARE = 0.125
-#: Steps of the frequency up to this one, as phase (rad) at the ends of the window, are left to the
-#: first-order correction, and up to `CONVERGED` with more samples, where another pass takes longer.
+#: Steps of the frequency, as phase (rad) at the ends of the window, that are left to the
+#: first-order correction: up to `_SHORT_STEP`, and with more than `_LONG` samples, where another
+#: pass takes longer, up to `CONVERGED`.
 _SHORT_STEP, _LONG = 1e-8, 1 << 17
 DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
 
@@ -219,7 +220,7 @@ def _check(time: Float, load: Float, force: Float, harmonics: int, degree: int) 
 
 
 def _check_finite(blocks: BlockSums) -> BlockSums:
-    """Refuse samples that are not finite: their sums are not either."""
+    """Refuse samples that are not finite, which show in their sums."""
     got = "values that are not"
     advice = "leave out their samples, as asperity.measure does"
     require(np.isfinite(blocks.moments).all(), "lock_in.load and force", "be finite", got, advice)

@@ -2,8 +2,9 @@
 
 The error of the amplitude at a frequency is the noise at that frequency. The variance of the
 coefficient of a column is therefore the mean of the periodogram of the residual over the nearest
-spectral lines that are free of fitted columns. The mean square of the residual is the same for
-white noise, and wrong for coloured noise. Each averaged line counts as two degrees of freedom.
+spectral lines that are free of fitted columns. The mean square of the residual would give the same
+variance for white noise, and a wrong one for coloured noise. Each averaged line counts as two
+degrees of freedom.
 """
 
 from __future__ import annotations
@@ -170,8 +171,9 @@ def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:
     )
     first = max(float(taken), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
-    # Both integer and half-integer lines are used. A distant line such as hum leaks into one of
-    # these two sets as it leaks into the harmonic or its derivative, and may vanish in the other.
+    # Both integer and half-integer lines are used. A distant line such as hum leaks into one of the
+    # two sets in the same way as into the harmonic or its derivative, and may vanish in the other
+    # set.
     away = np.arange(np.ceil(2 * (first - k * periods)), 2 * (last - k * periods) + 1e-9) / 2
     lines = k * periods + away
     nearest = np.clip(np.rint(lines / periods), 0, basis.harmonics)

@@ -134,25 +134,8 @@ class Basis:
         return turned
 
 
-def solved(normal: Float, right: Float) -> Float:
-    """Solution of normal equations.
-
-    Parameters
-    ----------
-    normal : array, (p, p)
-        Symmetric, positive definite.
-    right : array, (p,) or (p, q)
-
-    Returns
-    -------
-    array
-        Array of the shape of `right`.
-    """
-    return inverted(normal) @ right
-
-
 def inverted(normal: Float) -> Float:
-    """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it has none."""
+    """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it is singular."""
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = 1 / np.sqrt(np.diagonal(normal))
         equal = normal * scale * scale[:, None]

@@ -1,9 +1,9 @@
 """The reference of the lock-in: the modulation frequency, fitted to the load.
 
 An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the frequency is a parameter
-of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
-in a window short enough for that start, and is repeated in windows four times as long up to the
-whole one.
+of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum, in
+a window so short that the frequency of this line is accurate enough. It is repeated in windows four
+times as long each, up to the whole recording.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, ConstantLoadError, InputError, require
-from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
+from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inverted, sums
 
 #: Samples of the spectrum in which the line is searched.
 _SPECTRUM = 1 << 16
@@ -185,10 +185,10 @@ def frequency_step(blocks: BlockSums) -> float:
     """Gauss-Newton step of omega (rad/s) from the sums of the load, their first channel."""
     basis, linear = blocks.basis, blocks.basis.linear
     gram, moments = blocks.totals()
-    beta = solved(gram[:linear, :linear], moments[:linear, 0])
+    beta = inverted(gram[:linear, :linear]) @ moments[:linear, 0]
     columns = np.eye(basis.size)[:, : linear + 1]
     columns[:, linear] = frequency_direction(basis, beta)
-    change = solved(columns.T @ gram @ columns, columns.T @ moments[:, 0])[linear]
+    change = (inverted(columns.T @ gram @ columns) @ (columns.T @ moments[:, 0]))[linear]
     # Beyond a radian at the ends the linearisation is not valid.
     return float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))
 

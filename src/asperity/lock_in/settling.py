@@ -26,8 +26,8 @@ from asperity.lock_in.normal_equations import BlockSums, inverted
 
 #: Prior odds of a settling times the Occam factor of its amplitude, for the mean and for a
 #: harmonic, which has two amplitudes. With these odds for the mean, a settling is preferred in 3 to
-#: 10 of 1,000 steady recordings with white or AR(1) noise, and 99 of 100 keep their uncertainty
-#: within 10 %.
+#: 10 of 1,000 steady recordings with white or AR(1) noise, and the uncertainty changes by less than
+#: 10 % in 99 of 100.
 _ODDS = (0.005, 0.0005)
 #: A settling with a time constant above this share of the window does not end in the window: with a
 #: linear drift in the model, the final level is an extrapolation.
@@ -35,10 +35,10 @@ OPEN = 1 / 3
 #: Longest time constant, in windows; number of time constants of a grid; and shortest time constant
 #: of a harmonic, in periods, below which it overlaps with other harmonics.
 _LONGEST, _TRIED, _SHORTEST = 2.0, 41, 4.0
-#: Without a gain above this many times the noise nothing is corrected.
+#: Smallest gain, in units of the noise, at which a settling is considered.
 _LEAST_GAIN = 4.0
-#: Log-likelihood below the maximum at which a time constant is negligible, and number of time
-#: constants that are not, with which the sum approximates the integral.
+#: A time constant is negligible if its log-likelihood is below the maximum by this much; and the
+#: number of other time constants with which the sum approximates the integral over them.
 _NEGLIGIBLE, _ENOUGH = 12.0, 9
 #: The iteration ends when the noise falls by less than to this share of its last value.
 _STILL = 0.8
@@ -59,14 +59,14 @@ class Settling:
         At the beginning of the window, in the channel's unit; real for the mean. Of a harmonic the
         phase is that of the basis.
     odds : float
-        Odds that there is one.
+        Odds that there is a settling.
     longest : float
-        Time constant (s) that it has less than at 95 %, if there is one.
+        95 % quantile of the time constant (s), if there is a settling.
     unfinished : float
-        Probability that its time constant exceeds `OPEN` of the window, if there is one.
+        Probability that the time constant exceeds `OPEN` of the window, if there is a settling.
     shift : array, (linear,)
-        Correction of the coefficients: those of the sums without `removed` if the odds are above
-        one, else those of the original sums.
+        Correction of the coefficients. It refers to the fit of the sums without `removed` if the
+        odds are above one, else to that of the original sums.
     covariance : array, (linear, linear)
         Correction of the covariance of the coefficients.
     removed : array, (blocks, size)
@@ -110,7 +110,7 @@ class Settling:
 
 
 def settling_of_mean(blocks: BlockSums) -> Settling | None:
-    """Settling of the mean of the only channel; None if the blocks are too few for one."""
+    """Settling of the mean of the only channel; None if the blocks are too few for a fit."""
     linear = blocks.basis.linear
     gram, moments = blocks.totals()
     inner = inverted(gram[:linear, :linear])
@@ -125,7 +125,7 @@ def settling_of_mean(blocks: BlockSums) -> Settling | None:
 def find_settlings(
     blocks: BlockSums, channel: int, fitted: Float, inner: Float, white: float
 ) -> tuple[Settling, ...]:
-    """Settlings of a channel, of its mean and of each harmonic; those that are possible at all.
+    """The possible settlings of a channel: of its mean and of each harmonic.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ class _Profile:
         self._left = blocks.moments[:, :, channel] - blocks.gram @ fitted
 
     def settling(self) -> Settling | None:
-        """The settling of this order; None if the blocks are too few for one."""
+        """The settling of this order; None if the blocks are too few for a fit."""
         if self._half.size < 8:
             return None
         begin, end = self._range

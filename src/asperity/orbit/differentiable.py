@@ -41,10 +41,8 @@ from asperity.orbit.gradient.search import KnownOrbits, SearchedOrbits, search_o
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider import QuasiStatic, Slider
-from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.problem import checked_problem, flatten
-from asperity.slider.radiating import Radiating
+from asperity.slider import Slider
+from asperity.slider.problem import checked_problem, flatten, motion_type
 
 #: Smallest number of points that a program is compiled for; larger numbers are powers of two.
 _FEWEST = 4
@@ -106,13 +104,13 @@ class ResponseFunction:
             Every parameter by name, each a number or of shape (points,); in SI, or a text
             with its unit.
         known : KnownOrbits, optional
-            Of as many points, from earlier calls with other parameters. Orbits that the fast
-            method does not find are kept there for the next call, and begun there by
-            ``search="direct"``. For a search without multipliers, and parameters that are not
-            traced.
+            Orbits of the same points from earlier calls with other parameters. The call stores
+            there the orbits that the fast method does not find, and ``search="direct"`` and
+            ``search="coarse"`` take their initial guesses from there. Only for a search without
+            multipliers and for parameters that are not traced.
         motions : bool, optional
-            Whether a direct search integrates motions where it finds no orbit otherwise, 10 ms a
-            point; by default ``search="direct"`` does and ``search="coarse"`` does not.
+            Whether a direct search integrates a transient where it finds no orbit otherwise, 10 ms
+            a point; by default ``search="direct"`` does and ``search="coarse"`` does not.
 
         Returns
         -------
@@ -127,7 +125,7 @@ class ResponseFunction:
             `Outcome.INVALID`.
         """
         padded, points = self._padded(parameters)
-        self._require_fitting(known, points or 1, traced=_traced(padded))
+        self._check_known(known, points or 1, traced=_traced(padded))
         if _traced(padded):
             fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
             return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
@@ -152,21 +150,22 @@ class ResponseFunction:
         known : KnownOrbits, optional
             As for a call.
         every : bool
-            Whether the answer is of use only where every point has a response, as to a fit. The
-            search may then end at the first point without an orbit, and leaves out derivatives.
+            Whether the result is needed only if every point has a response, as in a fit. The search
+            may then end at the first point without an orbit, and leaves out derivatives.
         names : collection of str, optional
-            Parameters that derivatives are wanted to; all by default. Each takes time where orbits
-            are searched for.
+            Parameters to differentiate to; all by default. Each takes time where orbits are
+            searched for.
 
         Returns
         -------
         values : ResponseValues
         derivatives : dict of str to ResponseValues
-            By parameter, of the shapes of `values`: at each point to the value of that point. The
-            derivative to a parameter that all points share is the sum over the points.
+            For each parameter, with the shapes of `values`: the derivative of the response at each
+            point to the parameter at the same point. The derivative to a parameter that all points
+            share is the sum over the points.
         """
         padded, points = self._padded(parameters)
-        self._require_fitting(known, points or 1, traced=_traced(padded))
+        self._check_known(known, points or 1, traced=_traced(padded))
         table: Any
         if _traced(padded):
             fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
@@ -187,8 +186,8 @@ class ResponseFunction:
             n: _derivative(c, values) for n, c in columns if names is None or n in names
         }
 
-    def _require_fitting(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
-        """Refuse known orbits that this call cannot begin with."""
+    def _check_known(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
+        """Refuse known orbits that this call cannot take as initial guesses."""
         if known is None:
             return
         if traced or not self._program.search or self._program.multipliers:
@@ -204,7 +203,10 @@ class ResponseFunction:
             raise InputError("known", rule, got, "each law and motion needs its own")
 
     def _padded(self, parameters: Mapping[str, ArrayLike]) -> tuple[Parameters, int | None]:
-        """All parameters with as many points as a program is compiled for, and the points given."""
+        """All parameters, padded to the size of the compiled program, and the number of points.
+
+        The number is None if every parameter is a number.
+        """
         equations = self._program.equations
         given = self._defaults | dict(parameters)
         for name in given:
@@ -234,9 +236,8 @@ class ResponseFunction:
             )
         (count,) = next(iter(long), (1,))
         size = self.compiled_points(count)
-        lay_out = partial(_laid_out, count=count, size=size, module=jnp if traced else np)
-        padded = {n: lay_out(v) for n, v in given.items()}
-        return padded, count if long else None
+        pad = partial(_padded, count=count, size=size, module=jnp if traced else np)
+        return {n: pad(v) for n, v in given.items()}, count if long else None
 
 
 def _require_rate_dependence(law: type[Law]) -> None:
@@ -244,8 +245,8 @@ def _require_rate_dependence(law: type[Law]) -> None:
     require(law.rate_dependent, "law", rule, got, "choose another law")
 
 
-def _laid_out(value: Any, *, count: int, size: int, module: Any) -> Any:
-    """A parameter of `count` points, the last one repeated up to `size`."""
+def _padded(value: Any, *, count: int, size: int, module: Any) -> Any:
+    """A parameter of `count` points, its last value repeated up to `size` points."""
     flat = module.broadcast_to(module.asarray(value, dtype=float), (count,))
     return module.concatenate([flat, module.broadcast_to(flat[-1:], (size - count,))])
 
@@ -297,14 +298,15 @@ def response_function(
         Fourier coefficients, "load_cos_1", "load_sin_1", "shear_cos_1", "pull_cos_1", ..., become
         parameters with the coefficients of `modulation` as defaults.
     search : bool, "direct" or "coarse"
-        Whether to search for orbits that the fast method does not find. Without it they are not
-        converged, and programs are smaller. "direct" tries series under slow modulation, and
-        collocation from the orbits of `KnownOrbits`, from the averaged limit and, under a harmonic
-        load, from the orbit on which a motion from steady sliding settles, in some milliseconds a
-        point; it leaves out what follows branches, which may take a minute for one point. Within
-        `jax.jit`, and where multipliers are wanted, it is as True. "coarse" is the same on 72
-        intervals without a check of the mesh, and without motions unless a call asks for them:
-        values good to some 1e-6, to look for minima with.
+        Whether to search for orbits that the fast method does not find. With False these points do
+        not converge, and the compiled programs are smaller. True allows every method, also those
+        that follow branches, which may take a minute for one point. "direct" takes some
+        milliseconds a point: it tries series under slow modulation, and collocation from the orbits
+        of `KnownOrbits`, from the averaged limit and, under a harmonic load, from the last period
+        of a transient from steady sliding. Within `jax.jit`, and where multipliers are wanted,
+        "direct" means True. "coarse" is "direct" on 72 intervals without a check of the mesh, and
+        without transients unless a call asks for them: its values have errors of about 1e-6, small
+        enough to look for the minima of a fit.
     least_points : int
         Calls with fewer points are padded to this number, so that calls with different numbers of
         points share one compiled program.
@@ -332,25 +334,23 @@ def response_function(
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). With D the equations of an orbit
     Y for parameters p, D(p, Y) = 0, its derivative is -D_Y^-1 D_p.
 
-    Where the search is needed within `jax.jit`, a separate process does it, which takes some
-    seconds to start. Multipliers with inertia or radiation damping need it at every point.
-    Derivatives at its orbits are those of collocation on 216, 648 or 1,944 intervals, the fewest on
-    which mean and harmonics agree with those of the search to 1e-10: within some 1e-7 of the
-    largest derivative of an output, 1e-5 where the interface sticks (`cut-off`) and slip is sharp.
-    Their second derivatives, within JAX's transformations, are NaN. A direct search takes its
-    values from these meshes too, from the first that agrees with one of a third as many intervals
-    so well that its own error is below 1e-10. Where the finest mesh agrees with the search to less
-    than 1e-8, the outcome is `Outcome.NOT_RESOLVED`.
+    Where the search is needed within `jax.jit`, a separate process runs it, which takes some
+    seconds to start. Multipliers with inertia or radiation damping need the search at every point.
+    Derivatives at orbits of the search are those of collocation on 216, 648 or 1,944 intervals: the
+    fewest on which mean and harmonics agree with those of the search to 1e-10. Their error is about
+    1e-7 of the largest derivative of an output, 1e-5 where the interface sticks (`cut-off`) and
+    slip is sharp. Second derivatives at these orbits, within JAX's transformations, are NaN. A
+    direct search takes its values from these meshes too: from the first mesh that agrees with a
+    mesh of a third as many intervals so well that the error of the finer mesh is below 1e-10. Where
+    the finest mesh differs from the search by more than 1e-8, the outcome is
+    `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
     if modulation is not None:
         modulation = checked_modulation(modulation)
     _require_rate_dependence(law_type)
-    motion: type = QuasiStatic
-    if inertia or radiation_damping:
-        elastic = law_type.elastic_length is not Law.elastic_length
-        kinds = (Inertial, StiffInertial) if inertia else (RadiatingAsperities, Radiating)
-        motion = kinds[0] if elastic else kinds[1]
+    elastic = law_type.elastic_length is not Law.elastic_length
+    motion = motion_type(inertia=inertia, damped=radiation_damping, elastic=elastic)
     coefficients = None if modulation is None else coefficients_of(modulation)
     equations = ParametrisedProblem(law_type, motion, radiation_damping, coefficients)
     defaults = {} if modulation is None or coefficients is None else load_values(modulation)

@@ -19,7 +19,15 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.algebra.mirrored_grid import antiderivative
-from asperity.algebra.small_systems import Matrix, add, inverse_points, multiply, product, subtract
+from asperity.algebra.small_systems import (
+    Matrix,
+    add,
+    averaged,
+    inverse_points,
+    multiply,
+    product,
+    subtract,
+)
 
 #: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
 #: phases, is then unknown, too.
@@ -77,7 +85,7 @@ def log_multipliers_of_exponent(exponent: Any, log_determinant: Any) -> Any:
     log_determinant : array, shape (points,)
         Trace of `exponent`, free of cancellation.
     """
-    return _turned_back(_eigenvalues(exponent, log_determinant))
+    return _principal(_eigenvalues(exponent, log_determinant))
 
 
 def _eigenvalues(exponent: Any, log_determinant: Any) -> Any:
@@ -93,13 +101,13 @@ def _eigenvalues(exponent: Any, log_determinant: Any) -> Any:
     return sorted_logs(xp.linalg.eigvals(xp.moveaxis(finite, -1, 0)).T + 0j)
 
 
-def _turned_back(logs: Any) -> Any:
+def _principal(logs: Any) -> Any:
     """Logarithms with arguments in (-pi, pi]."""
     xp = logs.__array_namespace__()
     return logs - 2j * np.pi * xp.ceil(logs.imag / (2 * np.pi) - 0.5)
 
 
-#: Estimated error of L, and size of what still varies where its periodic factor is wanted.
+#: Accepted error of L, and accepted size of the last q where the factor P is wanted.
 _EXPONENT_ERROR, _FACTOR_ERROR = 1e-10, 1e-9
 #: Largest difference between the trace of 2 pi L and Liouville's formula. Of 20,651 orbits at
 #: numbers over decades 117 differ by more than 1e-7, half of them by more than 0.01; the larger
@@ -144,12 +152,12 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
 
         dz/dtau = R z,      R = (1 + q)^-1 (L + J q),
 
-    and R varies less than J by a factor of the size of L and q. A step does this with the R of the
-    last one; P is the product of all 1 + q. By averaging, the error of L is the square of what
-    still varies.
+    and R varies less than J by a factor of the size of L and q. Each step applies this to the R of
+    the step before; P is the product of all 1 + q. The error of L is about the square of the
+    variation that is left.
 
-    Where 1 + q is singular at some phase there is no such change of variables, and an L to which
-    the steps converge may be any. Its trace, which the steps keep otherwise, tells.
+    Where 1 + q is singular at some phase there is no such change of variables, and the steps may
+    converge to a wrong L. Its trace shows this, because otherwise the steps keep the trace.
     """
     n = range(len(J))
     accepted = _FACTOR_ERROR if factor else _EXPONENT_ERROR
@@ -169,7 +177,7 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
 
     def unfinished(carry: tuple) -> Array:
         *_, change, error, steps = carry
-        # What diverges becomes large or NaN, and ends the iteration.
+        # A diverging iteration becomes large or NaN, which ends it.
         return (steps < _MOST_STEPS) & jnp.any((error > accepted) & (change < 1e3))
 
     none = jnp.zeros(J[0][0].shape[1])
@@ -184,9 +192,9 @@ def floquet_form(J: Matrix, integral: np.ndarray, *, factor: bool = False) -> Fl
 
 @jax.custom_jvp
 def log_multipliers_along(J: Matrix, integral: np.ndarray) -> Array:
-    """ln|m| + i arg m, (n, points), of `floquet_form`, with derivatives; J as there.
+    """ln|m| + i arg m, (n, points), with derivatives; arguments as of `floquet_form`.
 
-    Simple multipliers: at a double one derivatives are not finite.
+    At a double multiplier the derivatives are not finite.
     """
     exponent = floquet_form(J, integral).exponent
     return log_multipliers_of_exponent(exponent, jnp.trace(exponent))
@@ -214,13 +222,13 @@ def _logs_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
         weights = multiply(multiply(P, [list(row) for row in projector]), back)
         change = sum(weights[j][i] * dJ[i][j] for i in n for j in n)
         changes.append(2 * jnp.pi * change.mean(0))
-    return _turned_back(logs), jnp.stack(changes)
+    return _principal(logs), jnp.stack(changes)
 
 
 def _means(entries: Matrix) -> Matrix:
     """Means over tau, as products with a vector: XLA's reductions would be slower."""
-    share = np.full(len(entries[0][0]), 1 / len(entries[0][0]))
-    return [[share @ entry for entry in row] for row in entries]
+    nodes = len(entries[0][0])
+    return averaged(entries, np.full(nodes, 1 / nodes))
 
 
 def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Complex:
@@ -258,7 +266,7 @@ def from_logs(logs: Complex) -> Complex:
 
 
 def multiplier_gap(before: Complex, now: Complex) -> Float:
-    """Largest relative change of multipliers, shape (points,); inf where one is not known.
+    """Largest relative change of multipliers, shape (points,); inf where a multiplier is unknown.
 
     Parameters
     ----------
@@ -271,22 +279,19 @@ def multiplier_gap(before: Complex, now: Complex) -> Float:
         largest = np.minimum(np.abs(new).max(0, initial=0.0), np.exp(LARGEST_LOG))
         floor = np.maximum(_VANISHING[several], several * _LOST_IN_ROUND_OFF * largest)
         gaps = np.abs(old - new) / np.maximum(np.abs(new), floor)
-        # Beyond doubles the logarithms are compared, the multipliers elsewhere.
+        # Where multipliers overflow, their logarithms are compared.
         turned = np.abs(np.exp(1j * (before.imag - now.imag)) - 1)
         changes = np.abs(before.real - now.real) / np.abs(now.real)
         gaps = np.where(now.real > LARGEST_LOG, np.maximum(changes, turned), gaps)
-    # The logarithm of a multiplier that vanishes is -inf, which is no lack of knowledge.
+    # A multiplier that vanishes has the logarithm -inf; it is known.
     return np.where(np.isnan(gaps), np.inf, gaps).max(0, initial=0.0)
 
 
 #: Bifurcations by the argument of the leading multiplier where it leaves the unit circle.
 FOLD, PERIOD_DOUBLING, NEIMARK_SACKER = "fold", "period doubling", "Neimark-Sacker"
 
-#: Arguments (rad) below this, and as close to pi, are real multipliers.
-_REAL = 1e-12
 
-
-def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
+def kind_of_crossing(logs: Complex, real: float = 1e-12) -> NDArray[np.object_]:
     """Bifurcation at which a multiplier leaves the unit circle, by its argument; "" if unknown.
 
     Real and positive: a fold. Real and negative: period doubling, a response that repeats only
@@ -296,11 +301,13 @@ def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
     ----------
     logs : complex array
         ln|m| + i arg m.
+    real : float
+        Multipliers whose argument is closer than this to 0 or pi (rad) are real.
     """
     angle = np.abs(logs.imag)
     kinds = np.full(logs.shape, NEIMARK_SACKER, dtype=object)
-    kinds[angle < _REAL] = FOLD
-    kinds[np.abs(angle - np.pi) < _REAL] = PERIOD_DOUBLING
+    kinds[angle < real] = FOLD
+    kinds[np.abs(angle - np.pi) < real] = PERIOD_DOUBLING
     kinds[np.isnan(angle) | np.isnan(logs.real)] = ""
     return kinds
 

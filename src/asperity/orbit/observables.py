@@ -84,9 +84,9 @@ def response_gap(
     before, now : complex array, shape (1 + count, points)
         Mean, then harmonics.
     each : int
-        Number of harmonics that are compared relative to themselves; higher ones relative to the
-        first. Those that vanish relative to the first, or to the mean, are compared up to
-        round-off.
+        Number of harmonics whose difference is divided by their own modulus; that of a higher
+        harmonic is divided by the modulus of the first. A harmonic that vanishes relative to the
+        first, or to the mean, is compared up to round-off.
     """
     with np.errstate(all="ignore"):
         mean, first = np.abs(now[0]), np.abs(now[1])

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 class Outcome(IntEnum):
     """Outcome of a periodic solve.
 
-    FOLDED, RUNAWAY and SENSITIVE are answers: the branch of orbits that begins with steady sliding
-    does not reach the amplitude asked for, or not in a way that anything could hold. Other orbits,
-    not connected to it, may exist. OUT_OF_RANGE is given without a search.
+    FOLDED, RUNAWAY and SENSITIVE are results, not failures of a method: the branch of orbits that
+    begins with steady sliding does not reach the requested amplitude, or reaches it only through
+    orbits that no computation and no experiment could stay on. Orbits that are not connected to
+    steady sliding may exist. OUT_OF_RANGE is given without a search.
     """
 
     CONVERGED = 0
@@ -66,8 +67,8 @@ _SENTENCES = {
     ),
     Outcome.SENSITIVE: (
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
-        "for part of the period that a disturbance grows by more than e^15, which neither a mesh "
-        "nor an experiment can hold; lower epsilon or stiffen the spring"
+        "for part of the period that a disturbance grows by more than e^15, so that no computation "
+        "and no experiment can follow it; lower epsilon or stiffen the spring"
     ),
     Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }

@@ -123,18 +123,17 @@ def periodic_response(
     )
     flat, shape = flatten(problem)
     points = int(np.prod(shape, dtype=int))
-    report = counted(progress, points)
+    options = SearchOptions(harmonics, waveform, counted(progress, points))
     if slider.law.rate_dependent:
-        options = {"harmonics": harmonics, "phases": waveform, "methods": chosen}
         if workers is None:
             workers = available_cores() if points >= WORTHWHILE else 1
         if workers > 1:
-            solution = find_orbits_on_cores(flat, points, workers, progress=report, **options)
+            solution = find_orbits_on_cores(flat, options, chosen, workers)
         else:
-            solution = find_orbits(flat, points, progress=report, **options)
+            solution = find_orbits(flat, options, chosen)
     else:
-        solution = _proportional(flat, points, harmonics, waveform)
-        report(points)
+        solution = _proportional(flat, points, options)
+        options.progress(points)
     mu_ss = np.asarray(_mu_ss(slider.law, problem.system.V)) * np.ones(shape)
     return PeriodicResponse.from_search(solution, shape, mu_ss, *problem)
 
@@ -144,9 +143,9 @@ def _mu_ss(law: Law, V: ArrayLike) -> Array:
     return law.mu_ss(V)
 
 
-def _proportional(problem: Problem, points: int, harmonics: int, phases: int) -> Solution:
+def _proportional(problem: Problem, points: int, options: SearchOptions) -> Solution:
     """A law without rate dependence: the force follows load and shear force, without dynamics."""
-    system, load = problem
+    (system, load), (harmonics, phases, *_) = problem, options
     count = max(phases, 4 * harmonics)
 
     def force(samples: int) -> np.ndarray:
@@ -156,7 +155,7 @@ def _proportional(problem: Problem, points: int, harmonics: int, phases: int) ->
         return np.asarray(at.w * friction - at.shear)
 
     spectrum = np.fft.rfft(force(count), axis=0) / count
-    solution = Solution.empty(0, points, SearchOptions(harmonics, phases, lambda _: None))
+    solution = Solution.empty(0, points, options)
     solution.mean_friction[:] = spectrum[0].real
     solution.harmonics[:] = 2 * spectrum[1 : harmonics + 1]
     solution.waveform[:] = np.stack([force(phases), np.zeros((phases, points))])
@@ -165,7 +164,8 @@ def _proportional(problem: Problem, points: int, harmonics: int, phases: int) ->
 
 
 #: Rate per radian of a perturbation that stands in for zero: the response differs from the limit by
-#: about as much, and the elastic motion of asperities, which does not vanish, drowns smaller rates.
+#: about this rate. At smaller rates the elastic motion of the asperities, which does not vanish,
+#: hides the rest of the response.
 _STIFFNESS = 1e-8
 
 

@@ -24,13 +24,7 @@ from asperity.parameters.parameter import (
     parameter_line,
 )
 from asperity.slider import Motion, Slider
-from asperity.slider.named import (
-    equation_parameters,
-    equations_as_text,
-    value_of,
-    values_as_text,
-)
-from asperity.slider.problem import Problem
+from asperity.slider.named import equation_parameters, equation_values, equations_as_text
 
 if TYPE_CHECKING:
     import xarray
@@ -314,17 +308,17 @@ class PeriodicResponse(Drawn):
 
     def _parameter_values(self) -> dict[str, tuple[Parameter, Any]]:
         """Parameters of the equations and of the drive with their values, of any shape."""
-        problem = Problem(self.motion, self.load)
         known = equation_parameters(self.motion, self.load)
-        values = {name: (p, value_of(problem, p)) for name, p in known.items()}
-        # Of a load that is not harmonic: the amplitude of its first harmonic.
-        return values | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
+        values = equation_values(self.motion, self.load)
+        # A load that is not harmonic has no epsilon: its first harmonic gives it.
+        pairs = {name: (p, values[name]) for name, p in known.items()}
+        return pairs | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
 
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, conventions, tolerance and source of the numbers."""
         return {
-            **equations_as_text(self.motion, values_as_text(self.motion, self.load)),
+            **equations_as_text(self.motion, equation_values(self.motion, self.load)),
             "relative_tolerance": 1e-8,
             "modulation": self.load.formula,
             "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",

@@ -1,22 +1,20 @@
 """The search for periodic orbits: methods in order, each for the points not solved so far.
 
-`METHODS` is the order in which methods are tried, fast methods first; each is described in its
-module.
+`METHODS` is the order in which methods are tried, fast methods first; each method is described in
+its module.
 
-Orbits are searched for within limits of dimensionless numbers, so that units do not matter, wider
-than the range that is tested (`docs/theory/numerical_method.md`). A point outside gets
-`Outcome.OUT_OF_RANGE` at once: a search there takes up to a minute and fails, or gives a stability
-that is round-off.
+The search is limited to a range of dimensionless numbers, which is wider than the tested range
+(`docs/theory/numerical_method.md`). A point outside gets `Outcome.OUT_OF_RANGE` at once: a search
+there takes up to a minute and fails, or gives a stability that only round-off decides.
 
-On several cores each core runs a process, since an XLA program gains little from several cores.
+On several cores each core runs a process, because an XLA program gains little from several cores.
 Worker processes are started once and kept; each loads the compiled programs from the cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -98,14 +96,7 @@ def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
 
 
 def find_orbits(
-    problem: Problem,
-    points: int,
-    *,
-    harmonics: int,
-    phases: int,
-    progress: Callable[[int], None],
-    methods: tuple[Method, ...] = METHODS,
-    intervals: int = 0,
+    problem: Problem, options: SearchOptions, methods: tuple[Method, ...] = METHODS
 ) -> Solution:
     """Find the periodic orbit of every operating point within the limits.
 
@@ -113,22 +104,14 @@ def find_orbits(
     ----------
     problem : Problem
         NumPy arrays with the points along the last axis.
-    points : int
-    harmonics, phases : int
-        Numbers of harmonics and of waveform samples.
-    progress : callable
-        Called with the number of points finished since the last call.
+    options : SearchOptions
     methods : tuple of Method
-    intervals : int
-        Number of intervals of the meshes on which orbits are kept, by methods on meshes alone; 0 to
-        keep none.
     """
-    options = SearchOptions(harmonics, phases, progress, intervals)
-    solution = Solution.unsolved(problem, points, options)
+    solution = Solution.unsolved(problem, problem.system.V.shape[-1], options)
     mark_out_of_range(problem, solution)
     outside = solution.outcome == Outcome.OUT_OF_RANGE
     for method in methods:
-        if not method.suits(problem) or (intervals and not method.on_mesh):
+        if not method.suits(problem) or (options.intervals and not method.on_mesh):
             continue
         left = method.candidates(solution)
         left = left[~outside[left]]
@@ -136,8 +119,7 @@ def find_orbits(
             rows = left[start : start + method.block]
             solution.merge(rows, method.solve(take(problem, rows), options), method.name)
     mark_too_unstable(problem, solution)
-    failed = np.flatnonzero(~solution.converged)
-    progress(len(failed))
+    options.progress(int((~solution.converged).sum()))
     return solution
 
 
@@ -149,30 +131,21 @@ WORTHWHILE = 200_000
 
 
 def find_orbits_on_cores(
-    problem: Problem,
-    points: int,
-    workers: int,
-    *,
-    harmonics: int,
-    phases: int,
-    progress: Callable[[int], None],
-    methods: tuple[Method, ...],
+    problem: Problem, options: SearchOptions, methods: tuple[Method, ...], workers: int
 ) -> Solution:
-    """`find_orbits` with the points divided among `workers` processes; same results and order."""
-    solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
-    options = {"harmonics": harmonics, "phases": phases, "methods": methods}
+    """`find_orbits` with the points divided among `workers` processes; same results and order.
+
+    Orbits on meshes are not returned.
+    """
+    points = problem.system.V.shape[-1]
+    solution = Solution.unsolved(problem, points, options)
     slices = [np.arange(k, min(k + _SLICE, points)) for k in range(0, points, _SLICE)]
     problems = [take(problem, index) for index in slices]
+    silent = SearchOptions(options.harmonics, options.phases)
     with process_pool(workers, "workers") as executor:
-        results = executor.map(partial(_search, options=options), problems)
+        results = executor.map(partial(find_orbits, options=silent, methods=methods), problems)
         for index, result in zip(slices, results, strict=True):
-            # Orbits are not wanted here.
             for target, values in zip(solution[:-1], result[:-1], strict=True):
                 target[..., index] = values
-            progress(len(index))
+            options.progress(len(index))
     return solution
-
-
-def _search(problem: Problem, options: dict[str, Any]) -> Solution:
-    points = len(np.asarray(problem.system.V))
-    return find_orbits(problem, points, progress=lambda _: None, **options)

@@ -31,12 +31,12 @@ class Solution(NamedTuple):
     outcome : int array, shape (points,)
         `Outcome` of each point.
     detail : array, shape (points,)
-        The number in its sentence; 0 where a method learnt nothing of the point.
+        Number in the sentence of the outcome; 0 where no method has a result.
     method : str array, shape (points,)
         Name of the method that gave the outcome; "" for none.
     orbit : Orbit
-        Orbits of the converged points on `SearchOptions.intervals` intervals, without any where
-        that is 0; the mesh of the others is 0 throughout.
+        Orbits of the converged points on `SearchOptions.intervals` intervals; the mesh of the other
+        points is 0 throughout.
     """
 
     mean_friction: Float
@@ -89,15 +89,15 @@ class Solution(NamedTuple):
 
     @property
     def informed(self) -> NDArray[np.bool_]:
-        """Points with an outcome of a method, an orbit or the reason of a failure."""
+        """Points at which a method found an orbit, or the reason why there is none."""
         return (self.outcome != Outcome.NO_ORBIT) | (self.detail > 0)
 
     def store(
         self, rows: Indices, observables: Observables, logs: NDArray[np.complex128] | None = None
     ) -> None:
-        """Write converged points, with logarithms of the multipliers if these are known better.
+        """Write converged points; `logs` take the place of the observables' multipliers.
 
-        Not their waveforms, which are sampled once an orbit is final.
+        Waveforms are sampled later, when an orbit is final.
         """
         self.mean_friction[rows] = observables.mean_friction
         self.harmonics[:, rows] = observables.harmonics
@@ -120,6 +120,10 @@ class Solution(NamedTuple):
             self.method[rows] = method
 
 
+def _no_report(_: int) -> None:
+    """No report of progress."""
+
+
 class SearchOptions(NamedTuple):
     """Requested observables, and progress.
 
@@ -128,14 +132,15 @@ class SearchOptions(NamedTuple):
     harmonics, phases : int
         Numbers of harmonics and of waveform samples.
     progress : callable
-        Called with the number of points solved since the last call.
+        Called with the number of points finished since the last call.
     intervals : int
-        Number of intervals of the stored orbits; 0 to store none.
+        Number of intervals of the meshes on which orbits are stored, by methods on meshes alone; 0
+        to store none.
     """
 
     harmonics: int
-    phases: int
-    progress: Callable[[int], None]
+    phases: int = 0
+    progress: Callable[[int], None] = _no_report
     intervals: int = 0
 
 
@@ -184,6 +189,6 @@ class Method(ABC):
         Returns
         -------
         Solution
-            Converged points have passed the checks of the method; for the others `outcome` and
-            `detail` say what was learnt.
+            Converged points have passed the checks of the method; `outcome` and `detail` of the
+            other points say why they have not.
         """

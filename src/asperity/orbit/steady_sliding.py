@@ -9,8 +9,8 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.algebra.small_systems import jacobian_columns, spectral_radius
-from asperity.loads import Excitation, Harmonic
+from asperity.algebra.small_systems import spectral_radius
+from asperity.loads import Harmonic
 from asperity.orbit.batches import chunk_of, points_of, run_chunks
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
@@ -25,7 +25,7 @@ _CHUNK = 4096
 class SteadySliding(NamedTuple):
     """Dimensionless numbers of an operating point, each (points,).
 
-    Mass and damping do not count: they add fast rates, which methods can treat.
+    Mass and damping are left out: they add fast rates, which the methods can treat.
 
     Attributes
     ----------
@@ -44,11 +44,7 @@ class SteadySliding(NamedTuple):
 
 def perturbation_rate(problem: Problem) -> Array:
     """Largest rate per radian of a perturbation of steady sliding, mass and damping included."""
-    system, points = problem.system, points_of(problem)
-    steady = jnp.broadcast_to(system.steady(), (system.size, points))
-    at = Excitation(jnp.ones(points))
-    _, columns = jacobian_columns(lambda Y: system.rates(Y, at), steady)
-    return spectral_radius(jnp.stack(columns, axis=1))
+    return spectral_radius(problem.system.steady_jacobian())
 
 
 def steady_sliding_of(problem: Problem) -> SteadySliding:

@@ -58,6 +58,23 @@ def rising(span: tuple[float, float], label: str, advice: str = "write it like 1
         raise InputError(label, "end after it begins", got, advice)
 
 
+def broadcast_shape(label: str, *values: Any) -> tuple[int, ...]:
+    """Common shape of arrays.
+
+    Raises
+    ------
+    InputError
+        If their shapes do not broadcast.
+    """
+    shapes = [np.shape(value) for value in values]
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        got = ", ".join(sorted({str(shape) for shape in shapes if shape}))
+        advice = "give arrays of one shape, or add axes of length 1"
+        raise InputError(label, "have shapes that broadcast", got, advice) from None
+
+
 def typed(function: Callable[P, R]) -> Callable[P, R]:
     """Let annotations be the check of the arguments of a function, or of a class.
 

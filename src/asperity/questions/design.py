@@ -82,17 +82,17 @@ class Design(Question):
     Attributes
     ----------
     law : str
-        That the readings are expected to follow.
+        Law that the readings are expected to follow.
     free : tuple of str
         Free parameters of the later fit.
     ranges : dict of str to Range
         V, epsilon, frequency, and other settings of the machine.
     noise : dict of str to Noise
-        By observable: what is measured.
+        For each observable that is measured.
     measure : tuple of str
         Parameters to be measured; or `rival` is given.
     rival : str, optional
-        A law to be excluded.
+        A law that the readings shall exclude.
     rival_free : tuple of str, optional
         Its free parameters.
     points : int, optional

@@ -90,7 +90,7 @@ class Track(Record):
     amplitude : float
         Standard deviation of mu0.
     length : float or str
-        Over which mu0 forgets itself (m).
+        Correlation length of mu0 (m).
     exponent : float
         Exponent of the power law of its spectrum beyond one over that length.
     origin : float or str

@@ -34,7 +34,7 @@ class Data(Record):
     source : Source
         How a recording is read.
     window : (float, float), optional
-        First and last time (s) of what is fitted.
+        First and last time (s) of the samples that are fitted.
     steps : tuple of float, optional
         Times (s) at which the velocity of the drive changes.
     velocities : tuple of float, optional
@@ -78,7 +78,7 @@ _PLUS_MINUS = re.compile(r"^\s*(.+?)\s*(?:\+-|±|\+/-)\s*([-+.\deE]+)\s*(.*?)\s*
 
 
 def _priors(value: Any) -> Any:
-    """Materials stand under their names, with None."""
+    """Priors by parameter; a material is a key with the value None."""
     if value is None or isinstance(value, Mapping):
         return value or {}
     texts = (value,) if isinstance(value, str) else value
@@ -103,7 +103,7 @@ class Estimation(Record):
     Attributes
     ----------
     free : tuple of str, optional
-        Free parameters, also as a text with commas; all that the data may show by default.
+        Free parameters, also as a text with commas; by default all that the data may determine.
     prior : dict of str to NormalPrior
     profile : bool
         Whether intervals are by profile likelihood.
@@ -126,7 +126,7 @@ class FitOptions(Estimation):
     fixed, start : dict of str to float or str
         Numbers in SI, or texts with units.
     material : str, optional
-        A material that fixes what is given nowhere else.
+        A material whose numbers apply where no other field has a number.
     inertia, radiation_damping : bool
         Whether the mass M and the damping eta count.
     trend : {"none", "linear", "quadratic"}

@@ -37,7 +37,7 @@ _LONGEST = 60
 #: brackets and the names of records.
 _TYPES = frozenset({"bool", "float", "int", "str", "constrained-str", "nullable"})
 
-#: What a value must be, by the beginning of pydantic's name of the mistake.
+#: Rule that a value breaks, by the beginning of pydantic's name of the mistake.
 _WORDS = {
     "bool_": "true or false",
     "int_": "a whole number",
@@ -134,7 +134,7 @@ def units_required() -> Iterator[None]:
 
 
 def require_unit(value: Any, kind: str, field: str = "") -> Any:
-    """A quantity as it is given, which in a file carries its unit.
+    """The quantity unchanged, if it has the unit that files require.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def require_unit(value: Any, kind: str, field: str = "") -> Any:
 
 
 def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
-    """Mistakes about bare numbers where a unit is needed: in files, which say what they mean.
+    """Mistakes about numbers without a unit, in files.
 
     Parameters
     ----------

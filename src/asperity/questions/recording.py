@@ -1,4 +1,4 @@
-"""How a recording is read, and what is measured in it."""
+"""Questions about a recording: how its file is read, and which quantities are measured."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Source(ReadingRecipe):
     Attributes
     ----------
     recipe : Path, optional
-        A reduction file, whose fields stand where this record leaves them open.
+        A reduction file, whose fields apply where this record has none.
     area : str or float, optional
         Contact area, which makes stresses forces.
     """
@@ -75,7 +75,7 @@ class Source(ReadingRecipe):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Keyword arguments of `asperity.read`; only those that say something."""
+        """Keyword arguments of `asperity.read`, without those that have their default."""
         named = self.model_dump(exclude={"title", "area"})
         return {name: value for name, value in named.items() if value not in (None, {}, "")}
 
@@ -98,8 +98,8 @@ class Measurement(Question):
     Attributes
     ----------
     modulated : bool, optional
-        Whether the load is; by default velocity steps and holds are read where it is constant, or
-        where some are given.
+        Whether the load is modulated. By default it is not if it is constant or if steps or holds
+        are given; velocity steps and holds are then measured.
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
@@ -119,7 +119,7 @@ class Measurement(Question):
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
     stick_slip : bool, optional
-        Whether slip events are read; by default where there are some, and no modulation.
+        Whether slip events are measured; by default if there are some and no modulation.
     stiffness, velocity, mass, normal_load : float or str, optional
         K (N/m), V (m/s), M (kg) and W0 (N) of the machine, for slip events.
     """

@@ -8,8 +8,8 @@ of faults. With asperities of stiffness W/lambda, F_i/W is a further state,
 
     d(F_i/W)/dt = (v - v_pl) / lambda,
 
-which has no dW/dt in it and takes the stiffness away: the slider swings on the asperities near
-sqrt(W0 / (lambda M)). Without asperities v is what the friction law resists, and ln v is the state.
+without dW/dt, and the equations are no longer stiff: the slider swings on the asperities near
+sqrt(W0 / (lambda M)). Without asperities the friction law acts on v itself, and ln v is the state.
 
 Source: Bureau et al. (2000), Eqs. (8), (26)-(29).
 """
@@ -26,8 +26,8 @@ from asperity.loads import Excitation
 from asperity.slider.motion import Motion
 
 
-class _Damped(Motion):
-    """A motion with radiation damping.
+class Damped(Motion):
+    """Equations with the spring force F/W0 as the first state, and with radiation damping.
 
     Parameters
     ----------
@@ -47,35 +47,39 @@ class _Damped(Motion):
         """W0 / (M V omega): gain of v/V per radian and unit force over W0."""
         return self.slider.W0 / (self.slider.M * self.V * self.omega)
 
-    def _balance(self, friction: Array, velocity: Array, at: Excitation) -> Array:
-        """Spring force over W0 that balances friction and damping."""
-        return at.w * friction + self.damping * velocity - at.shear
+    def force(self, Y: Array, at: Excitation) -> Array:
+        """F/W0."""
+        return Y[0]
 
-    def _law_rates(self, v: ArrayLike, slip: ArrayLike, Y: Array, at: Excitation) -> list[Array]:
+    def mechanical_states(
+        self, friction: Array, velocity: ArrayLike, log_slip: ArrayLike, at: Excitation
+    ) -> tuple[ArrayLike, ...]:
+        """As in `Motion`; the spring force balances friction and damping."""
+        force = at.w * friction + self.damping * velocity - at.shear
+        states = {
+            "force": force,
+            "velocity": velocity,
+            "log_velocity": log_slip,
+            "friction": friction,
+        }
+        return tuple(states[name] for name in self.mechanical)
+
+    def log_slip(self, Y: Array, at: Excitation) -> Array:
+        """ln(v_pl / V), where F_i/W is a state."""
         law = self.slider.law
-        rates = law.state_rate(self.V * v, self.V * slip, self.law_state(Y), at.w)
-        return [r / self.omega for r in rates]
+        return law.log_velocity(self._friction(Y), self.law_state(Y), at.w) - jnp.log(self.V)
+
+    def _friction(self, Y: Array) -> Array:
+        return Y[self.mechanical.index("friction")]
 
 
-class _OnAsperities(_Damped):
+class _OnAsperities(Damped):
     """Elastic asperities: the state "friction" is F_i/W."""
 
     @property
     def strain(self) -> Array:
         """V / (lambda omega): gain of F_i/W per radian while the slider moves at V on its joint."""
         return self.V / (self.slider.law.elastic_length * self.omega)
-
-    def force(self, Y: Array, at: Excitation) -> Array:
-        """F/W0."""
-        return Y[0]
-
-    def _friction(self, Y: Array) -> Array:
-        return Y[self.mechanical.index("friction")]
-
-    def log_slip(self, Y: Array, at: Excitation) -> Array:
-        """ln(v_pl / V)."""
-        law = self.slider.law
-        return law.log_velocity(self._friction(Y), self.law_state(Y), at.w) - jnp.log(self.V)
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""
@@ -96,20 +100,9 @@ class Inertial(_OnAsperities):
     mechanical: ClassVar[tuple[str, ...]] = ("force", "velocity", "friction")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, False, False)
 
-    def steady(self) -> Array:
-        """Steady sliding."""
-        mu = self.slider.law.mu_ss(self.V)
-        return self._steady_states(mu + self.damping, 1.0, mu)
-
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return Y[1]
-
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force, velocity, friction."""
-        return self._balance(friction, velocity, at), velocity, friction
 
     def _acceleration(self, Y: Array, at: Excitation) -> list[Array]:
         return [self.mobility * (Y[0] + at.shear - at.w * Y[2] - self.damping * Y[1])]
@@ -122,23 +115,12 @@ class RadiatingAsperities(_OnAsperities):
     mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
 
-    def steady(self) -> Array:
-        """Steady sliding."""
-        mu = self.slider.law.mu_ss(self.V)
-        return self._steady_states(mu + self.damping, mu)
-
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return (Y[0] + at.shear - at.w * Y[1]) / self.damping
 
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force, friction."""
-        return self._balance(friction, velocity, at), friction
 
-
-class StiffInertial(_Damped):
+class StiffInertial(Damped):
     """Inertia without asperities; states Y = (F/W0, ln(v/V), *law states).
 
     Singularly perturbed: velocities relax at the rate A W / (M v), which grows without bound as
@@ -149,14 +131,6 @@ class StiffInertial(_Damped):
     mechanical: ClassVar[tuple[str, ...]] = ("force", "log_velocity")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def steady(self) -> Array:
-        """Steady sliding."""
-        return self._steady_states(self.slider.law.mu_ss(self.V) + self.damping, 0.0)
-
-    def force(self, Y: Array, at: Excitation) -> Array:
-        """F/W0."""
-        return Y[0]
-
     def log_slip(self, Y: Array, at: Excitation) -> Array:
         """ln(v / V), a state."""
         return Y[1]
@@ -164,12 +138,6 @@ class StiffInertial(_Damped):
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return jnp.exp(Y[1])
-
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force, ln(v/V)."""
-        return self._balance(friction, jnp.exp(log_slip), at), log_slip
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""

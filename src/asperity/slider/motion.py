@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.algebra.small_systems import jacobian_columns
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
@@ -69,7 +70,7 @@ class Motion(eqx.Module):
 
     @property
     def compliance_ratio(self) -> Array:
-        """L = lambda K / W0: stiffness of the spring over that of the asperities."""
+        """The ratio l = lambda K / W0: stiffness of the spring over that of the asperities."""
         return self.slider.law.elastic_length * self.slider.K / self.slider.W0
 
     @property
@@ -81,9 +82,11 @@ class Motion(eqx.Module):
         """The law's states."""
         return tuple(Y[len(self.mechanical) :])
 
-    @abstractmethod
     def steady(self) -> Array:
         """States of steady sliding under constant load, shape (size, ...)."""
+        law = self.slider.law
+        mechanical = self.mechanical_states(law.mu_ss(self.V), 1.0, 0.0, Excitation(jnp.ones(())))
+        return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))
 
     @abstractmethod
     def force(self, Y: Array, at: Excitation) -> Array:
@@ -114,13 +117,26 @@ class Motion(eqx.Module):
 
     @abstractmethod
     def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
+        self, friction: Array, velocity: ArrayLike, log_slip: ArrayLike, at: Excitation
+    ) -> tuple[ArrayLike, ...]:
         """The mechanical states from F_i/W, v/V and ln(v_pl/V), without inertia."""
 
     @abstractmethod
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
+
+    def _law_rates(self, v: ArrayLike, slip: ArrayLike, Y: Array, at: Excitation) -> list[Array]:
+        """Rates of the law's states per radian, for the velocities dx/dt and v_pl over V."""
+        law = self.slider.law
+        rates = law.state_rate(self.V * v, self.V * slip, self.law_state(Y), at.w)
+        return [r / self.omega for r in rates]
+
+    def steady_jacobian(self) -> Array:
+        """Derivatives [row, column] of the rates in steady sliding, shape (size, size, points)."""
+        steady = self.steady()
+        at = Excitation(jnp.ones(steady.shape[1:]))
+        _, columns = jacobian_columns(lambda Y: self.rates(Y, at), steady)
+        return jnp.stack(columns, axis=1)
 
     def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
         """Factors, shape as Y, that make the rates times them as linear in Y as possible.
@@ -129,7 +145,3 @@ class Motion(eqx.Module):
         magnitude at one end of the step than at the other.
         """
         return 1.0
-
-    def _steady_states(self, *mechanical: ArrayLike) -> Array:
-        law = self.slider.law
-        return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))

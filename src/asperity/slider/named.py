@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
@@ -51,23 +52,30 @@ def with_value(problem: Problem, parameter: Parameter, value: Any) -> Problem:
     return eqx.tree_at(lambda p: _leaf(p, parameter.path), problem, changed)
 
 
-def values_as_text(motion: Motion, load: Modulation | None = None) -> str:
-    """All parameters with units, ``A = 0.013; K = 200000.0 N/m``; a range for an array."""
+def equation_values(motion: Motion, load: Modulation | None = None) -> dict[str, Any]:
+    """Values of `equation_parameters` by name."""
     problem = Problem(motion, load)
-    named = equation_parameters(motion, load).values()
-    shown = [f"{p.name} = {_shown(value_of(problem, p))} {p.unit}".rstrip() for p in named]
-    return "; ".join(shown)
+    return {name: value_of(problem, p) for name, p in equation_parameters(motion, load).items()}
 
 
-def equations_as_text(motion: Motion, parameters: str) -> dict[str, Any]:
-    """Version, law with its source, equation of motion and parameters, as files keep them."""
+def equations_as_text(motion: Motion, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Version, law with its source, equation of motion and parameters, as files keep them.
+
+    Parameters
+    ----------
+    motion : Motion
+    values : mapping of str to array
+        Written as ``A = 0.013; K = 200000.0 N/m``, with a range for an array.
+    """
     law = type(motion.slider.law)
+    known = point_parameters(law)
+    shown = [f"{name} = {_shown(v)} {known[name].unit}".rstrip() for name, v in values.items()]
     return {
         "asperity_version": __version__,
         "law": law.name,
         "source": law.source,
         "equation_of_motion": motion.name,
-        "parameters": parameters,
+        "parameters": "; ".join(shown),
     }
 
 
@@ -79,13 +87,13 @@ def slider_values(slider: Slider) -> dict[str, Any]:
 
 
 def law_from(law: type[Law], values: Any) -> Law:
-    """The law with the values that a mapping has by name."""
+    """The law with the values of a mapping from names of parameters to values."""
     names = law_parameters(law).items()
     return law(**{p.path.rsplit(".", 1)[-1]: values[name] for name, p in names})
 
 
 def slider_from(law: type[Law], values: Any) -> Slider:
-    """The slider with the values, SI or texts with units, that a mapping has by name.
+    """The slider with the values of a mapping from names of parameters to values.
 
     Parameters
     ----------

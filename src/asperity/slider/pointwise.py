@@ -92,7 +92,8 @@ def _slopes(
         return problem.system.rates(Y, at), problem.system.force(Y, at)
 
     _, push = jax.linearize(lambda problem: rates_and_force(problem, states), problem)
-    # Phases and points do not depend on each other: the sum's gradient is each one's own.
+    # Phases and points do not depend on each other: the gradient of the sum holds the derivative at
+    # each phase and point.
     gradient = jax.grad(lambda Y: rates_and_force(problem, Y)[1].sum())(states)
     return *jax.vmap(push)(directions), gradient
 

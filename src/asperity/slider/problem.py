@@ -16,6 +16,7 @@ from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
+from asperity.parameters.arguments import broadcast_shape
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
@@ -23,6 +24,15 @@ from asperity.slider.radiating import Radiating
 from asperity.slider.slider import Slider
 
 T = TypeVar("T")
+
+
+def motion_type(*, inertia: bool, damped: bool, elastic: bool) -> type[Motion]:
+    """Equation of motion with inertia or not, with radiation damping or not, by its asperities."""
+    if inertia:
+        return Inertial if elastic else StiffInertial
+    if damped:
+        return RadiatingAsperities if elastic else Radiating
+    return QuasiStatic
 
 
 def equation_of_motion(
@@ -64,12 +74,8 @@ def equation_of_motion(
         _require_positive("slider.M", slider.M, "kg", "give the mass, as mass='1.6 kg'")
     else:
         _require_positive("radiation_damping", eta, "N s/m", "leave it out where there is none")
-    damping = 0.0 if eta is None else eta
-    if _elastic(slider):
-        asperities = Inertial if inertia else RadiatingAsperities
-        return asperities(slider, V, omega, damping)
-    bare = StiffInertial if inertia else Radiating
-    return bare(slider, V, omega, damping)
+    kind: Any = motion_type(inertia=inertia, damped=True, elastic=_elastic(slider))
+    return kind(slider, V, omega, 0.0 if eta is None else eta)
 
 
 def _require_positive(name: str, value: ArrayLike | None, unit: str, remedy: str) -> None:
@@ -162,13 +168,7 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     InputError
         If the shapes do not broadcast.
     """
-    leaves = jax.tree.leaves(problem)
-    try:
-        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
-    except ValueError:
-        shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
-        advice = "give arrays of one shape, or add axes of length 1"
-        raise InputError(name, "have shapes that broadcast", ", ".join(shapes), advice) from None
+    shape = broadcast_shape(name, *jax.tree.leaves(problem))
     return (
         jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), problem),
         shape,

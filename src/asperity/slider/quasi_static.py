@@ -21,6 +21,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 from jax import Array
+from jax.typing import ArrayLike
 
 from asperity.loads import Excitation
 from asperity.slider.motion import Motion
@@ -32,10 +33,6 @@ class QuasiStatic(Motion):
     name: ClassVar[str] = "quasi-static"
     mechanical: ClassVar[tuple[str, ...]] = ("elongation",)
     logarithmic: ClassVar[tuple[bool, ...]] = (False,)
-
-    def steady(self) -> Array:
-        """States of steady sliding under a constant load."""
-        return self._steady_states(self.slider.law.mu_ss(self.V) * (1 + self.compliance_ratio))
 
     def force(self, Y: Array, at: Excitation) -> Array:
         """F/W0."""
@@ -63,8 +60,8 @@ class QuasiStatic(Motion):
         return self._velocity(Y, at, self.slip_velocity(self.friction(Y, at), Y, at))
 
     def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
+        self, friction: Array, velocity: ArrayLike, log_slip: ArrayLike, at: Excitation
+    ) -> tuple[ArrayLike, ...]:
         """Total elongation z."""
         return (friction * (at.w + self.compliance_ratio) - at.shear,)
 
@@ -81,7 +78,5 @@ class QuasiStatic(Motion):
         """dY/dtheta."""
         slip = self.slip_velocity(self.friction(Y, at), Y, at)
         z_rate = self.kappa * (at.pull - slip)
-        v = self.V * self._velocity(Y, at, slip)
-        law = self.slider.law
-        state_rates = law.state_rate(v, self.V * slip, self.law_state(Y), at.w)
-        return jnp.stack(jnp.broadcast_arrays(z_rate, *(r / self.omega for r in state_rates)))
+        v = self._velocity(Y, at, slip)
+        return jnp.stack(jnp.broadcast_arrays(z_rate, *self._law_rates(v, slip, Y, at)))

@@ -18,27 +18,20 @@ from jax.typing import ArrayLike
 
 from asperity.laws import Law, State
 from asperity.loads import Excitation
-from asperity.slider.inertial import _Damped
+from asperity.slider.inertial import Damped
 
-#: From velocities at which damping carries it all to those at which it carries A W takes
-#: ln(mu / A) steps, of about one unit of ln v each; from there convergence is quadratic.
+#: Number of Newton steps. From velocities at which damping carries the whole force to those at
+#: which it carries A W the method takes ln(mu / A) steps, of about one unit of ln v each; after
+#: that it converges quadratically.
 _STEPS = 14
 
 
-class Radiating(_Damped):
+class Radiating(Damped):
     """Radiation damping, no asperities; states Y = (F/W0, *law states)."""
 
     name: ClassVar[str] = "radiation-damped"
     mechanical: ClassVar[tuple[str, ...]] = ("force",)
     logarithmic: ClassVar[tuple[bool, ...]] = (False,)
-
-    def steady(self) -> Array:
-        """Steady sliding."""
-        return self._steady_states(self.slider.law.mu_ss(self.V) + self.damping)
-
-    def force(self, Y: Array, at: Excitation) -> Array:
-        """F/W0."""
-        return Y[0]
 
     def log_slip(self, Y: Array, at: Excitation) -> Array:
         """ln(v / V)."""
@@ -53,12 +46,6 @@ class Radiating(_Damped):
         force = Y[0] + at.shear
         forward = Y.at[0].set(jnp.abs(force) - at.shear)
         return jnp.sign(force) * jnp.exp(self.log_slip(forward, at))
-
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force."""
-        return (self._balance(friction, jnp.exp(log_slip), at),)
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""

@@ -2,14 +2,14 @@
 
     M dv/dt = F + S - F_i - eta v,      dF/dt = K (V p - v),      v = v(F_i/W, state, W)
 
-with the velocity that the law yields. It has a sign, and a logarithm on one side of rest only; the
-friction F_i/W has a value everywhere, and takes the place of v among the states:
+where the law gives v, which has a sign. ln v exists on one side of rest only; the friction F_i/W
+has a value everywhere, and takes the place of ln v among the states:
 
     d(F_i/W)/dt = [dv/dt - dv/dstate dstate/dt - dv/dw dw/dt] / [dv/d(F_i/W)].
 
-For the regularised law F_i/(A W) = asinh[v / (2 V*)], V* = V0 exp[-(mu0 + B phi) / A]: the state
-goes with v near rest and with ln v in sliding. A slider at rest creeps at the velocity at which
-friction balances the spring, to which it relaxes within M V* / (A W).
+For the regularised law F_i/(A W) = asinh[v / (2 V*)], V* = V0 exp[-(mu0 + B phi) / A]: the state is
+proportional to v near rest and linear in ln v in sliding. A slider at rest creeps at the velocity
+at which friction balances the spring; its velocity relaxes to this one within M V* / (A W).
 """
 
 from __future__ import annotations
@@ -23,40 +23,20 @@ from jax.typing import ArrayLike
 
 from asperity.laws import Law
 from asperity.loads import Excitation
-from asperity.slider.inertial import StiffInertial, _Damped
+from asperity.slider.inertial import Damped, StiffInertial
 from asperity.slider.motion import Motion
 
 
-class ReversingInertial(_Damped):
+class ReversingInertial(Damped):
     """Inertia without asperities, signed; states Y = (F/W0, F_i/W, *law states)."""
 
     name: ClassVar[str] = "inertial"
     mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
     logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
 
-    def steady(self) -> Array:
-        """Steady sliding."""
-        mu = self.slider.law.mu_ss(self.V)
-        return self._steady_states(mu + self.damping, mu)
-
-    def force(self, Y: Array, at: Excitation) -> Array:
-        """F/W0."""
-        return Y[0]
-
-    def log_slip(self, Y: Array, at: Excitation) -> Array:
-        """ln(v / V), forwards."""
-        law = self.slider.law
-        return law.log_velocity(Y[1], self.law_state(Y), at.w) - jnp.log(self.V)
-
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return self.slip_velocity(Y[1], Y, at)
-
-    def mechanical_states(
-        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
-    ) -> tuple[Array, ...]:
-        """Force, friction."""
-        return self._balance(friction, velocity, at), friction
 
     def friction_jump(self, Y: Array, before: Excitation, after: Excitation) -> Array:
         """Change of F_i/W where the load steps: the velocity is continuous."""

@@ -2,8 +2,8 @@
 
 Closed forms for Rice-Ruina friction with rigid or elastic asperities (lambda), Linker-Dieterich
 ageing (alpha) and inertia (M). The approximations of Bureau et al. (2000), section III, are limits
-of them, and they check the automatic differentiation of `asperity.theory.perturbation`, with which
-they share nothing. Dimensionless, theta = omega t, per eps and eps^2; n is the harmonic::
+of these forms. They are an independent check of `asperity.theory.perturbation`, which uses
+automatic differentiation. Dimensionless, theta = omega t, per eps and eps^2; n is the harmonic::
 
     kappa = V K/(omega W0)      nu = V/(omega D0)          q = omega lambda/V
     r_n = 1 - n^2 M omega^2/K   beta_n = B nu/(n i + nu)   S_n = A - beta_n

@@ -7,8 +7,9 @@ orbit shrinks to a point:
     < v_pl(f/w, state, w) > = V,      < state rates > = 0.
 
 The exponent of v_pl varies by eps mu / A, tens of units, so that the mean over the load cycle is
-that of a narrow pulse at the weakest contact. The start comes from its Laplace (saddle-point)
-estimate, and Newton's method works on the logarithm of the mean slip rate, which is nearly linear.
+that of a narrow pulse at the weakest contact. The initial guess is the Laplace (saddle-point)
+estimate of this mean, and Newton's method works on the logarithm of the mean slip rate, which is
+nearly linear.
 
 In the adiabatic limit the states at every phase are those of steady sliding under the present load.
 """
@@ -25,7 +26,10 @@ from jax import Array
 
 from asperity.algebra.small_systems import (
     Matrix,
+    apply,
+    averaged,
     inverse_points,
+    jacobian,
     jacobian_columns,
     spectral_abscissa,
 )
@@ -149,15 +153,11 @@ def _newton_step(
         return tuple(system.rates(jnp.stack(Y), constant))
 
     value, push = jax.linearize(rates, *(c + flat for c in centre))
-    one = jnp.ones_like(at.w)
-    n = len(centre)
-    columns = [push(*(one if i == j else flat for j in range(n))) for i in range(n)]
-    matrix = [[weights @ column[i] for column in columns] for i in range(n)]
+    matrix = averaged(jacobian(push, value), weights)
     mean = [weights @ rate for rate in value]
     slip = 1 - mean[0] / system.kappa
     mean[0] = -system.kappa * slip * jnp.log(slip)
-    inverse = inverse_points(matrix)
-    change = [-sum(a * m for a, m in zip(row, mean, strict=True)) for row in inverse]
+    change = [-c for c in apply(inverse_points(matrix), mean)]
     change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
     moved = jnp.stack([jnp.log(slip), *change[1:]])
     return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, jnp.abs(moved).max(0)

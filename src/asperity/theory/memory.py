@@ -26,11 +26,10 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
+from asperity.algebra.small_systems import spectral_abscissa
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
-from asperity.loads import Excitation
 from asperity.parameters import obeying
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, QuasiStatic, Slider
@@ -120,10 +119,7 @@ def steady_growth(motion: Motion) -> Array:
     motion : Motion
         Numbers of shape (points,). At 1 rad/s the rate is one per second.
     """
-    steady = motion.steady()
-    at = Excitation(jnp.ones(steady.shape[1]))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), steady)
-    return spectral_abscissa(jnp.stack(columns, axis=1))
+    return spectral_abscissa(motion.steady_jacobian())
 
 
 def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) -> Array:
@@ -136,7 +132,7 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
     ratio : array
         New velocity over the old one, positive.
     slip : array or str
-        Since the step (m).
+        Slip since the step (m).
     """
     name, law = _one_of_three(law)
     r = jnp.asarray(obeying(ratio, "state_after_step.ratio", "dimensionless", "positive"))

@@ -30,10 +30,9 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.algebra.small_systems import jacobian_columns, solve_points
-from asperity.errors import InputError
 from asperity.loads import Excitation
 from asperity.parameters import DRIVE, MACHINE, obeying
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import broadcast_shape, typed
 from asperity.slider import Motion, Slider, equation_of_motion
 
 #: (Y, w, dw/dtheta): the three arguments of the rates.
@@ -189,13 +188,7 @@ def perturb(system: Motion) -> PerturbationResponse:
     InputError
         If the shapes of the leaves do not broadcast.
     """
-    shapes = [jnp.shape(leaf) for leaf in jax.tree.leaves(system)]
-    try:
-        shape = jnp.broadcast_shapes(*shapes)
-    except ValueError:
-        given = ", ".join(sorted({str(s) for s in shapes if s}))
-        advice = "give arrays of one shape, or add axes of length 1"
-        raise InputError("parameters", "have shapes that broadcast", given, advice) from None
+    shape = broadcast_shape("parameters", *jax.tree.leaves(system))
     # One axis of points, as the linear solver takes them.
     points = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x, float), shape).ravel(), system)
     expand = _rate_independent if not system.slider.law.rate_dependent else _expand

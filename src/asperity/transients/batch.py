@@ -1,9 +1,9 @@
 """Many motions at once, each under constant load and drive: to a time, or to a crossing.
 
-Every motion takes steps of its length by the explicit method of order 8. A crossing is located by
-repeating the step in which it lies with another length, so that the states there have the accuracy
-of a step and not that of an interpolation. Derivatives with respect to the parameters are those of
-the steps at their lengths.
+Each motion has its own step length; steps are those of the explicit method of order 8. A crossing
+is located by repeating the step that contains it with other lengths, so that the states at the
+crossing have the accuracy of a step and not that of an interpolation. Derivatives with respect to
+the parameters are those of the steps at fixed lengths.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from asperity.slider import QuasiStatic, Slider
 from asperity.transients.equations import SegmentEquations
 from asperity.transients.explicit import attempt_step
 
-#: Tolerated error of a step, of logarithms and relative of forces, and absolute of forces.
+#: Tolerated error of a step: of logarithms and relative to forces, and the absolute one of forces.
 _RTOL, _ATOL = 1e-11, 1e-13
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
@@ -72,7 +72,7 @@ class Drive(NamedTuple):
     up : array
         The motion ends where this times ln(v_pl / V) rises through zero; 0 for never.
     level, width : array
-        The last time is located at which F/W0 comes as close to `level` as `width`.
+        The last time at which F/W0 comes within `width` of `level` is located.
     steady : array
         The motion ends where ln(v_pl / V) and the distances of the law's states from steady sliding
         sum up to less than this; 0 for never.
@@ -103,8 +103,8 @@ class Reached(NamedTuple):
     steps : array
         Steps taken, rejected ones among them.
     last, last_Y : array
-        Time at which the force last came as close to its level as the width, 0 if it never was
-        farther, and the states then.
+        Time at which the force last came within `Drive.width` of `Drive.level`, 0 if it was never
+        farther from the level; and the states at that time.
     """
 
     t: Array

@@ -67,7 +67,7 @@ class Termination:
         return _SENTENCES[self.kind].format(time=self.time, detail=self.detail)
 
 
-#: Of the time (s), relative, and of the distance at a root.
+#: Tolerances of the time of a root, relative, and of the distance at the root.
 _ROOT = {"xatol": 0.0, "xrtol": 4e-16, "fatol": 1e-13, "frtol": 0.0}
 
 #: v/V below which a slider whose velocity is about to vanish counts as at rest.
@@ -83,9 +83,9 @@ class Event:
     time : float
         Seconds.
     kind : str
-        "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`; where a
-        level of the force is given, "fall" through it, and "peak" and "trough" of the force, in
-        the place of the slips.
+        "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`. If
+        `EventThresholds.level` is set, "fall" (through the level), "peak" and "trough" (of the
+        force) take the place of "slip start" and "slip end".
     """
 
     time: float
@@ -106,7 +106,8 @@ class EventThresholds:
         Relative deviation below which sliding counts as steady, or change of a state over a period
         below which the response to a modulation counts as steady.
     level : float or None
-        F/W0 through which falls of the force are events, with its extrema under a steady drive.
+        Value of F/W0: falls of the force through it, and extrema of the force under a steady drive,
+        are events.
     """
 
     slip: float
@@ -283,7 +284,7 @@ class _PeriodicSteadiness:
         if self._last is None:
             changes[0] = np.inf
         # Sum of the changes still to come if they fall geometrically. Changes that no longer fall
-        # are lost in the errors of the steps: they count with the largest such factor.
+        # are errors of the steps: the factor is then the largest that is allowed.
         previous = np.append(self._change, changes[:-1])
         known = np.isfinite(previous) & (changes < previous)
         ratios = np.where(known, changes / np.where(known, previous, 1.0), 1.0)

@@ -17,7 +17,8 @@ from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_
 
 #: Sliding counts as steady within this share of the change of force from the extremum.
 SETTLED = 0.05
-#: Logarithms within which a motion that never reached the velocity of the drive counts as over.
+#: Sum of the distances from steady sliding, in logarithms, below which a motion ends that has not
+#: reached the velocity of the drive.
 _OVER = 1e-9
 
 

@@ -64,8 +64,9 @@ def _tableau() -> _ModalTableau:
     kept = kept[np.argsort(np.abs(values[kept].imag))]
     # A complex pair adds twice its real part.
     twice = np.where(np.abs(values[kept].imag) < 1e-9, 1.0, 2.0)
-    # An embedded quadrature of order s on the same points and on t itself, which has the weight
-    # of the real eigenvalue, so that the matrix at hand filters what is stiff out of it.
+    # An embedded quadrature of order s on the same points and on t itself. The weight of t is the
+    # real eigenvalue, so that the matrix that is factorised already damps the stiff components of
+    # the error.
     gamma = 1 / values[kept[0]].real
     weights = (1 / k - gamma * (k == 1)) @ scheme.monomials
     powers = np.zeros((s + 1, s))
@@ -186,7 +187,7 @@ def _largest_eigenvalue(matrix: Array) -> Array:
 
 
 def _left(size: Array, rate: Array) -> Array:
-    """Remainder after corrections that fall geometrically."""
+    """Sum of the corrections still to come, if they fall geometrically."""
     return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)
 
 

@@ -50,7 +50,7 @@ _HOPELESS_CHUNKS = 20
 
 @dataclass
 class Pace:
-    """Judges the steps of one segment by their number.
+    """Predicts how many steps one segment takes, and whether to leave out ringing.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Pace:
         self._tried, self._hopeless = False, 0
 
     def many(self, chunk: StepChunk, t: float, end: float) -> bool:
-        """Whether too many steps of the length of the chunk's remain to `end`."""
+        """Whether too many steps remain to `end`, if all are as long as the steps of the chunk."""
         return _steps_left(chunk, t, end) >= _MANY_STEPS
 
     def should_try(self, chunk: StepChunk, t: float, end: float) -> bool:
@@ -89,7 +89,7 @@ class Pace:
         return True
 
     def gained(self, chunk: StepChunk, trial: StepChunk, t: float) -> bool:
-        """Whether the steps of a trial from `t` are sufficiently longer than the chunk's."""
+        """Whether the steps of a trial from `t` are sufficiently longer than those of the chunk."""
         return _length(trial, t) > _GAIN * _length(chunk, t)
 
     def out_of_reach(
@@ -132,7 +132,7 @@ def _steps_left(chunk: StepChunk, t: float, end: float) -> float:
 #: Names of the methods in results.
 NAMES = {explicit: "explicit", implicit: "implicit"}
 
-#: Share of the steps of a chunk that must suggest the other method before it is tried.
+#: Share of doubtful steps in a chunk from which the other method is tried.
 _MOST = 0.6
 
 #: Cost of an implicit step in explicit steps.
@@ -142,10 +142,10 @@ _COST = 2.5
 class MethodChoice:
     """The explicit or the implicit method, chosen by the last steps.
 
-    Either method reports steps that the other might have taken more cheaply. When the explicit
-    method is at its limit of stability, the implicit one is tried; unless its steps are longer by
-    more than the ratio of the costs, the next trial waits for twice as long. Measured times play
-    no part, so that the same input gives the same result.
+    Each method marks a step as doubtful if the other method could have taken it at lower cost. When
+    the explicit method is at its limit of stability, the implicit method is tried. If its steps are
+    not longer by more than the ratio of the costs, the next trial waits twice as long. Measured
+    computing times are not used, so that the same input gives the same result.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class MethodChoice:
         return implicit if self._implicit else explicit
 
     def learn(self, chunk: StepChunk, many: bool) -> None:
-        """Judge the method by the chunk of steps it has just taken.
+        """Choose the method of the next chunk from the chunk of steps just taken.
 
         Parameters
         ----------

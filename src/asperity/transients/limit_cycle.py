@@ -1,18 +1,19 @@
-"""Limit cycles of a slider that is pulled at one velocity: stick-slip, as the motion repeats it.
+"""Limit cycles of a slider that is pulled at a constant velocity: periodic stick-slip.
 
 The motion begins far outside the cycle, as after slow sliding, or on the cycle of a slider with
-similar parameters. It is followed from one fall of the spring force through its level of steady
-sliding to the next: under a drive of velocity V the force has its extrema where the slider moves at
-V, where only its state can make it differ from steady sliding, to both sides of it. The states at
-these falls are a return map s -> P(s), whose fixed point is found by Newton's method with the
-derivatives of `asperity.transients.variation`:
+similar parameters. It is integrated from one fall of the spring force through its level of steady
+sliding to the next such fall. In every cycle the force passes that level: its extrema are at
+instants at which the slider moves with the velocity V of the drive, and there the force differs
+from that of steady sliding only by the state of the interface, upwards at a peak and downwards at a
+trough. The states at the falls form a return map s -> P(s), whose fixed point is computed by
+Newton's method with the derivatives of `asperity.transients.variation`:
 
     (1 - P_s) ds = P(s) - s,      P_s = (1 - f q^T / (q f)) D_s,
 
-D_s the derivatives of the states at the end to those at the beginning, f the rates at the end and q
-the gradient of the force. Eigenvalues of P_s are the multipliers of the cycle, which is taken where
-it is stable. The same equation with P_p in the place of P(s) - s gives the derivatives to the
-parameters.
+with D_s the derivatives of the states at the end to those at the beginning, f the rates at the end
+and q the gradient of the force. The eigenvalues of P_s are the multipliers of the cycle; only a
+stable cycle is accepted. The same equation with P_p in the place of P(s) - s gives the derivatives
+to the parameters.
 
 Source: R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010),
 chapter 7.
@@ -40,23 +41,24 @@ from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
 from asperity.transients.variation import Variation
 
-#: Velocities of the sliding before the first cycle, over that of the drive: the second where the
-#: first slip from the first is too large for the law.
+#: Velocities of sliding before the first cycle, over that of the drive. The second is used where
+#: the first slip after the slower sliding is too large for the law.
 _SLOWER = (1e-3, 0.3)
 #: Difference of F/W0 between peak and trough below which sliding is steady.
 _STEADY = 1e-6
-#: Slips in a period, and slips that are followed, at most.
+#: Largest number of slips in a period, and of slips that are integrated.
 _MOST_SLIPS, _MOST_CYCLES = 8, 400
 #: Longest cycles that are followed at once.
 _CYCLES = 10
-#: Newton's step of a logarithm, in tolerances of a step, that is none: the errors of the steps of a
-#: cycle add up to less.
+#: Newton's method ends where the change of every logarithm is below this multiple of the tolerance
+#: of a step: the errors of the steps of a cycle add up to less.
 _CLOSED = 100.0
-#: Newton's step of a logarithm from which the motion is followed on instead, and most steps.
+#: Newton's method is abandoned, and the motion integrated further, where the change of a logarithm
+#: is larger than this or after this number of steps.
 _NEAR, _PASSES = 0.5, 8
-#: Length of the motion that is tried for a cycle, over its period as known so far.
+#: Length of the motion that is integrated for one cycle, over the latest estimate of its period.
 _LONGER = 1.2
-#: Steps in a cycle, at most.
+#: Largest number of steps in a cycle.
 _MOST_STEPS = 200_000
 _TOO_MANY = (
     f"more than {_MOST_STEPS} steps do not end one; on elastic asperities the slider rings between "
@@ -137,8 +139,8 @@ class LimitCycle:
         Returns
         -------
         force : array, shape (n, parameters)
-            Derivatives of F/W0 per SI unit, at fixed times from a fall through the present level of
-            steady sliding: those from the peak differ by a shift in time.
+            Derivatives of F/W0 per SI unit, at fixed times after a fall through the level of steady
+            sliding; derivatives at fixed times after a peak differ by a shift in time.
         period : array, shape (parameters,)
         """
         assert self._orbit is not None  # where the motion repeats itself
@@ -226,9 +228,9 @@ class _Orbit:
     variation : Variation
         With these parameters.
     map : array, shape (size, size + parameters)
-        Derivatives of the last states, on the section, to the first ones and to the parameters.
+        Derivatives of the last states, on the section, to the first states and to the parameters.
     duration : array, shape (size + parameters,)
-        Those of the time in between (s).
+        Derivatives of the time between the falls (s).
     """
 
     run: _Run
@@ -353,8 +355,7 @@ def limit_cycle(
     inertia, radiation_damping, rtol
         As in `asperity.transients.transient`.
     near : LimitCycle, optional
-        Cycle of similar parameters and the same law: its cycle is followed to the present ones,
-        where it stays stable.
+        Cycle of a slider with similar parameters and the same law, used as the initial guess.
 
     Returns
     -------

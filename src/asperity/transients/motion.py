@@ -54,7 +54,7 @@ def integrate_blocks(
     slider, programme, initial, sampling, progress, **options
         As in `transient`.
     rows : int
-        Largest number of samples of a block.
+        Largest number of samples in a block.
     resume : Checkpoint, optional
         Checkpoint of the last block of an earlier call with the same arguments.
 
@@ -189,8 +189,8 @@ def transient(
         equation of motion, such as the last row of another trajectory's `states`.
     sampling : float, str or array, optional
         Rate (Hz) or times (s) at which to write; by default the steps of the integrator, which
-        are short where much happens. The solution is a polynomial on every step, so that the
-        rate costs next to nothing and does not change it.
+        are short where the states change fast. The solution is a polynomial on every step: a
+        higher rate takes little time and does not change the solution.
     inertia : bool
         Whether the mass of the slider counts.
     radiation_damping : float or str, optional
@@ -208,11 +208,11 @@ def transient(
         Deviation from steady sliding, or from a response that repeats itself with the modulation,
         below which it counts as reached.
     method : {"auto", "explicit", "implicit"}
-        "auto" takes whichever suits the equations and changes it on the way where they turn
-        stiff, or cease to be.
+        "auto" takes the method that suits the equations, and changes to the other where they
+        become stiff or are no longer stiff.
     most_steps : float
-        Number of steps at which the integration stops, or as soon as it is clear that its steps
-        are too short to reach the end with them.
+        Largest number of steps. The integration stops as soon as its steps are foreseeably too
+        short to reach the end with this number.
     progress : callable, optional
         Called now and then with the time reached and the end of the programme (s).
 
@@ -243,9 +243,10 @@ def transient(
     equations of motion use: a step of the load leaves them continuous and is exact.
 
     With inertia and elastic asperities the slider rings at sqrt(W0 / (lambda M)), and in a long
-    hold never quite ceases to. Where that would take more than a million steps to the end of a
-    segment, ringing below the velocity sqrt(lambda W0 / M) times the tolerated error of F_i/W is
-    left out; `provenance` gives it as ``unresolved_ringing`` (m/s), 0 where all is resolved.
+    hold the ringing never ends. Where steps that resolve it would need more than a million to the
+    end of a segment, ringing below the velocity sqrt(lambda W0 / M) times the tolerated error of
+    F_i/W is left out; `provenance` gives this velocity as ``unresolved_ringing`` (m/s), 0 where all
+    ringing is resolved.
     """
     arguments = dict(locals())
     rows = planned_rows(sampling, programme.duration)

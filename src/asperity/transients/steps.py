@@ -50,17 +50,17 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     function : callable
         Function of a `SegmentEquations` and other arguments.
     """
-    apart, joined = jax.jit(function), jax.jit(_joined(function))
+    many, single = jax.jit(function), jax.jit(_as_one_kernel(function))
 
     @wraps(function)
     def call(system: SegmentEquations, *arguments: Any) -> Any:
-        run = joined if _goes_well(system) else apart
+        run = single if _compiles_to_one(system) else many
         return run(system, *arguments)
 
     return call
 
 
-def _joined(function: Callable[..., Any]) -> Callable[..., Any]:
+def _as_one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     def within(*arguments: Any) -> Any:
         with set_xla_metadata(**_NO_ATTRIBUTES):
             return function(*arguments)
@@ -73,7 +73,7 @@ def _joined(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _goes_well(system: SegmentEquations) -> bool:
+def _compiles_to_one(system: SegmentEquations) -> bool:
     leaves, structure = jax.tree.flatten(system)
     return all(np.ndim(leaf) == 0 for leaf in leaves) and _elementwise(structure)
 
@@ -83,11 +83,11 @@ def _elementwise(structure: Any) -> bool:
     """Whether rates and excitation of a system of scalars are element-wise."""
     system = jax.tree.unflatten(structure, [np.ones(())] * structure.num_leaves)
 
-    def what_runs(system: SegmentEquations, t: jax.Array, Y: jax.Array) -> tuple:
+    def evaluate(system: SegmentEquations, t: jax.Array, Y: jax.Array) -> tuple:
         return system.rates(system.at(t), Y), system.segment.next_kink(t)
 
     with set_xla_metadata(**_NO_ATTRIBUTES):
-        jaxpr = jax.make_jaxpr(what_runs)(system, np.ones(()), np.ones(system.motion.size + 1))
+        jaxpr = jax.make_jaxpr(evaluate)(system, np.ones(()), np.ones(system.motion.size + 1))
     return _ALLOWED.issuperset(_primitives(jaxpr.jaxpr))
 
 
@@ -155,9 +155,9 @@ def run_steps(
     memory: Any,
     limits: tuple[float, float],
 ) -> StepChunk:
-    """Integrate from `t` towards `end`: at most `STEPS` accepted steps of `_TRIALS` that are tried.
+    """Integrate from `t` towards `end`: at most `STEPS` accepted steps and `_TRIALS` trial steps.
 
-    In the place of the coefficients are the records of the trials, (STEPS, ...).
+    The chunk has the records of the trials, (STEPS, ...), in place of the coefficients.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from asperity.loads.programme.programme import BREAK
 from asperity.parameters.arguments import number
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
-from asperity.slider.named import equations_as_text, values_as_text
+from asperity.slider.named import equation_values, equations_as_text
 from asperity.transients.events import Event, Termination
 from asperity.transients.integration import Checkpoint, Integration
 from asperity.units import to_si
@@ -48,7 +48,7 @@ class SampleTimes:
         self._next, self._after = 0, -np.inf
 
     def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """The next times (s) before `end`, at most `most` of them.
+        """The next times (s) before `end`, no more than `most`.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class SampleTimes:
             self._next = self._count(t, True)
 
     def _count(self, end: float, closing: bool) -> int:
-        """How many times lie before `end`, which is one of them where the trajectory closes."""
+        """Number of times before `end`; `end` itself is counted if the trajectory closes there."""
         # A time that coincides with a break point belongs to the segment after it.
         limit = end * (1 + BREAK if closing else 1 - BREAK)
         if self._times is not None:
@@ -141,7 +141,7 @@ def provenance(integration: Integration) -> dict[str, Any]:
     """Version, law, parameters with units, programme, equations, tolerances and effort."""
     motion = integration.motion
     return {
-        **equations_as_text(motion, values_as_text(motion)),
+        **equations_as_text(motion, equation_values(motion)),
         "programme": repr(integration.programme),
         "method": " and ".join(sorted(integration.methods)),
         "relative_tolerance": integration.tolerances.rtol,
@@ -232,7 +232,7 @@ class Trajectory(Drawn):
 
     @property
     def age(self) -> Float | None:
-        """Age Phi of the contacts (s), theta in geophysics; None for a law whose state is none."""
+        """Age Phi of the contacts (s), theta in geophysics; None for a law without such a state."""
         law = self.motion.slider.law
         ages = (RiceRuina.state_names, LinkerDieterich.state_names)
         if not isinstance(law, RiceRuina) or law.state_names[:1] not in ages:

@@ -4,10 +4,10 @@ Along a motion Y(t) with the rates f(Y, p) they are linear,
 
     dD/dt = f_Y D + f_p,
 
-with a column of D for each first state, D(0) = 1, and for each parameter, D(0) = 0. They are solved
-by Radau collocation with five stages on the steps of the motion. Of a motion whose steps the
-implicit method took they are the derivatives of these steps at fixed lengths; along others they
-have the order 9 of the method.
+with a column of D for each first state, D(0) = 1, and for each parameter, D(0) = 0. The equations
+are solved by Radau collocation with five stages on the steps of the motion. Where the implicit
+method took these steps, the results are the exact derivatives of the steps at fixed lengths;
+elsewhere their error is that of a method of order 9.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
 (Springer, 1993), section I.14.
@@ -93,7 +93,7 @@ class Variation:
         powers = np.linalg.inv(scheme.c[:, None] ** np.arange(1, STAGES + 1))
         rising = np.einsum("kj,njrc->knrc", powers, stages)
         here = np.eye(size, size + len(names))
-        # Of the rows that come with a first state the parameters have none.
+        # The rows for first states have no entries for the parameters.
         only = np.concatenate([np.zeros((size, size)), np.ones((size, len(names)))], axis=1)
         coefficients = np.empty((STAGES + 1, *rising.shape[1:]))
         for i in range(len(lengths)):

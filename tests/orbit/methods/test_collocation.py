@@ -72,20 +72,20 @@ def each(a):
 
 @pytest.mark.parametrize("complex_", [False, True])
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_solve_columns(n, complex_):
+def test_solve_columns_agrees_with_lapack(n, complex_):
     matrix, right = matrices(n, complex_=complex_), normal(n, COLUMNS, POINTS, seed=9)
     found, one = map(each, solve_columns_and_points(matrix, right))
     np.testing.assert_allclose(found, np.linalg.solve(each(matrix), each(right)), rtol=1e-9)
     np.testing.assert_allclose(one, found[:, :, 0], rtol=EXACT)
 
 
-def test_solve_columns_with_a_zero_pivot():
+def test_solve_columns_handles_a_zero_pivot():
     matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 3.0]])
     found, _ = solve_columns_and_points(repeated(matrix), repeated(np.eye(3, COLUMNS)))
     np.testing.assert_allclose(each(found)[0, :, :3], np.linalg.inv(matrix), atol=EXACT)
 
 
-def test_a_singular_matrix_is_not_solved_silently():
+def test_a_singular_matrix_gives_no_finite_solution():
     for found in solve_columns_and_points(
         repeated([[1.0, 2.0], [2.0, 4.0]]), repeated(np.ones((2, COLUMNS)))
     ):
@@ -93,20 +93,20 @@ def test_a_singular_matrix_is_not_solved_silently():
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_product(n):
+def test_product_is_the_matrix_product(n):
     a, b = matrices(n), matrices(n, seed=8)
     np.testing.assert_allclose(each(product(a, b)), each(a) @ each(b), atol=EXACT)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_spectral_radius(n):
+def test_spectral_radius_is_the_largest_modulus_of_the_eigenvalues(n):
     matrix = matrices(n)
     values = np.linalg.eigvals(each(matrix))
     np.testing.assert_allclose(spectral_radius(matrix), np.abs(values).max(1), rtol=3e-3)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
-def test_spectral_abscissa(n):
+def test_spectral_abscissa_is_the_largest_real_part_of_the_eigenvalues(n):
     # Similar to random matrices by scales that differ by many orders of magnitude, as those of
     # force, velocity and friction do.
     random = matrices(n)
@@ -144,7 +144,7 @@ def dense_cyclic(maps, right):
 
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("count", [1, 2, 17])
-def test_solve_cyclic(n, count):
+def test_solve_cyclic_agrees_with_a_dense_solution(n, count):
     maps = normal(n, n, count, 6) + np.eye(n)[:, :, None, None]
     sides = normal(n, 2, count, 6, seed=8)
     found = solve_cyclic(maps, sides)
@@ -154,7 +154,7 @@ def test_solve_cyclic(n, count):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_solve_bordered(n):
+def test_both_equations_of_a_bordered_system_hold(n):
     """Both equations hold, with one more unknown that the periodic recurrence alone leaves open."""
     maps = normal(n, n, 17, 6) + np.eye(n)[:, :, None, None]
     right, column, row = (normal(n, 17, 6, seed=seed) for seed in (8, 9, 10))
@@ -210,7 +210,7 @@ def on_mesh(problem, mesh):
     return np.stack([read.mean_friction, *read.harmonics, trace, read.log_determinant])
 
 
-def test_order_of_convergence():
+def test_the_error_falls_with_the_order_of_the_method():
     # Gauss-Legendre collocation with s stages is of order 2s at the nodes, and so are quadratures.
     law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
     pair = np.ones(2)
@@ -380,7 +380,7 @@ LOADS = modulated(
 )
 
 
-def test_load_shear_and_pull_even_or_not():
+def test_fourier_and_collocation_agree_for_loads_with_shear_and_pull():
     fast, robust = (
         asp.periodic_response(
             SLIDER,
@@ -401,7 +401,7 @@ def test_load_shear_and_pull_even_or_not():
     np.testing.assert_allclose(fast.waveform, robust.waveform, atol=1e-5)
 
 
-def test_a_point_without_progress_is_given_up_and_others_are_not():
+def test_a_point_without_progress_is_abandoned_and_others_converge():
     # The load of the second point is not a number: no change is smaller than the one before.
     law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
     pair = np.ones(2)

@@ -38,7 +38,7 @@ def exponent(f, phi, w):
     return (f / w - MU - B * phi) / A
 
 
-def test_marching_settles_on_the_same_orbit():
+def test_an_integration_in_time_settles_on_the_same_orbit():
     ageing, stiffness, epsilon = 40.0, 3.0, 0.5
     kappa = ageing * stiffness * (B - A)
     response = respond(ageing, stiffness, epsilon)
@@ -78,7 +78,7 @@ def test_in_the_limit_friction_follows_the_steady_state():
 @pytest.mark.parametrize(
     ("law", "seed", "softest", "largest"), [(RiceRuina, 8, 0, 0.9), (ElastoPlastic, 2, 0.5, 0.6)]
 )
-def test_collocation_finds_the_same(law, seed, softest, largest):
+def test_collocation_finds_the_same_orbit(law, seed, softest, largest):
     random = np.random.default_rng(seed)
     ageing, stiffness = 10 ** random.uniform(-1, 4, 40), 10 ** random.uniform(softest, 2, 40)
     epsilon = random.uniform(0.01, largest, 40)

@@ -141,7 +141,7 @@ def observed(mistake):
         lambda p, _: p._replace(step=p.step * np.nan),
     ],
 )
-def test_mistaken_passes_are_caught(monkeypatch, mistake):
+def test_planted_mistakes_in_an_integration_pass_are_detected(monkeypatch, mistake):
     plant(monkeypatch, mistake)
     found, left = shoot()
     assert len(left) == 3
@@ -149,7 +149,7 @@ def test_mistaken_passes_are_caught(monkeypatch, mistake):
     assert np.isnan(found.log_multipliers).all()
 
 
-def test_points_out_of_reach_are_left():
+def test_shooting_leaves_points_that_it_cannot_solve():
     """A resonance far above what the steps resolve, and slip that relaxes within one of them."""
     assert len(shoot(mass=1e-7)[1]) == 3
     fast = {"velocity": [1e-3, 1e-6], "epsilon": 0.3, "frequency": [20.0, 120.0]}
@@ -159,7 +159,7 @@ def test_points_out_of_reach_are_left():
     assert np.isfinite(found.mean_friction[1])
 
 
-def test_points_out_of_reach_go_to_collocation():
+def test_points_that_shooting_cannot_solve_go_to_collocation():
     law = PAPER | {"A": np.full(2, 0.013)}
     drive = {"velocity": [1e-4, 1e-6], "epsilon": 0.3, "frequency": [60.0, 120.0]}
     counts = []

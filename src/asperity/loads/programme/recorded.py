@@ -129,7 +129,7 @@ class RecordedSegment(ProgrammeSegment):
 def interpolated(
     time: np.ndarray, recorded: Any, level: float, kind: str, interpolant: str, name: str
 ) -> tuple[PiecewiseCubic, np.ndarray]:
-    """Cubics through the samples over the time since the first, with values that bound them.
+    """Cubics through the samples over the time since the first sample, and bounds of their values.
 
     Parameters
     ----------

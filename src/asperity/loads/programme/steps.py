@@ -228,9 +228,9 @@ class Follow(ProgrammeStep):
     velocity : array, shape (n,), optional
         V (m/s); as before by default.
     interpolant : {"pchip", "spline"}
-        Cubic pieces through all samples, from which both W and dW/dt come: those that never
-        overshoot, or those with a continuous second derivative,
-        which long steps can go over.
+        Piecewise cubic through all samples, from which both W and dW/dt follow. "pchip" never
+        overshoots; "spline" has a continuous second derivative, so that steps of the integrator
+        may be longer than the time between samples.
     """
 
     time: ArrayLike

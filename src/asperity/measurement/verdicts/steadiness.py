@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.lock_in.normal_equations import Basis, solved
+from asperity.lock_in.normal_equations import Basis, inverted
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
@@ -88,7 +88,7 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
 def _residual(basis: Basis, time: Float, values: Float) -> Float:
     """Residual of a separate fit to a piece of a window."""
     columns = basis.columns(time)[: basis.linear]
-    return values - solved(columns @ columns.T, columns @ values) @ columns
+    return values - inverted(columns @ columns.T) @ (columns @ values) @ columns
 
 
 def leakage(reading: LockInReading) -> Check:

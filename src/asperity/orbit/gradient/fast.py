@@ -18,7 +18,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations, contracted, implicit_solution
 from asperity.algebra.mirrored_grid import grid
-from asperity.algebra.small_systems import Matrix, inverse_points
+from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points, jacobian
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.balance import BalanceEquations, balanced_orbit
@@ -29,7 +29,6 @@ from asperity.orbit.methods.fourier import (
     advance,
     force_spectrum,
     fourier_orbit,
-    jacobian,
     load_cycle,
     orbit_error,
     rates_on,
@@ -217,8 +216,7 @@ class FourierEquations(Equations):
         """Jacobian and the inverse of its mean; steps."""
         problem, steps = parameters
         J = self.jacobian(problem, unknowns)
-        share = self.cycle(problem).share
-        inverse = inverse_points([[share @ entry for entry in row] for row in J])
+        inverse = inverse_points(averaged(J, self.cycle(problem).share))
         return (inverse, J), steps + _MORE_STEPS
 
     def residual(
@@ -233,10 +231,10 @@ class FourierEquations(Equations):
         rates = rates_on(problem.system, cycle)(*together(*unknowns))
 
         def push(*change: Array) -> States:
-            return _times(at[1], change)
+            return apply(at[1], change)
 
         mean, zero_mean, _ = advance(cycle, at[0], unknowns.mean, rates, push)
-        return _less(unknowns, FourierUnknowns(mean, zero_mean))
+        return jax.tree.map(jnp.subtract, unknowns, FourierUnknowns(mean, zero_mean))
 
     def solve(
         self, product: Any, right: FourierUnknowns, at: Any, steps: Array, *, transposed: bool
@@ -254,9 +252,9 @@ class FourierEquations(Equations):
 
         def forwards(y: FourierUnknowns) -> FourierUnknowns:
             states = tuple(m[:, None] + z for m, z in zip(y.mean, y.zero_mean, strict=True))
-            rates = _times(J, states)
-            change = tuple(-c for c in _times(inverse, tuple(r @ share for r in rates)))
-            follow = _times(J, tuple(c[:, None] for c in change))
+            rates = apply(J, states)
+            change = tuple(-c for c in apply(inverse, tuple(r @ share for r in rates)))
+            follow = apply(J, tuple(c[:, None] for c in change))
             zero_mean = tuple((r + f) @ integral for r, f in zip(rates, follow, strict=True))
             return FourierUnknowns(together(y.mean, change), zero_mean)
 
@@ -272,11 +270,3 @@ class FourierEquations(Equations):
         contract = backwards if transposed else forwards
         turned = jax.tree.map(jnp.transpose, right)
         return jax.tree.map(jnp.transpose, contracted(contract, turned, steps, points_first=True))
-
-
-def _less(a: Any, b: Any) -> Any:
-    return jax.tree.map(jnp.subtract, a, b)
-
-
-def _times(matrix: Matrix, vector: States) -> States:
-    return tuple(sum(a * b for a, b in zip(row, vector, strict=True)) for row in matrix)

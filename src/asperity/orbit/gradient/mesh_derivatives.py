@@ -33,7 +33,13 @@ from asperity.orbit.gradient.parametrised import (
     ResponseValues,
 )
 from asperity.orbit.gradient.search import MeshOrbits, search_orbits
-from asperity.orbit.mesh.equations import collocated, condensed_jacobian, quadrature, transfer_maps
+from asperity.orbit.mesh.equations import (
+    collocated,
+    condensed_jacobian,
+    fourier_coefficients,
+    quadrature,
+    transfer_maps,
+)
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.outcome import Outcome
 from asperity.slider.pointwise import curvature_along, slopes_along
@@ -89,7 +95,8 @@ def orbit_derivatives(
         sides, forces, gradient = _slopes(problem, orbit, directions)
         changes = _orbit_changes(orbit, values, sides)
         forces = forces + np.einsum("nkmb,dnkmb->dkmb", gradient, changes)
-        columns = [_force_columns(orbit, forces, harmonics)]
+        mean, phasors = fourier_coefficients(forces, orbit, harmonics)
+        columns = [np.moveaxis(np.stack([mean, *phasors.real, *phasors.imag]), 0, -1)]
         if logs is not None:
             columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
         part = np.concatenate(columns, axis=-1)
@@ -151,18 +158,6 @@ def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Floa
     return response, np.concatenate(constants, axis=2)[:, :, :count]
 
 
-def _force_columns(orbit: Orbit, forces: Float, harmonics: int) -> Float:
-    """Changes of mean and harmonics with those of F/W0, (directions, points, 1 + 2 harmonics)."""
-    weighted = quadrature(orbit) / (2 * np.pi) * forces
-    turn = np.exp(-1j * orbit.stage_phases)
-    phasors, turns = [], np.ones_like(turn)
-    for _ in range(harmonics):
-        turns = turns * turn
-        phasors.append(2 * np.einsum("kmb,dkmb->db", turns, weighted))
-    parts = [weighted.sum((1, 2)), *(c.real for c in phasors), *(c.imag for c in phasors)]
-    return np.stack(parts, axis=-1)
-
-
 def _multiplier_columns(
     problem: Problem,
     orbit: Orbit,
@@ -197,9 +192,9 @@ def _multiplier_columns(
         share = (left[j] * moved).sum(1) / (left[j] * after).sum(0)
         result[:, j] = share.sum(1)
     if pair:
+        units = np.broadcast_to(np.eye(size)[..., None, None, None], (size, *states.shape))
         trace = sum(
-            np.stack([along(k, _unit(i, states))[i] for k in range(len(changes))])
-            for i in range(size)
+            np.stack([along(k, units[i])[i] for k in range(len(changes))]) for i in range(size)
         )
         whole = (quadrature(orbit) * trace).sum((1, 2))
         # A complex pair shares the sum equally.
@@ -210,12 +205,6 @@ def _multiplier_columns(
     result = np.where(gap < _MULTIPLIER_GAP, result, np.nan)
     both = np.concatenate([result.real, result.imag], axis=1)
     return [np.moveaxis(both, 1, 2)]
-
-
-def _unit(i: int, like: Float) -> Float:
-    vector = np.zeros_like(like)
-    vector[i] = 1.0
-    return vector
 
 
 def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Complex], Float]:

@@ -1,9 +1,9 @@
 """The search for orbits to differentiate: each orbit on the coarsest mesh that is accurate enough.
 
-The whole search takes the orbits of `asperity.orbit.search`. A direct search solves each point by
-itself, from an orbit known of it or from one that is soon computed: it takes some milliseconds a
-point, where the whole search, which follows branches from steady sliding, may take a minute. Fits
-call it at the same points again and again.
+The whole search takes the orbits of `asperity.orbit.search`; it follows branches from steady
+sliding and may take a minute for one point. The direct search solves each point by itself, from the
+orbit of an earlier call or from an initial guess that is cheap to compute; it takes some
+milliseconds a point. Fits call the direct search at the same points again and again.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -30,7 +30,7 @@ from asperity.orbit.methods.series import NODES, follows_steady_sliding, series_
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
-from asperity.orbit.solution import Solution
+from asperity.orbit.solution import SearchOptions
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
@@ -41,27 +41,30 @@ Complex = NDArray[np.complex128]
 
 #: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
 MESHES = (216, 648, 1944)
-#: Largest relative difference of mean and harmonics on a mesh from those of the search, at which
-#: the mesh serves, and on the last mesh, equal to the accuracy of the search. A steep slip pulse
-#: that moves along the mesh multiplies the error of the derivatives by the pulse's shift over its
-#: width, some thousand times.
+#: Largest relative difference between mean and harmonics on a mesh and those of the search, at
+#: which the mesh is accurate enough. The second number is for the last mesh and equals the accuracy
+#: of the search. The first is smaller because a steep slip pulse that moves along the mesh makes
+#: the relative error of the derivatives some thousand times larger (the pulse's shift divided by
+#: its width).
 _AGREEMENT = (1e-10, 1e-8)
-#: The same between two meshes: the error of the finer one is smaller by 3^8, for a stiff orbit by
-#: 3^4.
+#: The same between two successive meshes: the finer mesh has an error smaller by 3^8, for a stiff
+#: orbit by 3^4.
 _MESH_AGREEMENT = (1e-8, AGREEMENT)
 
 
-#: Nodes of series in a direct search; a mesh goes on from what they do not resolve, in less time
-#: than the dense equations of more nodes take.
+#: Numbers of nodes of the series in a direct search. An orbit that these do not resolve is solved
+#: on a mesh, which takes less time than the dense equations of a longer series.
 _FEW_NODES = NODES[:2]
 
 
 #: Attempts of Newton's method, each on a new mesh: of 9,100 orbits of fits under slow modulation
-#: the first found 7,500, the second 98, a third 21 and a fourth 10, for a third of the time.
+#: the first attempt found 7,500 and the second 98. A third and a fourth would find 21 and 10 more
+#: and take a third of the time.
 _ROUNDS = 2
-#: Patience of Newton's method for coarse orbits, of which a fit may miss some, in a single attempt:
-#: of 36,000 orbits 136 came after three steps without a smaller change, as 62 % of the steps in
-#: vain do. Accurate orbits are searched for without this bound: with it one in 140 is missed.
+#: Patience of Newton's method for coarse orbits, in a single attempt. Of 36,000 orbits 136 converge
+#: only after three steps without a smaller change, and 62 % of the steps of failed attempts come
+#: after three such steps. A fit may miss some coarse orbits; accurate orbits have no such bound,
+#: because it would lose one in 140.
 _PATIENCE = 3
 
 
@@ -156,7 +159,7 @@ class KnownOrbits:
     def complete(
         self, other: KnownOrbits, index: Indices | None = None, *, near: bool = False
     ) -> None:
-        """Take the orbits that only another call knows, of all points or of the points `index`."""
+        """Copy orbits from `other` to the points without one; `index` are the points of `other`."""
         rows = np.arange(self.points) if index is None else index
         new = np.flatnonzero(other.known & ~self.known[rows])
         if other.orbit is None or not len(new):
@@ -195,12 +198,13 @@ def followed_orbits(
     index : array of int
     harmonics : int
     meshes : tuple of int
-        Numbers of intervals, rising. Without any, orbits are coarse: on `FIRST_MESH`, unchecked.
+        Numbers of intervals, rising. If empty, orbits are coarse: on `FIRST_MESH`, unchecked.
     numbers : complex array, shape (1 + harmonics, points), optional
         Mean and harmonics, where they are known. Otherwise each mesh is compared with the one
         before, the first with `FIRST_MESH`, and a point that Newton's method fails on is left out.
     patient : bool
-        Whether each orbit gets all attempts, to their end.
+        Whether Newton's method makes all attempts of an orbit; otherwise it makes one, and ends it
+        after `_PATIENCE` steps without a smaller change.
 
     Yields
     ------
@@ -224,12 +228,12 @@ def followed_orbits(
         ):
             put(finer, part, fine)
             solved = error < ACCEPTED
-            served = solved & (response_gap(before[:, part], now, each=1) < agreement)
-            served |= solved & (not meshes)
-            kept = np.flatnonzero(served)
+            accurate = solved & (response_gap(before[:, part], now, each=1) < agreement)
+            accurate |= solved & (not meshes)
+            kept = np.flatnonzero(accurate)
             if len(kept):
                 yield part[kept], MeshOrbits.of(take(fine, kept), now[:, kept])
-            left.append(part[~served & (known | solved)])
+            left.append(part[~accurate & (known | solved)])
             if not known:
                 before[:, part] = now
         index, guess = np.concatenate(left), finer
@@ -258,15 +262,16 @@ def search_orbits(
     parameters : dict of str to array, shape (points,)
     wanted : bool array, shape (points,)
     direct : bool
-        Whether only to solve each point independently, without following branches: by series under
-        slow modulation, from the known orbits, from the averaged limit, and from motions.
+        Whether only to solve each point independently, without following branches: from the known
+        orbits, by series under slow modulation, from the averaged limit, and from transients.
     coarse : bool
         Whether a direct search takes orbits on the coarsest mesh, unchecked.
     motions : bool, optional
-        Whether a direct search integrates motions for the orbits that it does not find otherwise;
-        by default one that is not coarse does.
+        Whether a direct search integrates a transient for each orbit that it does not find
+        otherwise; by default it does unless `coarse`.
     known : KnownOrbits, optional
-        Of the first points: the search keeps there what it finds, and a direct one begins there.
+        Orbits of the first points. The search stores the orbits that it finds there, and a direct
+        search takes its initial guesses from there.
     every : bool
         Whether a direct search may end at the first point without an orbit.
     """
@@ -274,22 +279,17 @@ def search_orbits(
     points, index = len(wanted), np.flatnonzero(wanted)
     result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
 
-    def searched(rows: Indices, **options: Any) -> Solution:
-        counted = max(harmonics, 2)
-        return find_orbits(
-            take(problem, rows), len(rows), harmonics=counted, phases=0, progress=_idle, **options
-        )
-
     def keep(some: Indices, orbits: MeshOrbits) -> None:
         result.add(some, orbits)
         if known is not None:
             known.keep(problem, some, orbits.orbit)
 
+    part, options = take(problem, index), SearchOptions(max(harmonics, 2), intervals=MESHES[0])
     if not direct:
-        solution = searched(index, intervals=MESHES[0])
+        solution = find_orbits(part, options)
         solved = solution.converged
         result.outcome[index] = np.where(solved, int(Outcome.NOT_RESOLVED), solution.outcome)
-        numbers, part = solution.numbers[: 1 + harmonics], take(problem, index)
+        numbers = solution.numbers[: 1 + harmonics]
         rows = np.flatnonzero(solved)
         for some, orbits in followed_orbits(part, solution.orbit, rows, harmonics, MESHES, numbers):
             logs = solution.log_multipliers[:, some]
@@ -303,8 +303,8 @@ def search_orbits(
         done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
         return index[~(done | ended[index])]
 
-    # No method at all still marks the points out of range.
-    result.outcome[index] = searched(index, methods=()).outcome
+    # A search without methods marks the points out of range.
+    result.outcome[index] = find_orbits(part, options._replace(intervals=0), methods=()).outcome
     meshes = () if coarse else MESHES
     motions = not coarse if motions is None else motions
 
@@ -344,14 +344,10 @@ def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
     return np.concatenate([mean[None], phasors])
 
 
-def _idle(_: int) -> None:
-    """No report of progress."""
-
-
 # Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses
-# that move along the period with every parameter: Newton's method from a smooth guess does not find
-# them, and continuation takes seconds. The motion itself settles on them in a few periods, if they
-# are stable, as all are that can be measured.
+# whose phase changes with every parameter. Newton's method from a smooth guess does not find such
+# an orbit, and continuation takes seconds. A transient comes close to a stable orbit in a few
+# periods, and every orbit that can be measured is stable.
 
 #: Number of periods of a transient, and the largest number of its steps.
 _PERIODS, _MOST_STEPS = 6, 2000
@@ -381,7 +377,7 @@ def settled_orbits(
         Problem of these parameters.
     index : array of int
     every : bool
-        Whether to stop at the first motion that does not settle.
+        Whether to stop at the first transient that does not become periodic.
 
     Returns
     -------

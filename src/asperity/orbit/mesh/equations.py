@@ -173,12 +173,6 @@ def collocated(problem: Problem, orbit: Orbit, at: Excitation | None = None) -> 
     return values_at(problem.system, at, orbit.centre, orbit.stage_deviations)
 
 
-def parameter_slopes(problem: Problem, direction: Problem, orbit: Orbit) -> Float:
-    """Derivative of the rates at the collocation points along a direction of the parameters."""
-    one = jax.tree.map(lambda a: np.asarray(a)[None], direction)
-    return slopes_along(problem, one, orbit.stage_phases, orbit.stage_states)[0][0]
-
-
 def condensed(
     problem: Problem,
     orbit: Orbit,
@@ -206,7 +200,9 @@ def condensed(
     if closed:
         right[:, :, 0] = values.rates - orbit.slopes
     if direction is not None:
-        right[:, :, 1] = parameter_slopes(problem, direction, orbit)
+        one = jax.tree.map(lambda a: np.asarray(a)[None], direction)
+        (slopes,), *_ = slopes_along(problem, one, orbit.stage_phases, orbit.stage_states)
+        right[:, :, 1] = slopes
     return CondensedEquations(values, *condensed_jacobian(values.jacobian, right, orbit))
 
 
@@ -248,15 +244,34 @@ _SMALL_EXPONENT = 1e-5
 VANISHING_GROWTH = -200.0
 
 
+def fourier_coefficients(
+    force: Float, orbit: Orbit, harmonics: int
+) -> tuple[Float, NDArray[np.complex128]]:
+    """Mean (..., points) and harmonics (count, ..., points) of a force, peak amplitudes.
+
+    Parameters
+    ----------
+    force : array, shape (..., STAGES, intervals, points)
+        At the collocation points.
+    orbit : Orbit
+        With the mesh.
+    harmonics : int
+    """
+    weighted = quadrature(orbit) / (2 * np.pi) * force
+    turn, phasors = np.exp(-1j * orbit.stage_phases), []
+    turns = np.ones_like(turn)
+    for _ in range(harmonics):
+        turns = turns * turn
+        phasors.append(2 * (turns * weighted).sum((-3, -2)))
+    return weighted.sum((-3, -2)), np.stack(phasors)
+
+
 def mean_and_harmonics(
     values: PointValues, orbit: Orbit, harmonics: int
 ) -> tuple[Float, NDArray[np.complex128]]:
     """Mean (points,) and harmonics (count, points) of F/W0, peak amplitudes."""
-    weighted = quadrature(orbit) / (2 * np.pi) * values.force_rest
-    turn = np.exp(-1j * orbit.stage_phases)
-    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
-    mean = values.force_mean[0, 0] + weighted.sum((0, 1))
-    return mean, 2 * (turns * weighted).sum((1, 2))
+    mean, phasors = fourier_coefficients(values.force_rest, orbit, harmonics)
+    return values.force_mean[0, 0] + mean, phasors
 
 
 def orbit_observables(

@@ -47,8 +47,8 @@ T = TypeVar("T")
 TOLERANCE = 1e-8
 #: A last change below this counts as converged.
 ACCEPTED = 1e-6
-#: Bound on the change of an exponent or logarithmic state in one step: bold from a rough guess,
-#: since the change of the slip rate is e to that.
+#: Bound on the change of an exponent or logarithmic state in one step: the slip rate then changes
+#: by at most e^2.
 _LARGEST_CHANGE = 2.0
 
 
@@ -170,7 +170,7 @@ def newton_step(
     value : float
         Distance of the new point from the plane.
     closed : bool
-        Whether the step makes up for the defect of the orbit, or keeps to the solutions of the
+        Whether the step reduces the residual of the equations. If not, it solves the homogeneous
         linear equations: the tangent of a branch.
     """
     nodes, slopes = (orbit.nodes, orbit.slopes) if closed else (0 * orbit.nodes, 0 * orbit.slopes)
@@ -276,7 +276,7 @@ def solve(
     plane = Plane.of_fixed_parameters(guess)
     line = partial(_fixed, problem)
     result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few, patience=patience)
-    # The last points of a chunk go on in a smaller one: a step takes as long as its points.
+    # The last points of a chunk continue in a smaller chunk, whose steps take less time.
     taken = int(result.steps.max())
     left = np.flatnonzero((result.error > TOLERANCE) & (result.steps == taken))
     if 0 < len(left) <= few and taken < max_steps:

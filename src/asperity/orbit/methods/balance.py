@@ -13,7 +13,6 @@ the grid, and advances z and the states of the law as `asperity.orbit.methods.fo
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, TypeAlias
@@ -25,12 +24,19 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.algebra.contraction import Equations
-from asperity.algebra.mirrored_grid import antiderivative, grid
-from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
+from asperity.algebra.mirrored_grid import grid, interpolation
+from asperity.algebra.small_systems import (
+    Matrix,
+    apply,
+    averaged,
+    inverse_by_elimination,
+    inverse_points,
+)
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
+    advance,
     error_of,
     load_cycle,
     spectrum,
@@ -49,7 +55,7 @@ _NEAR = 3e-2
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
-#: Steps that a linear system is given beyond those that the orbit took.
+#: Steps for a linear system, more than the orbit took.
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
 _AVERAGED_TOLERANCE = 1e-2
@@ -100,8 +106,8 @@ class Prepared(NamedTuple):
 class BalanceEquations(Equations):
     """The equations of an orbit on a grid, for the solver and for the implicit-function rule.
 
-    The parameters are the problem, what the last step of the solver was prepared with, and the
-    number of steps that linear systems take.
+    The parameters are the problem, the linearisation that the last step of the solver used, and
+    the number of steps that linear systems take.
 
     Parameters
     ----------
@@ -148,8 +154,7 @@ class BalanceEquations(Equations):
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
         columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]
         rates = [[columns[j][i] for j in n] for i in n]
-        mean = [[cycle.share @ entry for entry in row] for row in rates]
-        return Prepared(inverse, friction, rates, inverse_points(mean))
+        return Prepared(inverse, friction, rates, inverse_points(averaged(rates, cycle.share)))
 
     def _advance(
         self,
@@ -158,24 +163,20 @@ class BalanceEquations(Equations):
         unknowns: BalanceUnknowns,
         at: Prepared,
         moved: Array,
-        bound: Callable[[Array], Array],
+        largest: float = jnp.inf,
     ) -> tuple[BalanceUnknowns, States]:
         """The next unknowns for a change of the friction, and the change of the means."""
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction + moved
         rates = self._rates(problem, cycle, slow, g)
-        half = self.nodes // 2
-        # Sum mirror images first: odd functions of theta then cancel exactly.
-        gaps = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
-        change = tuple(
-            bound(-sum(a * r for a, r in zip(row, gaps, strict=True))) for row in at.mean_inverse
+
+        def push(*changes: Array) -> States:
+            return apply(at.rates, changes)
+
+        mean, zero_mean, change = advance(
+            cycle, at.mean_inverse, unknowns.mean, rates, push, largest
         )
-        integral = cycle.integral * cycle.stretch
-        zero_mean = tuple(
-            antiderivative(integral, r + sum(a * x for a, x in zip(row, change, strict=True)))
-            for r, row in zip(rates, at.rates, strict=True)
-        )
-        g = g + sum(a * x for a, x in zip(at.friction, change, strict=True))
-        return BalanceUnknowns(together(unknowns.mean, change), zero_mean, g), change
+        (with_means,) = apply([list(at.friction)], change)
+        return BalanceUnknowns(mean, zero_mean, g + with_means), change
 
     def bounded_step(
         self, problem: Problem, cycle: LoadCycle, unknowns: BalanceUnknowns, at: Prepared
@@ -186,21 +187,12 @@ class BalanceEquations(Equations):
         _, exponent = jax.jvp(lambda g: _log_slip(problem, cycle.at, g, slow[1:]), (g,), (moved,))
         leap = jnp.abs(exponent).max(0)
         moved = moved * jnp.minimum(1.0, _LARGEST_CHANGE / jnp.maximum(leap, 1e-300))
-        new, change = self._advance(
-            problem,
-            cycle,
-            unknowns,
-            at,
-            moved,
-            lambda x: jnp.clip(x, -_LARGEST_CHANGE, _LARGEST_CHANGE),
-        )
-        # Of z relative to its size, whose rate has the round-off of kappa; others are exponents.
-        sizes = [
-            jnp.abs(new.zero_mean[0]).max(0) + 1e-3 * problem.system.kappa,
-            *[1.0] * len(change),
-        ]
-        parts = zip(new.zero_mean, unknowns.zero_mean, sizes, strict=False)
-        moves = [jnp.abs(a - b).max(0) / size for a, b, size in parts]
+        new, change = self._advance(problem, cycle, unknowns, at, moved, _LARGEST_CHANGE)
+        parts = zip(new.zero_mean, unknowns.zero_mean, strict=True)
+        moves = [jnp.abs(a - b).max(0) for a, b in parts]
+        # z relative to its size, because its rate has the round-off of kappa; the other states are
+        # exponents.
+        moves[0] /= jnp.abs(new.zero_mean[0]).max(0) + 1e-3 * problem.system.kappa
         return new, jnp.stack([leap, *moves, *map(jnp.abs, change)]).max(0)
 
     def residual(
@@ -211,7 +203,7 @@ class BalanceEquations(Equations):
         cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.zero_mean)
         gap = self._balance(problem, cycle, slow, unknowns.friction)
         moved = _times(at.inverse, -gap)
-        stepped, _ = self._advance(problem, cycle, unknowns, at, moved, lambda x: x)
+        stepped, _ = self._advance(problem, cycle, unknowns, at, moved)
         return jax.tree.map(jnp.subtract, unknowns, stepped)
 
     def steady(self, problem: Problem) -> BalanceUnknowns:
@@ -371,7 +363,7 @@ def _iterate(
     tolerance: float,
     max_steps: int,
 ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
-    """Unknowns, what their last step was prepared with, estimated error and number of steps."""
+    """Unknowns, the linearisation that their last step used, estimated error, number of steps."""
     cycle = equations.cycle(problem)
 
     def prepare(unknowns: BalanceUnknowns) -> Prepared:
@@ -402,9 +394,7 @@ def _iterate(
 
 def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
     """The same trigonometric polynomials in tau at more nodes."""
-    before, after = grid(unknowns.friction.shape[0])[0], grid(nodes)[0]
-    k = np.arange(1, len(before) // 2)[:, None, None]
-    kernel = (1 + 2 * np.cos(k * (after[:, None] - before)).sum(0)) / len(before)
+    kernel = interpolation(grid(nodes)[0], grid(unknowns.friction.shape[0])[0])
     zero_mean = tuple(kernel @ part for part in unknowns.zero_mean)
     return BalanceUnknowns(unknowns.mean, zero_mean, kernel @ unknowns.friction)
 
@@ -430,7 +420,8 @@ def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
 
 #: Orders of the harmonics of the elastic swing.
 SWING_ORDERS = np.arange(1, 13)
-#: Share of the elastic swing below which it is beyond a resonance with the modulation.
+#: Smallest value of the elastic swing relative to rigid asperities; a smaller value means that the
+#: modulation is faster than the resonance of the elastic asperities, and the swing is not used.
 LEAST_SWING = 0.2
 
 

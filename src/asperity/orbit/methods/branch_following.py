@@ -1,7 +1,7 @@
-"""From steady sliding to the requested amplitude, through folds and canards, in batches.
+"""Branches of orbits from steady sliding to the requested amplitude, through folds and canards.
 
-`BranchFollowing` is the method of the search that takes the orbits at the ends of these branches,
-or the reason why a branch ends before.
+`BranchFollowing` is the method of the search that refines the orbit at the end of each branch, or
+reports why the branch ends before the requested amplitude. Branches are followed in batches.
 """
 
 from __future__ import annotations
@@ -54,18 +54,20 @@ RUNAWAY = 13.0
 
 #: Distance from the requested amplitude below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
-#: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
+#: How far the exponent may exceed `RUNAWAY` on a branch within `_NEAR` of the requested amplitude.
 _AHEAD = 0.5
 #: A branch counts as returning when it is this far behind its fold (share of the amplitude).
 _BACK = 1e-3
 _NEWTON_STEPS = 10
 #: Distance that the motion of the mesh may cause; shorter steps do not reduce it.
 _NOISE = 0.15
+#: Length of the first step.
 _FIRST = 0.02
 #: Number of failures after which a step is predicted along the tangent.
 _RESTART = 4
-#: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
-#: and how many times farther the share may get than where that leads.
+#: Extrapolation of the share to where pulses run away: smallest exponent at which it begins, rise
+#: of the exponent over which the gain of the share is measured, and factor on the extrapolated gain
+#: that makes the estimate a cautious one.
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 
 
@@ -103,9 +105,8 @@ def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: in
 
 
 def continues(share: Float, fastest: Float) -> NDArray[np.bool_]:
-    """Branches that neither arrived nor ran away; one that returns may turn again."""
+    """Whether to follow a branch further: it has not arrived, run away or returned to the start."""
     left = np.abs(share - 1)
-    # A branch that is about to arrive may exceed the limit a little.
     fastest = np.where(left < _NEAR, fastest - _AHEAD, fastest)
     return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
 
@@ -128,8 +129,8 @@ class SteadyBranches(Curves):
     fastest : array, shape (points,)
         Largest exponent of the slip rate of the last orbit.
     limit : array, shape (points,)
-        Share at which, as they grew at last, pulses are to reach e^`RUNAWAY`; inf where they
-        do not grow.
+        Share at which pulses would reach e^`RUNAWAY`, extrapolated from their latest growth; inf
+        where they do not grow.
     watched_share, watched_exponent : array, shape (points,)
         Share and exponent from which the present rise of the exponent is counted.
     """
@@ -176,9 +177,10 @@ class SteadyBranches(Curves):
         return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
 
     def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
-        """Not predicted to pass the requested amplitude; back where a step has passed it.
+        """Lengths that are not predicted to pass the requested amplitude.
 
-        After several failures along the secant, along the tangent.
+        The length is negative where the last step has passed it. After several failures along the
+        secant the next step is predicted along the tangent.
         """
         stuck = np.flatnonzero((failures >= _RESTART) & (failures < self.control.most_failures))
         self.span[stuck] = length[stuck] = np.abs(length[stuck])
@@ -264,7 +266,7 @@ class BranchFollowing(Method):
         return True
 
     def candidates(self, solution: Solution) -> Indices:
-        """Points without an orbit, or with one that was lost on every finer mesh."""
+        """Points without an orbit, or whose orbit was lost on every finer mesh."""
         return np.flatnonzero(_without_orbit(solution))
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
@@ -391,8 +393,8 @@ def _distance(units: Float, a: Orbit, s: Float, b: Orbit, t: Float) -> Float:
 def relaid(orbit: Orbit, units: Float) -> Orbit:
     """The orbit on a mesh with intervals of equal length in the space of phase and states.
 
-    Other than a mesh that spreads an error estimate it changes as smoothly as the orbit does, which
-    extrapolation lives on.
+    Along a branch this mesh changes as smoothly as the orbit does, so that it can be extrapolated;
+    a mesh that spreads an error estimate evenly does not.
     """
     widths = orbit.widths
     rises = widths * np.abs(orbit.slopes).mean(1) * units[:, None]

@@ -68,18 +68,18 @@ def refine(
             put(finer, part, fine)
             solution.iterations[part] = intervals
             resolved[part] = _compare(solution, part, previous, observables, error, agreement)
-        _keep(problem, solution, finer, index[resolved[index]])
+        _store_orbits(problem, solution, finer, index[resolved[index]])
         orbit, index = finer, index[~resolved[index]]
         if not len(index):
             return
     stiff = index[solution.outcome[index] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     resolve_multipliers(problem, solution, orbit, stiff)
-    _keep(problem, solution, orbit, stiff[solution.converged[stiff]])
+    _store_orbits(problem, solution, orbit, stiff[solution.converged[stiff]])
     solution.discard(index[~solution.converged[index]])
 
 
-def _keep(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> None:
-    """Write waveforms and orbits of the points `rows` to `solution`, which may have room."""
+def _store_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> None:
+    """Write waveforms and orbits of the points `rows` to `solution`, if they were requested."""
     phases = solution.waveform.shape[1]
     if phases:
         chunk = mesh_chunk(problem.system.size)
@@ -95,7 +95,7 @@ def _keep(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> 
 
 
 def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOptions) -> None:
-    """Write orbits that are exact already to `solution`, once their multipliers are resolved.
+    """Write orbits that need no refinement to `solution`, once their multipliers are resolved.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     index = np.concatenate(stiff)
     solution.outcome[index] = Outcome.MULTIPLIERS_NOT_RESOLVED
     resolve_multipliers(problem, solution, orbit, index)
-    _keep(problem, solution, orbit, np.flatnonzero(solution.converged))
+    _store_orbits(problem, solution, orbit, np.flatnonzero(solution.converged))
     solution.discard(np.flatnonzero(~solution.converged))
 
 
@@ -208,7 +208,11 @@ def orbits_from_averaged_limit(
 
 
 def _first_orbit(problem: Problem, patience: float) -> tuple[Orbit, Float]:
-    """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
+    """Collocation from the averaged limit, with an error for each point.
+
+    The averaged limit is that of the quasi-static equations. Their orbit is the initial guess of
+    equations with inertia.
+    """
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
     centre = np.asarray(_averaged_states(Problem(quasi_static, load)))
@@ -283,7 +287,9 @@ _OVERFLOW, _HOPELESS = 750.0, 5000.0
 def extreme_multipliers(
     observables: Observables, logs: NDArray[np.complex128]
 ) -> NDArray[np.bool_]:
-    """Points whose multipliers are beyond doubles and need no mesh; their `logs` are corrected.
+    """Points with multipliers outside the range of doubles, for which no finer mesh is needed.
+
+    The function replaces the `logs` of these points by the values that are known.
 
     Returns
     -------

@@ -33,8 +33,8 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.algebra.mirrored_grid import antiderivative, grid
-from asperity.algebra.small_systems import Matrix, inverse_points
+from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
+from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, chunk_of, points_of, run_chunks, take
 from asperity.orbit.floquet import floquet_form
@@ -84,17 +84,14 @@ class FourierOrbit(NamedTuple):
     @property
     def start(self) -> Array:
         """States at theta = 0, shape (size, points)."""
-        return self._interpolated(np.zeros((1, 1)))[:, 0]
+        return self._interpolated(np.zeros(1))[:, 0]
 
     def states(self, theta: np.ndarray) -> Array:
         """States at the phases `theta`, a column: shape (size, phases, points)."""
-        return self._interpolated(eccentric_phase(theta, self.grading))
+        return self._interpolated(eccentric_phase(theta[:, 0], self.grading))
 
     def _interpolated(self, tau: np.ndarray) -> Array:
-        """States at a column of `tau`, by trigonometric interpolation."""
-        nodes = len(self.zero_mean[0])
-        difference = tau - grid(nodes)[0]
-        kernel = (2 / nodes) * sum(np.cos(k * difference) for k in range(1, nodes // 2))
+        kernel = interpolation(tau, grid(len(self.zero_mean[0]))[0])
         # NumPy or JAX, as the arrays are.
         xp = self.zero_mean[0].__array_namespace__()
         return xp.stack([m + kernel @ y for m, y in zip(self.mean, self.zero_mean, strict=True)])
@@ -138,32 +135,33 @@ def together(mean: States, zero_mean: States) -> States:
     return tuple(m + y for m, y in zip(mean, zero_mean, strict=True))
 
 
-def jacobian(push: Callable[..., States], states: States) -> Matrix:
-    """Derivatives [i][j] of rate i to state j, from the linear map of their changes."""
-    one, zero = jnp.ones_like(states[0]), jnp.zeros_like(states[0])
-    n = range(len(states))
-    columns = [push(*(one if i == j else zero for j in n)) for i in n]
-    return [[columns[j][i] for j in n] for i in n]
-
-
 def advance(
-    cycle: LoadCycle, inverse: Matrix, mean: States, rates: States, push: Callable[..., States]
+    cycle: LoadCycle,
+    inverse: Matrix,
+    mean: States,
+    rates: States,
+    push: Callable[..., States],
+    largest: float = jnp.inf,
 ) -> tuple[States, States, States]:
     """One step of the iteration: the new means and zero-mean parts, and the change of the means.
 
     Parameters
     ----------
     inverse : Matrix
-        Inverse of the derivatives of the mean rates to the means, roughly.
+        Approximate inverse of the derivatives of the mean rates to the means.
     rates : States
         At the present states.
     push : callable
         Change of the rates with the states, to first order.
+    largest : float
+        Bound on the change of a mean.
     """
     half = len(cycle.theta) // 2
     # Sum mirror images first: odd functions of theta then cancel exactly.
     residual = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
-    change = tuple(-sum(a * r for a, r in zip(row, residual, strict=True)) for row in inverse)
+    change = tuple(-c for c in apply(inverse, residual))
+    if largest < jnp.inf:
+        change = tuple(jnp.clip(c, -largest, largest) for c in change)
     follow = push(*(c + jnp.zeros_like(r) for c, r in zip(change, rates, strict=True)))
     integral = cycle.integral * cycle.stretch
     zero_mean = tuple(antiderivative(integral, r + f) for r, f in zip(rates, follow, strict=True))

@@ -28,6 +28,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import jacobian_columns, solve_columns
 from asperity.loads import Excitation, Harmonic
@@ -111,11 +112,12 @@ _CHUNK, _FEW = 240, 24
 
 #: Newton steps on a division, and the largest change of an exponent in one.
 _NEWTON_STEPS, _LARGEST_CHANGE = 12, 3.0
-#: Newton change on the coarse division below which its square is small enough to go on, and largest
-#: ones where a finer division is compared with the next, and where it is the finer of two.
+#: Largest Newton change on the coarse division, at which the finer divisions begin (the next change
+#: would be about its square); on the first of two finer divisions that are compared; and on the
+#: second of them.
 _NEAR, _CLOSED, _ACCEPTED = 2e-2, 1e-6, 1e-9
-#: Chord steps on a finer division, which shrink a change by a hundred and more, and the change
-#: below which there need be no further one.
+#: Largest number of chord steps on a finer division, each of which makes a change a hundred times
+#: smaller or more, and the change below which no further chord step is taken.
 _CHORDS, _NEARLY_CLOSED = 4, 1e-5
 #: Agreement of two divisions, relative; the finer one is then good to 2e-6 / 2^8.
 _AGREEMENT = 2e-6
@@ -480,9 +482,6 @@ def shot_waveform(
     By trigonometric interpolation in tau between the ends of `count` steps.
     """
     path = np.asarray(_path(problem, start, steps, count=count))
-    theta = even_phases(phases)
-    difference = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
-    k = np.arange(1, (count + 1) // 2)[:, None, None]
-    interpolate = (1 + 2 * np.cos(k * difference).sum(0)) / count
-    Y = start[:, None] + np.einsum("pk,knb->npb", interpolate, path)
-    return waveform_of(problem, Y, theta)
+    theta, nodes = even_phases(phases), 2 * np.pi * np.arange(count) / count
+    kernel = interpolation(eccentric_phase(theta[:, 0], grading), nodes)
+    return waveform_of(problem, start[:, None] + np.einsum("pk,knb->npb", kernel, path), theta)
