@@ -62,6 +62,14 @@ def in_python(argument: Argument) -> str:
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
 
 
+def in_files(argument: Argument) -> str:
+    """The words of a TOML file: ``fixed.D0``, ``fixed.D0 = '0.4 um'``."""
+    place = ".".join(filter(None, argument[:2]))
+    value = {"True": "true", "False": "false"}.get(argument.value, argument.value)
+    plain = value in ("true", "false") or value.isdigit()
+    return f"{place} = {value if plain else repr(value)}" if value else place
+
+
 class Key(Argument):
     """A key of a file, which has the same name at every door."""
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Seconds, Span, quantity
+from asperity.questions.record import Question, Seconds, Span, quantity, shown
 
 Column = str | int
 
@@ -90,6 +90,10 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
         rule, got = "have a start and an end", f"{start:g} to {end:g} s"
         require(math.isfinite(start) and math.isfinite(end), "", rule, got, "write both")
     return tuple(sorted(spans))
+
+
+#: Fields that say how a modulated load is read; a drift is that of sliding too.
+_OF_MODULATION = ("frequency", "exact_frequency", "harmonics", "whole_periods", "detrend")
 
 
 class Measurement(Question):
@@ -174,7 +178,13 @@ class Measurement(Question):
             rule, got = f"go without {Argument('measure.holds')}", "both"
             advice = "write 0 as the velocity of a hold"
             require(self.holds is None, "measure.velocities", rule, got, advice)
-        alone = self.modulated is None and self.frequency is None
-        rule = f"go without {modulated} and {frequency}"
-        require(alone or not self.stick_slip, "measure.stick_slip", rule, "both", "leave one out")
+        alone = self.modulated is None or not self.stick_slip
+        require(alone, "measure.stick_slip", f"go without {modulated}", "both", "leave one out")
+        if self.modulated is False or self.stick_slip:
+            kind = Argument("modulated", value="False")
+            for name in _OF_MODULATION[: None if self.stick_slip else -1]:
+                got, field = getattr(self, name), type(self).model_fields[name]
+                other = Argument("measure.stick_slip") if self.stick_slip else kind
+                rule = f"go without {other}"
+                require(got == field.default, f"measure.{name}", rule, shown(got), "leave one out")
         return self

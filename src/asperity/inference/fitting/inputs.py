@@ -36,7 +36,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.questions.fit import NormalPrior
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS, format_si, to_si
 
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
@@ -208,6 +208,14 @@ def fixed_values(
             rule, got = "come with a fixed W0", f"'{given['K']}' and W0 free"
             raise InputError("K over the load", rule, got, "give K as a stiffness, or fix W0")
         result["K"] = result["K"] * result["W0"]
+    for name in (n for n in given if n in points):
+        column, value = np.broadcast_arrays(points[name], result[name])
+        other = np.isfinite(column) & ~np.isclose(column, value, rtol=1e-9, atol=0.0)
+        if other.any():
+            at, kind = int(np.argmax(other)), known[name].kind
+            got = f"{format_si(value[at], kind)} and {format_si(column[at], kind)}"
+            rule, advice = "agree with the column of the data", "leave it out, or remove the column"
+            raise InputError(Argument("fixed", name), rule, got, advice)
     if "eps_ratio" not in free:
         result["eps_ratio"] = ratio = float(
             _checked(law, "fixed", "eps_ratio", given.get("eps_ratio", 1.0))
@@ -244,7 +252,7 @@ def require_free(
 
 
 def require_motion(
-    free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free", plan: bool = False
+    free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free"
 ) -> None:
     """Refuse a free M without inertia and a free eta without radiation damping.
 
@@ -255,8 +263,6 @@ def require_motion(
         ``inertia`` and ``radiation_damping``.
     label : str
         Name of `free` in messages.
-    plan : bool
-        Whether the switches are those of a plan file.
 
     Raises
     ------
@@ -267,9 +273,8 @@ def require_motion(
         ("eta", "radiation_damping", "radiation damping"),
     ):
         if name in free and not motion[option]:
-            switch = f"{option} = true" if plan else Argument(option, value="True")
             got = f"'{name}', which has no influence without {word}"
-            advice = f"add {switch} or fix {name}"
+            advice = f"add {Argument(option, value='True')} or fix {name}"
             raise InputError(label, "be parameters that count", got, advice)
 
 
