@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -77,7 +78,7 @@ class Source(ReadingRecipe):
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments of `asperity.read`; only those that say something."""
         named = self.model_dump(exclude={"title", "area"})
-        return {name: value for name, value in named.items() if value not in (None, {}, "")}
+        return {name: value for name, value in named.items() if value not in (None, {})}
 
 
 def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -89,7 +90,11 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
     for start, end in spans:
         rule, got = "have a start and an end", f"{start:g} to {end:g} s"
         require(math.isfinite(start) and math.isfinite(end), "", rule, got, "write both")
-    return tuple(sorted(spans))
+    ordered = sorted(spans)
+    for (first, end), (start, last) in pairwise(ordered):
+        got = f"{first:g} to {end:g} s and {start:g} to {last:g} s"
+        require(end <= start, "", "not overlap", got, "leave one out or cut it")
+    return tuple(ordered)
 
 
 #: Fields that say how a modulated load is read; a drift is that of sliding too.
@@ -170,6 +175,14 @@ class Measurement(Question):
             "them of a modulated recording",
         )
         require(steady, "measure.steps and holds", rule, got, "leave one of them out")
+        inside = [
+            f"{step:g} s in {start:g} to {end:g} s"
+            for start, end in self.holds or ()
+            for step in self.steps or ()
+            if start < step < end
+        ]
+        rule = f"lie outside {Argument('measure.holds')}"
+        require(not inside, "measure.steps", rule, ", ".join(inside), "leave one of them out")
         if self.velocities is not None:
             got = f"{len(self.velocities)} for {len(self.steps or ())}"
             rule, counted = "be one more than the steps", len(self.steps or ()) + 1
