@@ -49,9 +49,17 @@ class Argument(NamedTuple):
         return format(str(self), spec)
 
 
+#: Arguments of `asperity.measure` that have another name in a `questions.Measurement`.
+_IN_PYTHON = {
+    "measure.exact_frequency": "measure.refine",
+    "measure.whole_periods": "measure.only_whole_periods",
+}
+
+
 def in_python(argument: Argument) -> str:
     """The words of the library."""
     name, key, value = argument
+    name = _IN_PYTHON.get(name, name)
     if not value:
         if key and "." in name:  # a method
             return f"{name}('{key}')"

@@ -109,15 +109,26 @@ def require_contact(programme: Programme, W0: float) -> None:
         require(load > NO_LOAD * W0, "programme.load", rule, got, advice)
 
 
+def require_sliding(programme: Programme) -> None:
+    """Refuse a programme that cannot begin in steady sliding: its first velocity is not positive.
+
+    Raises
+    ------
+    InputError
+    """
+    velocity = programme.level.velocity
+    rule = "be positive for a start in steady sliding"
+    advice = f"give it, or the states at rest as {Argument('initial')}"
+    require(velocity > 0, "programme.velocity", rule, f"{velocity:g} m/s", advice)
+
+
 def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     """States of steady sliding under the load and at the velocity before the programme.
 
     With x K / W0 as the last; a step of the load at the very beginning is included.
     """
+    require_sliding(programme)
     level = programme.level
-    rule, got = "be positive for a start in steady sliding", f"{level.velocity:g} m/s"
-    advice = f"give it, or the states at rest as {Argument('initial')}"
-    require(level.velocity > 0, "programme.velocity", rule, got, advice)
     first = SegmentEquations(motion, programme.segments[0])
     w = level.load / np.asarray(motion.slider.W0)
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))

@@ -132,7 +132,7 @@ def of_the_table(
         start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
     if prior is not None and elsewhere:
         rule = "be in N/m or 1/m for a table"
-        require(prior.unit == "1/m", "prior of K", rule, prior.unit, "convert it")
+        require(prior.unit == "1/m", Argument("prior", "K"), rule, prior.unit, "convert it")
         W0 = float(load[0])
         priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
     return start, priors
@@ -339,11 +339,12 @@ def priors_of(
         parameter = known.get(name.partition("[")[0])
         if parameter is None:
             raise InputError("prior", "name a parameter", f"'{name}'", "correct the name")
-        mean, unit = _of_some_kind(parameter, prior.mean, f"prior {name}")
-        sd, other = _of_some_kind(parameter, prior.std, f"prior {name}")
+        label = f"{Argument('prior', name)}"
+        mean, unit = _of_some_kind(parameter, prior.mean, label)
+        sd, other = _of_some_kind(parameter, prior.std, label)
         rule = "have a positive deviation" if unit == other else "have one unit"
         got = f"{sd:g}" if unit == other else f"{unit} and {other}"
-        require(sd > 0 and unit == other, f"prior {name}", rule, got, "give one")
+        require(sd > 0 and unit == other, label, rule, got, "give one")
         result[name] = Prior(mean, sd, "given", unit)
     return result
 
