@@ -268,7 +268,7 @@ def test_of_its_file_is_read_what_an_instrument_records(physical, tmp_path) -> N
         ({"initial": "rest"}, "initial must be 'steady'"),
         ({"initial": [0.5]}, r"initial must be 2 finite states \(elongation, log_age\)"),
         ({"radiation_damping": 0.0}, "radiation_damping must be positive"),
-        ({"inertia": True}, "slider.M must be positive"),
+        ({"inertia": True}, "slider.mass must be positive"),
     ],
 )
 def test_bad_questions_are_named(physical, options, words) -> None:

@@ -251,9 +251,7 @@ def require_free(
         require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
 
 
-def require_motion(
-    free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free"
-) -> None:
+def require_motion(free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free") -> None:
     """Refuse a free M without inertia and a free eta without radiation damping.
 
     Parameters
