@@ -49,9 +49,17 @@ class Argument(NamedTuple):
         return format(str(self), spec)
 
 
+#: Arguments of `asperity.measure` that have another name in a `questions.Measurement`.
+_IN_PYTHON = {
+    "measure.exact_frequency": "measure.refine",
+    "measure.whole_periods": "measure.only_whole_periods",
+}
+
+
 def in_python(argument: Argument) -> str:
     """The words of the library."""
     name, key, value = argument
+    name = _IN_PYTHON.get(name, name)
     if not value:
         if key and "." in name:  # a method
             return f"{name}('{key}')"
@@ -60,6 +68,14 @@ def in_python(argument: Argument) -> str:
         return f"'{key}={value}'"
     shown = value if value.isdigit() or value in ("...", "True", "False") else f"'{value}'"
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
+
+
+def in_files(argument: Argument) -> str:
+    """The words of a TOML file: ``fixed.D0``, ``fixed.D0 = '0.4 um'``."""
+    place = ".".join(filter(None, argument[:2]))
+    value = {"True": "true", "False": "false"}.get(argument.value, argument.value)
+    plain = value in ("true", "false") or value.isdigit()
+    return f"{place} = {value if plain else repr(value)}" if value else place
 
 
 class Key(Argument):

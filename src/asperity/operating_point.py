@@ -288,6 +288,42 @@ def motions(values: Mapping[str, Float]) -> list[Index]:
     return [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
 
 
+#: Numbers that count only with another one that is not 0.
+_COUNTS_WITH = {
+    "M": "inertia",
+    **{f"{name}_phase": name for name in ("epsilon2", "epsilon3", "pull")},
+}
+
+
+def require_influence(
+    axes: Iterable[str], numbers: Mapping[str, Any], field: str, place: str = ""
+) -> None:
+    """Refuse an axis along which no response changes, such as one of M without inertia.
+
+    Parameters
+    ----------
+    axes : iterable of str
+        Names of the numbers that vary.
+    numbers : mapping of str to float
+        The fixed ones.
+    field : str
+        An axis in messages, of which ``{}`` is the name.
+    place : str
+        As in `numbers_for`.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in axes:
+        other = _COUNTS_WITH.get(name)
+        if other and other not in axes and not numbers.get(other):
+            value = "1" if other == "inertia" else "0.1"
+            like = f"{place}.{other} = {value}" if place else Argument("numbers", other, value)
+            rule, got = f"have an influence, which it has with {other}", f"{other} = 0"
+            raise InputError(field.format(name), rule, got, f"add {like}, or leave the axis out")
+
+
 def without_mass(values: Mapping[str, Float]) -> Bool:
     """Points with inertia and no mass."""
     return (np.asarray(values["inertia"]) > 0) & ~(np.asarray(values["M"]) > 0)

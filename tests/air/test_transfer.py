@@ -172,7 +172,7 @@ def test_air_over_vacuum():
         ({"frequency": -1.0}, "modulation.frequency must not be negative, got -1 Hz;"),
         ({"frequency": "120 N"}, "modulation.frequency must be a frequency"),
         ({"W0": 0.0}, "NormalContact.W0 must be positive, got 0 N;"),
-        ({"M": -1.6}, "slider.M must not be negative, got -1.6 kg;"),
+        ({"M": -1.6}, "modulation.M must not be negative, got -1.6 kg;"),
         ({"lambda_z": None}, "NormalContact.lambda_z must be a length, got None"),
         ({"frequency": np.ones(2), "M": np.ones(3)}, "modulation.frequency must have shapes that"),
     ],

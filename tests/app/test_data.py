@@ -411,10 +411,10 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
 @pytest.mark.parametrize(
     ("changed", "word"),
     [
-        ({"laws": ["rice-ruina", "nagata"], "posterior": True}, "posterior"),
-        ({"draws": 99}, "draws"),
-        ({"chains": 1}, "chains"),
-        ({"draws": 10**9}, "draws"),
+        ({"laws": ["rice-ruina", "nagata"], "posterior": True}, "Posterior of one law"),
+        ({"draws": 99}, "Draws of each chain"),
+        ({"chains": 1}, "Chains"),
+        ({"draws": 10**9}, "Draws of each chain"),
         ({"laws": ["file.py:Law"]}, "law"),
         ({"material": "../x.toml"}, "material"),
         ({"tables": []}, "data"),

@@ -45,7 +45,7 @@ def test_the_page_starts_at_the_slider(address, visit):
     [
         ({"slider": "elasto-plastic"}, "slider must be a Slider"),
         ({"velocity": "-1 um/s"}, "velocity must be positive"),
-        ({"velocity": [1e-6, 2e-6]}, "V must be one number"),
+        ({"velocity": [1e-6, 2e-6]}, "velocity must be one number"),
         ({"height": 1}, "height must be"),
     ],
 )

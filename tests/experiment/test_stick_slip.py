@@ -130,7 +130,7 @@ def test_without_inertia_a_slip_runs_away():
 def test_bad_input_says_what_to_do():
     law = RiceRuina(mu0=0.5, A=0.01, B=0.015, D0=1e-6, V0=V0)
     slider = asp.Slider(law, spring=100.0, load=1.0)
-    with pytest.raises(InputError, match=r"slider.M must be positive, got 0 kg; give the mass"):
+    with pytest.raises(InputError, match=r"slider.mass must be positive, got 0 kg; give the mass"):
         stick_slip_response(slider, velocity=1e-6)
     with pytest.raises(InputError, match="velocity must be positive"):
         stick_slip_response(slider, velocity=-1e-6, inertia=False)

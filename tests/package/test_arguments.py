@@ -158,7 +158,7 @@ LAWS = ("amontons", "elasto-plastic", "linker-dieterich", "rice-ruina")
 
 def test_input_error_is_a_value_error() -> None:
     with pytest.raises(ValueError, match="must be > 0"):
-        raise InputError("slider.K must be > 0, got -1 N/m; give a stiffness")
+        raise InputError("slider.spring must be > 0, got -1 N/m; give a stiffness")
 
 
 @pytest.mark.parametrize(

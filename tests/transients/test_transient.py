@@ -268,7 +268,7 @@ def test_the_file_of_a_trajectory_is_read_as_a_recording(physical, tmp_path) -> 
         ({"initial": "rest"}, "initial must be 'steady'"),
         ({"initial": [0.5]}, r"initial must be 2 finite states \(elongation, log_age\)"),
         ({"radiation_damping": 0.0}, "radiation_damping must be positive"),
-        ({"inertia": True}, "slider.M must be positive"),
+        ({"inertia": True}, "slider.mass must be positive"),
     ],
 )
 def test_bad_arguments_are_refused_in_one_sentence(physical, options, words) -> None:

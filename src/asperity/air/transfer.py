@@ -62,7 +62,7 @@ def transfer_function(
     """
     contact = NormalContact(W0=W0, lambda_z=lambda_z)  # type: ignore[arg-type]
     f = as_real("modulation.frequency", frequency, "frequency", "not negative")
-    mass = as_real("slider.M", M, "mass", "not negative")
+    mass = as_real("modulation.M", M, "mass", "not negative")
     fields: tuple[Real, ...] = ()
     if layer is not None:
         fields = (layer.P0, layer.h0, layer.eta, layer.R, layer.temperature)

@@ -97,7 +97,13 @@ def explore(
         if isinstance(value, str):
             continue
         got, advice = f"an array of shape {np.shape(value)}", "the page shows one operating point"
-        require(np.size(value) == 1, name, "be one number", got, advice)
+        require(
+            np.size(value) == 1,
+            DRIVE[name].label if name in DRIVE else name,
+            "be one number",
+            got,
+            advice,
+        )
         values[name] = repr(float(np.ravel(value)[0]))
     fragment = f"#explore?{urlencode(values)}" if values else "#explore"
     return Page(_server() + fragment, height)

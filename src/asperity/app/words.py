@@ -33,11 +33,23 @@ _LABELS: Mapping[str, str] = {
     "free": "Free parameters",
     "fixed": "Fixed numbers",
     "laws": "Laws",
+    "prior": "Published uncertainties as priors",
     "gauge": "Low-pass of the force gauge",
     "drift": "Friction also drifts over time",
     "profile": "Intervals by profile likelihood",
     "fit_rate": "Mean values per second for long recordings",
     "velocities": "Velocities between steps",
+    "whole_periods": "Whole periods only",
+    "stick_slip": "What it is: stick-slip",
+    "measure.stiffness": "Spring stiffness K",
+    "measure.velocity": "Pulling velocity V",
+    "measure.mass": "Mass M",
+    "measure.normal_load": "Normal load W0",
+    "trend": "Trend of the friction over slip",
+    "initial": "State at the beginning",
+    "posterior": "Posterior of one law by sampling",
+    "draws": "Draws of each chain",
+    "chains": "Chains",
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
@@ -74,5 +86,5 @@ def in_labels(argument: Argument) -> str:
     elif name == "modulated":
         return f"What it is{': velocity steps and holds' if value == 'False' else ''}"
     else:
-        label = _LABELS.get(name, name)
+        label = _LABELS.get(argument.whole) or _LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

@@ -61,7 +61,8 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
         with written_file(target) as fresh:
             write_table(fresh, rows[0], [row.values() for row in rows])
     output.answer(result.record, lambda: _sections(result), checked.truth.law.name)
-    return 0
+    aims = checked.question.measure
+    return int(any(math.isinf(result.parameters[name].se) for name in aims))
 
 
 def _sections(result: Design) -> list[Section]:

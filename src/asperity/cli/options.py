@@ -206,12 +206,13 @@ def point_options(command: Command) -> Command:
         *, law: str | None, material: str | None, settings: tuple[str, ...], **others: Any
     ) -> Any:
         given = settings_of(settings)
+        of_set = {f"numbers.{name}": "--set" for name in given}
         for parameter in named:
             value = others.pop(parameter.argument)
             if parameter.rule == "switch":
                 value = "1" if value else None
             add_setting(given, parameter.name, value)
-        with fields_as_options(POINT_OPTIONS):
+        with fields_as_options({**POINT_OPTIONS, **of_set}):
             return command(point=point_of(law, material, given), **others)
 
     drive = [_option(parameter) for parameter in DRIVE.values() if parameter.options]

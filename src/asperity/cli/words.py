@@ -51,7 +51,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
     if name == "numbers":
         named = {**DRIVE, **MACHINE}.get(key)
-        if named and named.options:
+        if named and named.options and f"numbers.{key}" not in (options or {}):
+            value = "" if named.rule == "switch" else value
             return f"{named.options[0]} {_quoted(value) if value else ''}".rstrip()
         pair = _quoted(f"{key}={value}", also="=") if value else key
         return f"{(options or {}).get(name, '--set')} {pair}".rstrip()

@@ -324,6 +324,7 @@ def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
 
 def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float) -> Any:
     """Run many points in calls of a few fixed shapes, padded by repetition."""
+    require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
     size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
     parts = []
     for i in range(0, max(len(V), 1), size):

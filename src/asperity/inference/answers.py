@@ -28,7 +28,7 @@ from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
-from asperity.parameters.arguments import FilePath, typed
+from asperity.parameters.arguments import FilePath, shown, typed
 from asperity.parameters.columns import marked_encoding
 from asperity.questions import fit as questions
 from asperity.questions.recording import Measurement as Measured
@@ -125,7 +125,9 @@ def read_data(
     for name in () if recordings else ("trend", "drift", "initial", "gauge", "fit_rate"):
         value = getattr(question, name)
         same = value == type(question).model_fields[name].default
-        require(same, name, "go with a recording", f"{value} with a table", "leave it out")
+        # Those that are numbers are frequencies.
+        got = f"{value:g} Hz" if isinstance(value, float) else shown(value)
+        require(same, name, "go with a recording", f"{got} with a table", "leave it out")
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 
 from asperity.arrays import Float
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
@@ -94,6 +94,10 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
     """
     path = Path(path)
     columns = read_headed_columns(path, _KINDS, row="a hold")
+    for name in given or {}:
+        field, got = Argument("fixed", name), "a column of the data too"
+        advice = "leave it out, or remove the column"
+        require(name not in columns, field, "be given once", got, advice)
     return healing_table({**(given or {}), **columns}, name=path.name)
 
 

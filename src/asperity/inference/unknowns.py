@@ -252,7 +252,7 @@ def unknown_of(
     positive = parameter.rule == "positive"
     if prior is not None and positive and prior.mean <= 0:
         rule = "have a positive mean"
-        raise InputError(f"prior of {name}", rule, f"{prior.mean:g}", "correct it")
+        raise InputError(Argument("prior", name), rule, f"{prior.mean:g}", "correct it")
     middle = given if given else prior.mean if prior else None
     if usual is not None:
         low, high = usual

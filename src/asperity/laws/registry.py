@@ -31,6 +31,7 @@ from asperity.parameters.arguments import shown, typed
 _LAWS: dict[str, type[Law]] = {}
 
 
+@typed
 def register(law: type[Law]) -> type[Law]:
     """Register `law` under its `name`; returns the law, for use as a class decorator.
 
@@ -91,6 +92,7 @@ def get_law(name: str) -> type[Law]:
     return _LAWS[name]
 
 
+@typed
 def known_law(text: str) -> str:
     """Name of a law from its name or its place; a law at a place is registered.
 

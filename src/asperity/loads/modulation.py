@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Self, TypeAlias
+from typing import Annotated, Any, NamedTuple, Self, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,7 +18,7 @@ from jax.typing import ArrayLike
 
 from asperity.arrays import Float
 from asperity.errors import InputError, require
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import at_least, shown, typed
 from asperity.units import to_radians, to_si
 
 
@@ -192,6 +192,7 @@ _PHASES = 2 * np.pi * np.arange(720) / 720
 _NEGLIGIBLE = 1e-13
 
 
+@typed
 def modulated(
     epsilon: ArrayLike | str = 0.0,
     *,
@@ -260,12 +261,13 @@ def no_contact(lowest: float) -> str:
     )
 
 
+@typed
 def sampled(
     load: ArrayLike | None = None,
     *,
     velocity: ArrayLike | None = None,
     shear: ArrayLike | None = None,
-    harmonics: int | None = None,
+    harmonics: Annotated[int, at_least(1)] | None = None,
 ) -> Periodic:
     """Modulation from evenly spaced samples of one period, the first at theta = 0.
 
@@ -302,7 +304,13 @@ def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] |
     terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
     for n, term in (load or {}).items():
         rule = "have harmonics from 2 on"
-        require(not n < 2 and n == int(n), "load", rule, n, "give the first one as epsilon")
+        require(
+            isinstance(n, int | np.integer) and n >= 2,
+            "load",
+            rule,
+            n,
+            "give the first one as epsilon",
+        )
         try:
             amplitude, phase = term
         except (TypeError, ValueError):
@@ -332,7 +340,7 @@ def _checked_tilt(value: Any) -> Float:
 def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Series:
     if values is None:
         return ()
-    samples = np.asarray(values, float)
+    samples = np.asarray(to_si(values, "dimensionless", name), float)
     holds = samples.ndim == 1 and len(samples) >= 3 and np.isfinite(samples).all()
     rule, got = "be at least 3 finite samples of one period", f"an array of shape {samples.shape}"
     require(holds, name, rule, got, "give evenly spaced samples without the end point")

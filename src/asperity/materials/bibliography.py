@@ -8,10 +8,12 @@ from functools import cache
 from importlib.resources import files
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import typed
 
 _ENTRY = re.compile(r"^@\w+\{(?P<key>[^,\s]+),.*?^\}", re.MULTILINE | re.DOTALL)
 
 
+@typed
 def citation(key: str) -> str:
     """Return the BibTeX entry of a source, such as ``"bureau2000"``.
 
@@ -28,6 +30,7 @@ def citation(key: str) -> str:
         raise InputError("citation", rule, f"'{key}'", closest(key, entries)) from None
 
 
+@typed
 def cited_works(source: str) -> dict[str, str]:
     """Sources of a law, by citation key.
 

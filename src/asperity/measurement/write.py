@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.measurement.campaign import (
     Row,
     modulated_rows,
@@ -64,6 +64,7 @@ def write(
     if units:
         raise InputError("write.units", "go with a recording", "measurements", "leave them out")
     measured = [data] if isinstance(data, Measured) else data
+    require(measured, "data", "hold a measurement", "none", "give one")
     rows: list[Row] = []
     for number, one in enumerate(measured, 1):
         # A measurement does not know its file.

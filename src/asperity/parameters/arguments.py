@@ -172,6 +172,12 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
             kinds = parts[:1] * len(value) if alike else parts
             each = enumerate(zip(value, kinds, strict=True))
             return tuple(of_type(part, kind, f"{name}[{i}]") for i, (part, kind) in each)
+    elif origin is Mapping:
+        if isinstance(value, Mapping):
+            for key, part in value.items() if parts else ():
+                of_type(key, parts[0], f"a key of {name}")
+                of_type(part, parts[1], f"{name}[{key!r}]")
+            return value
     elif origin is type:
         if isinstance(value, type) and issubclass(value, parts[0]):
             return value

@@ -75,7 +75,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     value : str, number, array or sequence of these
         A text carries its unit, a number is SI.
     label : str
-        What messages call the value, as ``slider.K``.
+        What messages call the value, as ``slider.spring``.
     kind : str
         A key of `asperity.units.KINDS`.
     rule : str

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -23,11 +25,34 @@ from asperity.questions.record import without_unit
 from asperity.slider import Slider
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, transient
-from asperity.transients.inputs import require_contact
+from asperity.transients.inputs import (
+    checked_integration,
+    first_checkpoint,
+    require_contact,
+    require_sliding,
+)
 from asperity.transients.trajectory import planned_rows, row_bytes
 
 #: Segments whose values are part of the comparison of two protocols.
 _COMPARED = 100
+
+
+#: Fields of a protocol by the arguments of a transient.
+_FIELDS = {
+    "initial": "start.states",
+    "programme.load": "start.load",
+    "programme.velocity": "start.velocity",
+    **{name: f"solver.{name}" for name in ("rtol", "most_steps")},
+}
+
+
+@contextmanager
+def fields_of_protocol() -> Iterator[None]:
+    """Let mistakes in the arguments of a transient name the fields of a protocol."""
+    try:
+        yield
+    except InputError as error:
+        raise error.about(_FIELDS.get(error.field.name, error.field)) from None
 
 
 class Protocol(Experiment):
@@ -67,7 +92,16 @@ class Protocol(Experiment):
         if mistakes:
             raise ProtocolError(mistakes)
         # Mistakes of the programme as a whole, such as steps without duration.
-        require_contact(self.programme, self._numbers["W0"].value)
+        with fields_of_protocol():
+            require_contact(self.programme, self._numbers["W0"].value)
+            solver = self.integration
+            initial, _ = solver.pop("initial"), solver.pop("sampling")
+            motion = checked_integration(self.slider, self.programme, **solver).motion
+            # The states of steady sliding take a compilation.
+            if isinstance(initial, str):
+                require_sliding(self.programme)
+            else:
+                first_checkpoint(motion, self.programme, initial)
         return self
 
     def _sourced_numbers(self) -> dict[str, SourcedNumber]:

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from asperity import materials
-from asperity.errors import InputError
 from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
 from asperity.parameters.arguments import FilePath, typed
-from asperity.protocol.protocol import Protocol, load_protocol
+from asperity.protocol.protocol import Protocol, fields_of_protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.slider import Slider, equation_of_motion
 from asperity.theory import closed_forms as cf
@@ -96,8 +95,6 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     )
 
 
-#: Fields of a protocol by the arguments of a transient.
-_FIELDS = {"initial": "start.states", "rtol": "solver.rtol", "programme.velocity": "start.velocity"}
 #: Rows of a block, the most that an interruption loses.
 _ROWS = 20_000
 
@@ -231,15 +228,14 @@ def run_protocol(
     require_room(protocol, target, done.lengths.get("time", 0))
     try:
         while not done.finished:
-            done = _one_block(protocol, output, done, rows, progress)
+            with fields_of_protocol():
+                done = _one_block(protocol, output, done, rows, progress)
             if progress is not None and math.isfinite(done.time):
                 progress(done.time, protocol.programme.duration)
         attributes = _attributes(protocol, done)
         if unstable := stability_statement(protocol):
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
-    except InputError as error:
-        raise error.about(_FIELDS.get(error.field.name, error.field)) from None
     except KeyboardInterrupt:
         total = protocol.programme.duration
         raise Interrupted(

@@ -118,7 +118,6 @@ class Design(Question):
     """
 
     subject: ClassVar[str] = "plan"
-    prefix: ClassVar[str] = "plan."
 
     law: str
     free: Annotated[Names, Field(min_length=1)]
@@ -148,16 +147,16 @@ class Design(Question):
             rule, got = "have one aim, measure or rival", "both" if self.measure else "none"
             raise InputError("plan", rule, got, "name parameters to measure, or a rival law")
         if self.rival_free is not None and self.rival is None:
-            raise InputError("plan.rival_free", "go with a rival", "no rival", "leave it out")
+            raise InputError("rival_free", "go with a rival", "no rival", "leave it out")
         if self.draws and self.rival is not None:
             advice = "laws are separated at one set of values"
-            raise InputError("plan.draws", "be 0 with a rival", self.draws, advice)
+            raise InputError("draws", "be 0 with a rival", self.draws, advice)
         missing = [n for n in ("V", "epsilon", "frequency") if n not in self.ranges]
         rule, got = "have V, epsilon and frequency", f"none for {', '.join(missing)}"
-        require(not missing, "plan.ranges", rule, got, "give a value, a list, or from and to")
+        require(not missing, "ranges", rule, got, "give a value, a list, or from and to")
         for n in (1, 2):
             holds = f"phase{n}" not in self.noise or f"mu{n}" in self.noise
-            require(holds, "plan.noise", f"have mu{n} where it has phase{n}", "none", "add it")
+            require(holds, "noise", f"have mu{n} where it has phase{n}", "none", "add it")
         return self
 
     @model_validator(mode="after")
@@ -168,7 +167,7 @@ class Design(Question):
         costs = {n: getattr(self, n) for n in ("settling_slip", "integration")}
         given = [n for n, cost in costs.items() if cost is not None]
         if self.points is not None and given:
-            raise InputError(f"plan.{given[0]}", "go with time", "points", "leave it out")
+            raise InputError(given[0], "go with time", "points", "leave it out")
         if self.time is not None and not any(costs.values()):
             got = "no settling_slip and no integration"
             raise InputError("plan", "say what a reading takes", got, "give one or both")

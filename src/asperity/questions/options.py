@@ -114,7 +114,6 @@ def source_options(source: Source) -> list[str]:
         parts.append(f"{own or '--column'} {shlex.quote(text)}")
     channels = {f"{name} ": f" {expression}" for name, expression in source.channels.items()}
     fields = source.model_dump(exclude={"columns", "title", "channels"}, exclude_defaults=True)
-    fields = {name: value for name, value in fields.items() if value != ""}
     return parts + as_options({**fields, "channels": channels}, SOURCE_OPTIONS)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Seconds, Span, quantity
+from asperity.questions.record import Question, Seconds, Span, quantity, shown
 
 Column = str | int
 
@@ -77,7 +78,7 @@ class Source(ReadingRecipe):
     def arguments(self) -> dict[str, Any]:
         """Keyword arguments of `asperity.read`, without those that have their default."""
         named = self.model_dump(exclude={"title", "area"})
-        return {name: value for name, value in named.items() if value not in (None, {}, "")}
+        return {name: value for name, value in named.items() if value not in (None, {})}
 
 
 def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -89,7 +90,15 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
     for start, end in spans:
         rule, got = "have a start and an end", f"{start:g} to {end:g} s"
         require(math.isfinite(start) and math.isfinite(end), "", rule, got, "write both")
-    return tuple(sorted(spans))
+    ordered = sorted(spans)
+    for (first, end), (start, last) in pairwise(ordered):
+        got = f"{first:g} to {end:g} s and {start:g} to {last:g} s"
+        require(end <= start, "", "not overlap", got, "leave one out or cut it")
+    return tuple(ordered)
+
+
+#: Fields that say how a modulated load is read; a drift is that of sliding too.
+_OF_MODULATION = ("frequency", "exact_frequency", "harmonics", "whole_periods", "detrend")
 
 
 class Measurement(Question):
@@ -166,6 +175,14 @@ class Measurement(Question):
             "them of a modulated recording",
         )
         require(steady, "measure.steps and holds", rule, got, "leave one of them out")
+        inside = [
+            f"{step:g} s in {start:g} to {end:g} s"
+            for start, end in self.holds or ()
+            for step in self.steps or ()
+            if start < step < end
+        ]
+        rule = f"lie outside {Argument('measure.holds')}"
+        require(not inside, "measure.steps", rule, ", ".join(inside), "leave one of them out")
         if self.velocities is not None:
             got = f"{len(self.velocities)} for {len(self.steps or ())}"
             rule, counted = "be one more than the steps", len(self.steps or ()) + 1
@@ -174,7 +191,13 @@ class Measurement(Question):
             rule, got = f"go without {Argument('measure.holds')}", "both"
             advice = "write 0 as the velocity of a hold"
             require(self.holds is None, "measure.velocities", rule, got, advice)
-        alone = self.modulated is None and self.frequency is None
-        rule = f"go without {modulated} and {frequency}"
-        require(alone or not self.stick_slip, "measure.stick_slip", rule, "both", "leave one out")
+        alone = self.modulated is None or not self.stick_slip
+        require(alone, "measure.stick_slip", f"go without {modulated}", "both", "leave one out")
+        if self.modulated is False or self.stick_slip:
+            kind = Argument("modulated", value="False")
+            for name in _OF_MODULATION[: None if self.stick_slip else -1]:
+                got, field = getattr(self, name), type(self).model_fields[name]
+                other = Argument("measure.stick_slip") if self.stick_slip else kind
+                rule = f"go without {other}"
+                require(got == field.default, f"measure.{name}", rule, shown(got), "leave one out")
         return self

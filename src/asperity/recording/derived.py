@@ -9,6 +9,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
+from asperity.parameters.arguments import typed
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Names, Quantity, evaluate
 from asperity.recording.finding import Finding
@@ -21,6 +22,7 @@ from asperity.units.scale import base_units, kind_of_dimension, unit_text
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
 
+@typed
 def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     """Add channels to a recording, each computed by an expression of other channels.
 
@@ -49,9 +51,9 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     for target, text in channels.items():
         field = Argument("channels", target)
         rule = "be an expression"
-        require(str(text).strip(), field, rule, repr(text), "write it like '2.4 N/V * Gauge'")
+        require(text.strip(), field, rule, repr(text), "write it like '2.4 N/V * Gauge'")
         require(target.strip(), "channels", "have names", "an empty one", "write 'load = ...'")
-        quantity, sources = evaluate(str(text), _names(trace, field), field)
+        quantity, sources = evaluate(text, _names(trace, field), field)
         trace = _with_channel(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
@@ -70,8 +72,10 @@ def _with_channel(
     _check_kind(role, kind, quantity, field)
     shape = trace.time.shape
     values = np.array(np.broadcast_to(np.asarray(quantity.values, dtype=np.float64), shape))
+    rule, advice = "give numbers", "correct the expression"
+    require(np.isfinite(values).any() or not values.size, field, rule, "no finite one", advice)
     if role == "time":
-        return _with_time(trace, values, field, text)
+        return _with_time(trace, values, text)
     unit = KINDS[kind].si if kind else ""
     channel = Channel(values, kind, unit, target, unit or unit_text(quantity.dimension))
     channels, findings, roles = dict(trace.channels), trace.findings, dict(trace.roles)
@@ -90,8 +94,7 @@ def _with_channel(
     return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 
-def _with_time(trace: Trace, time: Float, field: Argument, text: str) -> Trace:
-    require(np.isfinite(time).any(), field, "give times", "no finite one", "correct the expression")
+def _with_time(trace: Trace, time: Float, text: str) -> Trace:
     kept = [f for f in trace.findings if f.name not in CHECKED]
     moved = replace(trace, time=time, findings=())
     provenance = {**trace.provenance, "time": f"derived: {text}"}

@@ -71,7 +71,7 @@ def equation_of_motion(
     rule, got = "depend on the velocity with inertia or radiation damping", slider.law.name
     require(slider.law.rate_dependent, "law", rule, got, "leave both out or choose another law")
     if inertia:
-        _require_positive("slider.M", slider.M, "kg", "give the mass, as mass='1.6 kg'")
+        _require_positive("slider.mass", slider.M, "kg", "give the mass, as mass='1.6 kg'")
     else:
         _require_positive("radiation_damping", eta, "N s/m", "leave it out where there is none")
     kind: Any = motion_type(inertia=inertia, damped=True, elastic=_elastic(slider))

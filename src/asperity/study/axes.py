@@ -254,6 +254,8 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     count = table["count"]
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LISTED:
         raise InputError("count", f"be from 1 to {MOST_LISTED:,}", shown(count))
+    rule, advice = "be at least 2 between two ends", "write { values = ['...'] } for one value"
+    require(count > 1 or low == high, "count", rule, count, advice)
     return spaced(low, high, count, log=spacing == "log").tolist()
 
 

@@ -7,6 +7,7 @@ no absolute path of a file, so that it is the same on another machine.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import sys
 from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from asperity.operating_point import (
     known_parameters,
     material_of,
     refuse_foreign,
+    require_influence,
     sourced_numbers,
     without_numbers,
 )
@@ -119,6 +121,12 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         outputs = dict.fromkeys(one_of(name, offered, "outputs") for name in asked)
         supplied = solve.supplied(named)
     if not mistakes:
+        columns = [columns_of(axis) for axis in axes.values()]
+        # What varies together with others may be there for the record.
+        alone = [names[0] for names in columns if len(names) == 1]
+        varied = dict.fromkeys(itertools.chain(*columns), 1.0)
+        with _noted(mistakes):
+            require_influence(alone, {**numbers, **varied}, "axes.{}", "parameters")
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:

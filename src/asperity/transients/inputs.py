@@ -14,7 +14,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, State
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
-from asperity.parameters.arguments import number, typed
+from asperity.parameters.arguments import number, shown, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
 from asperity.transients.equations import SegmentEquations, states_after_jump
 from asperity.transients.events import EventThresholds
@@ -52,12 +52,16 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
         rule, advice = "be 'steady' or an array of states", "leave it out to begin steadily"
         require(initial == "steady", "initial", rule, f"'{initial}'", advice)
         return Checkpoint(0, 0.0, steady_start(motion, programme))
-    states = np.asarray(initial, float)
+    try:
+        states = np.asarray(initial, float)
+    except (TypeError, ValueError, OverflowError):
+        states = np.array(np.nan)
     names = ", ".join((*motion.mechanical, *motion.slider.law.state_names))
     holds = states.shape == (motion.size,) and bool(np.all(np.isfinite(states)))
     advice = "take them from a trajectory or begin in steady sliding"
     rule = f"be {motion.size} finite states ({names})"
-    require(holds, "initial", rule, states.tolist(), advice)
+    got = states.tolist() if 0 < states.size < 20 and states.ndim else shown(initial)
+    require(holds, "initial", rule, got, advice)
     _require_motion(motion, programme, states)
     return Checkpoint(0, 0.0, np.append(states, 0.0))
 
@@ -109,15 +113,26 @@ def require_contact(programme: Programme, W0: float) -> None:
         require(load > NO_LOAD * W0, "programme.load", rule, got, advice)
 
 
+def require_sliding(programme: Programme) -> None:
+    """Refuse a programme that cannot begin in steady sliding: its first velocity is not positive.
+
+    Raises
+    ------
+    InputError
+    """
+    velocity = programme.level.velocity
+    rule = "be positive for a start in steady sliding"
+    advice = f"give it, or the states at rest as {Argument('initial')}"
+    require(velocity > 0, "programme.velocity", rule, f"{velocity:g} m/s", advice)
+
+
 def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
     """States of steady sliding under the load and at the velocity before the programme.
 
     With x K / W0 as the last; a step of the load at the very beginning is included.
     """
+    require_sliding(programme)
     level = programme.level
-    rule, got = "be positive for a start in steady sliding", f"{level.velocity:g} m/s"
-    advice = f"give it, or the states at rest as {Argument('initial')}"
-    require(level.velocity > 0, "programme.velocity", rule, got, advice)
     first = SegmentEquations(motion, programme.segments[0])
     w = level.load / np.asarray(motion.slider.W0)
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))

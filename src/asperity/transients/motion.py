@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from asperity._jax import spare_mappings
 from asperity.loads import Programme
 from asperity.outputs import require_memory
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, typed
 from asperity.slider import Slider
 from asperity.transients.equations import motion_samples
 from asperity.transients.events import Event
@@ -33,11 +33,12 @@ from asperity.transients.trajectory import (
 ROWS = 100_000
 
 
+@typed
 def integrate_blocks(
     slider: Slider,
     programme: Programme,
     *,
-    rows: int = ROWS,
+    rows: Annotated[int, at_least(1)] = ROWS,
     initial: Any = "steady",
     sampling: Any = None,
     resume: Checkpoint | None = None,

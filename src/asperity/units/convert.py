@@ -231,18 +231,17 @@ def to_radians(value: Any, name: str) -> Any:
     Parameters
     ----------
     value : str, number or array
-        A text has its unit, ``"5 deg"`` or ``"0.09 rad"``; numbers are in radians and returned as
-        they are.
+        A text has its unit, ``"5 deg"`` or ``"0.09 rad"``; numbers are in radians.
     name : str
         Name of the value in messages.
 
     Raises
     ------
     InputError
-        If a text is no angle.
+        If the value is no finite angle.
     """
     if not isinstance(value, str):
-        return value
+        return to_si(value, "dimensionless", name)
     number, _, unit = value.strip().replace("°", " deg").partition(" ")
     try:
         angle = float(number) * _RADIANS[unit.strip()]

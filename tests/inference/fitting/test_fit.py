@@ -309,7 +309,7 @@ def test_a_stiffness_over_the_load_of_a_table_is_one_of_the_table(readings, pmma
     assert with_prior[0].values == pytest.approx(with_prior[1].values, rel=1e-6)
     shown = with_prior[0].over_load["K/W0"]
     assert shown.value == pytest.approx(with_prior[0].values["K"] / pmma.W0 * 1e-6)
-    with pytest.raises(InputError, match="prior of K must be in N/m or 1/m for a table"):
+    with pytest.raises(InputError, match=r"prior\['K'\] must be in N/m or 1/m for a table"):
         fit(table, "elasto-plastic", ("A", "K"), prior={"K": Prior(1, 1, "", "Pa/m")}, **given)
 
 

@@ -256,7 +256,7 @@ def test_a_prior_of_the_stiffness_over_the_load_is_one_of_the_stiffness():
     # Far narrower than what the recording knows.
     assert found.values["K"] == pytest.approx(3e3 * run.W0, rel=2e-3)
     assert any("prior of K" in w for w in found.warnings)
-    with pytest.raises(InputError, match="prior of K must be in Pa/m or 1/m"):
+    with pytest.raises(InputError, match=r"prior\['K'\] must be in Pa/m or 1/m"):
         fit(run, "rice-ruina", FREE, prior={"K": replace(over_load, unit="N/m")})
 
 

@@ -138,7 +138,7 @@ def test_plans_beyond_memory_are_refused_before_anything(
             "axes": few, "solve": "threshold", "threshold": {"scan": huge}
         },
         "chunk must fit into": {
-            "axes": {"epsilon": few["epsilon"], **spans(10**5, 1, 10**5)}, "chunk": huge
+            "axes": {**spans(10**5, 1, 10**5), **few}, "chunk": huge
         },
     }  # fmt: skip
     for message, fields in plans.items():

@@ -340,7 +340,7 @@ def design(
     cost = plan.cost(candidates.points["V"])
     if cost.min() > plan.budget:
         rule, got = "suffice for one reading", f"{plan.budget:g} s"
-        raise InputError(f"{plan.name}.time", rule, got, f"the shortest takes {cost.min():g} s")
+        raise InputError("time", rule, got, f"the shortest takes {cost.min():g} s")
     shape = tuple(levels.size for levels in plan.axes.values())
     grid = even_grid(shape, candidates.index, cost, plan.budget)
     expected, jacobian = expected.without(unseen), jacobian[~unseen]
@@ -353,7 +353,7 @@ def _require_candidates(plan: DesignPlan, candidates: Candidates) -> None:
         why = "; ".join(f"{count} times: {text}" for text, count in candidates.left_out.items())
         rule = "hold operating points at which the slider slides steadily"
         advice = "lower W0, stiffen the spring, or widen the ranges"
-        raise InputError(f"{plan.name}.ranges", rule, f"none of {candidates.total} ({why})", advice)
+        raise InputError("ranges", rule, f"none of {candidates.total} ({why})", advice)
 
 
 def fisher_information(jacobian: Float) -> Float:
@@ -422,7 +422,7 @@ class _Task:
         n, grid = result.readings.astype(float), self.grid.readings(self.cost, total)
         best, name = result.fitted, rival.law.name
         values = "; ".join(f"{key} = {v:.4g}" for key, v in rival.named(best.u).items())
-        field = f"{plan.name}.rival"
+        field = "rival"
         if not math.isfinite(best.chi2):
             rule, got = "have responses where the law has them", f"'{name}', which lost them"
             advice = "narrow the ranges, or free fewer of its parameters"
@@ -500,6 +500,8 @@ class _Task:
         candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
         warnings = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
+        if any(math.isinf(errors[name].se) for name in self.plan.question.measure):
+            numbers = {**numbers, "fewer": math.nan}
         simulation = None
         if simulate:
             simulation = self._simulated(n.astype(float), simulate, rival)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.arrays import Float, spaced
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, closest, in_files, naming, require
 from asperity.inference.fitting.inputs import (
     fixed_values,
     priors_of,
@@ -132,10 +132,11 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
         # A law that is defined in a file is searched in the folder of the plan.
         if isinstance(place, str) and ".py:" in place:
             content[key] = str(file.parent / place)
-    try:
-        return plan_of(content, name=file.name, require_unit=True)
-    except InputError as error:
-        raise InputError(f"{error} (in '{Path(path).name}')") from None
+    with naming(in_files):
+        try:
+            return plan_of(content, name=file.name, require_unit=True)
+        except InputError as error:
+            raise InputError(f"{error} (in '{Path(path).name}')") from None
 
 
 def plan_of(
@@ -163,7 +164,7 @@ def plan_of(
 
 
 def _checked(question: Design, name: str) -> DesignPlan:
-    law = _law(question.law, "plan.law")
+    law = _law(question.law, "law")
     material = None if question.material is None else load_material(question.material)
     known = _known(law)
     axes = _axes(question, {n: p for n, p in known.items() if p.place != "law"})
@@ -173,31 +174,31 @@ def _checked(question: Design, name: str) -> DesignPlan:
     truth = _hypothesis(question, law, law, question.free, material, table)
     rival = None
     if question.rival is not None:
-        rival_law = _law(question.rival, "plan.rival")
+        rival_law = _law(question.rival, "rival")
         free = question.rival_free or tuple(n for n in truth.names if n in _known(rival_law))
         rival = _hypothesis(question, rival_law, law, free, material, table)
         holds = rival_law is not law or not set(truth.names) <= set(rival.names)
         rule, got = "differ from the law", f"{law.name} with the same free parameters"
-        require(holds, "plan.rival", rule, got, "name another law, or leave one out in rival_free")
+        require(holds, "rival", rule, got, "name another law, or leave one out in rival_free")
     noise = _noise(question)
-    uncertainty = _uncertainties(question, known, material, truth) if question.draws else {}
+    uncertainty = _uncertainties(question, known, material, truth)
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
-    require_motion(truth.names, plan.motion, label="plan.free", plan=True)
+    require_motion(truth.names, plan.motion)
     if rival is not None:
-        require_motion(rival.names, plan.motion, label="plan.rival_free", plan=True)
+        require_motion(rival.names, plan.motion, label="rival_free")
     for parameter in question.measure:
         rule, advice = "name free parameters", f"free it or choose among {', '.join(truth.names)}"
-        require(parameter in truth.names, "plan.measure", rule, f"'{parameter}'", advice)
+        require(parameter in truth.names, "measure", rule, f"'{parameter}'", advice)
     largest = float(axes["epsilon"].max())
     for hypothesis in (truth, rival) if rival else (truth,):
         carried = {**hypothesis.fixed, **expected_values(hypothesis)}["eps_ratio"] * largest
         got, advice = f"{carried:g}", "contact would be lost"
-        require(not carried >= 1, "plan.ranges.epsilon times eps_ratio", "be below 1", got, advice)
+        require(not carried >= 1, "ranges.epsilon times eps_ratio", "be below 1", got, advice)
     unknown = sum(1 for u in truth.unknowns if u.prior is None)
     if question.points is not None and question.points * len(noise) < unknown:
         rule = "give at least as many data as free parameters"
         got = f"{question.points * len(noise)} for {unknown} without a prior"
-        raise InputError("plan.points", rule, got, "plan more, or free fewer")
+        raise InputError("points", rule, got, "plan more, or free fewer")
     return plan
 
 
@@ -226,8 +227,8 @@ def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> di
     for name, value in getattr(question, field).items():
         if name not in known:
             rule = "have names of parameters"
-            raise InputError(f"plan.{field}", rule, f"'{name}'", closest(name, known))
-        result[name] = _quantity(value, known[name], f"plan.{field}.{name}")
+            raise InputError(field, rule, f"'{name}'", closest(name, known))
+        result[name] = _quantity(value, known[name], f"{field}.{name}")
     return result
 
 
@@ -237,17 +238,17 @@ def _axes(question: Design, known: Mapping[str, Parameter]) -> dict[str, Float]:
     for name, given in question.ranges.items():
         if name not in known or name == EPS_RATIO.name:
             rule = "be of the drive or the machine"
-            raise InputError("plan.ranges", rule, f"'{name}'", closest(name, known))
+            raise InputError("ranges", rule, f"'{name}'", closest(name, known))
         axes[name] = _levels(name, given, known[name])
     count = math.prod(levels.size for levels in axes.values())
     rule = f"have at most {MOST} combinations"
-    require(not count > MOST, "plan.ranges", rule, count, "give fewer levels")
+    require(not count > MOST, "ranges", rule, count, "give fewer levels")
     return axes
 
 
 def _levels(name: str, given: Range, parameter: Parameter) -> Float:
     """Values of one axis in SI: a list, or divisions of a range."""
-    label = f"plan.ranges.{name}"
+    label = f"ranges.{name}"
     if given.values is not None:
         levels = np.array([_quantity(v, parameter, label) for v in given.values])
         if np.unique(levels).size != levels.size:
@@ -267,13 +268,13 @@ def _noise(question: Design) -> dict[str, NoiseLevel]:
     for name in question.noise:
         if name not in OBSERVABLES:
             rule = "be of observables"
-            raise InputError("plan.noise", rule, f"'{name}'", closest(name, OBSERVABLES))
+            raise InputError("noise", rule, f"'{name}'", closest(name, OBSERVABLES))
     return {n: _level(n, question.noise[n]) for n in OBSERVABLES if n in question.noise}
 
 
 def _level(name: str, given: Noise) -> NoiseLevel:
     """Standard uncertainty of one observable."""
-    label = f"plan.noise.{name}"
+    label = f"noise.{name}"
     phase = name.startswith("phase")
     rule = "be absolute"
     require(not phase or not given.relative, label, rule, "a relative part", "give an angle")
@@ -313,10 +314,10 @@ def _hypothesis(
     for name, field in itertools.chain(((n, "fixed") for n in fixed), ((n, "free") for n in free)):
         rule = "not have what ranges has"
         advice = "drop one" if field == "fixed" else "it is set, not fitted"
-        require(name not in table.points, f"plan.{field}", rule, f"'{name}'", advice)
+        require(name not in table.points, field, rule, f"'{name}'", advice)
     for name in given:
         rule = "be given once"
-        require(name not in fixed or name in free, f"plan.{name}", rule, "two", "drop one")
+        require(name not in fixed or name in free, f"values.{name}", rule, "two", "drop one")
         if name not in free and first is law:
             fixed[name] = given[name]
     start = start_values(law, free, {n: v for n, v in given.items() if n in free}, material)
@@ -325,7 +326,7 @@ def _hypothesis(
     missing = [n for n in free if n in known and n not in start]
     rule = f"have a value for each free parameter of {law.name}"
     got = f"none for {', '.join(missing)}"
-    require(not missing, "plan.values", rule, got, "a design is made for values that are expected")
+    require(not missing, "values", rule, got, "a design is made for values that are expected")
     constants = fixed_values(law, table, free, fixed, material)
     constants = {n: float(v) for n, v in constants.items() if n not in table.points}
     unknowns = unknowns_of(
@@ -347,9 +348,9 @@ def _uncertainties(
     """Standard deviations of the free parameters that are drawn, in SI."""
     given = {}
     for name, value in question.uncertainty.items():
-        label = f"plan.uncertainty.{name}"
+        label = f"uncertainty.{name}"
         holds, rule = name in known and name in truth.names, "be of free parameters"
-        require(holds, "plan.uncertainty", rule, f"'{name}'", "free it or leave it out")
+        require(holds, "uncertainty", rule, f"'{name}'", "free it or leave it out")
         with_unit(value, known[name].kind, label)
         given[name] = float(to_si(value, known[name].kind, label))
         if given[name] < 0:
@@ -358,5 +359,5 @@ def _uncertainties(
         if material is not None and name in material and material[name].uncertainty:
             given.setdefault(name, float(material[name].si_uncertainty or 0.0))
     rule = "have a free parameter to draw"
-    require(given, "plan.uncertainty", rule, "none", "add one, or leave draws out")
+    require(given or not question.draws, "uncertainty", rule, "none", "add one, or leave draws out")
     return {n: given[n] for n in truth.names if n in given}

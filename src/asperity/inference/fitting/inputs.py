@@ -36,7 +36,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.questions.fit import NormalPrior
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS, format_si, to_si
 
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
@@ -132,7 +132,7 @@ def of_the_table(
         start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
     if prior is not None and elsewhere:
         rule = "be in N/m or 1/m for a table"
-        require(prior.unit == "1/m", "prior of K", rule, prior.unit, "convert it")
+        require(prior.unit == "1/m", Argument("prior", "K"), rule, prior.unit, "convert it")
         W0 = float(load[0])
         priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
     return start, priors
@@ -208,6 +208,14 @@ def fixed_values(
             rule, got = "come with a fixed W0", f"'{given['K']}' and W0 free"
             raise InputError("K over the load", rule, got, "give K as a stiffness, or fix W0")
         result["K"] = result["K"] * result["W0"]
+    for name in (n for n in given if n in points):
+        column, value = np.broadcast_arrays(points[name], result[name])
+        other = np.isfinite(column) & ~np.isclose(column, value, rtol=1e-9, atol=0.0)
+        if other.any():
+            at, kind = int(np.argmax(other)), known[name].kind
+            got = f"{format_si(value[at], kind)} and {format_si(column[at], kind)}"
+            rule, advice = "agree with the column of the data", "leave it out, or remove the column"
+            raise InputError(Argument("fixed", name), rule, got, advice)
     if "eps_ratio" not in free:
         result["eps_ratio"] = ratio = float(
             _checked(law, "fixed", "eps_ratio", given.get("eps_ratio", 1.0))
@@ -243,9 +251,7 @@ def require_free(
         require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
 
 
-def require_motion(
-    free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free", plan: bool = False
-) -> None:
+def require_motion(free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free") -> None:
     """Refuse a free M without inertia and a free eta without radiation damping.
 
     Parameters
@@ -255,8 +261,6 @@ def require_motion(
         ``inertia`` and ``radiation_damping``.
     label : str
         Name of `free` in messages.
-    plan : bool
-        Whether the switches are those of a plan file.
 
     Raises
     ------
@@ -267,9 +271,8 @@ def require_motion(
         ("eta", "radiation_damping", "radiation damping"),
     ):
         if name in free and not motion[option]:
-            switch = f"{option} = true" if plan else Argument(option, value="True")
             got = f"'{name}', which has no influence without {word}"
-            advice = f"add {switch} or fix {name}"
+            advice = f"add {Argument(option, value='True')} or fix {name}"
             raise InputError(label, "be parameters that count", got, advice)
 
 
@@ -334,11 +337,12 @@ def priors_of(
         parameter = known.get(name.partition("[")[0])
         if parameter is None:
             raise InputError("prior", "name a parameter", f"'{name}'", "correct the name")
-        mean, unit = _of_some_kind(parameter, prior.mean, f"prior {name}")
-        sd, other = _of_some_kind(parameter, prior.std, f"prior {name}")
+        label = f"{Argument('prior', name)}"
+        mean, unit = _of_some_kind(parameter, prior.mean, label)
+        sd, other = _of_some_kind(parameter, prior.std, label)
         rule = "have a positive deviation" if unit == other else "have one unit"
         got = f"{sd:g}" if unit == other else f"{unit} and {other}"
-        require(sd > 0 and unit == other, f"prior {name}", rule, got, "give one")
+        require(sd > 0 and unit == other, label, rule, got, "give one")
         result[name] = Prior(mean, sd, "given", unit)
     return result
 

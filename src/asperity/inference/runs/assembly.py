@@ -261,7 +261,7 @@ def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
         return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
     units = " or ".join(dict.fromkeys((run.stiffness_unit, "1/m")))
     rule = f"be in {units} for {run.name}"
-    raise InputError("prior of K", rule, prior.unit, "convert it")
+    raise InputError(Argument("prior", "K"), rule, prior.unit, "convert it")
 
 
 def shared_stiffness(
@@ -370,7 +370,7 @@ def require_calibrated(
     known = [GAIN, *((f"{GAIN}[{run.name}]" for run in runs) if several else ())]
     for name in [*given, *(n for n in free if n.partition("[")[0] == GAIN)]:
         rule = f"name {' or '.join(known)}"
-        require(name in known, "prior of a gain", rule, f"'{name}'", "correct the name")
+        require(name in known, "prior", rule, f"'{name}'", "correct the name")
     varying = [run.name for run in runs if run.load_varies]
     if given and varying and not mu0_given:
         rule = f"be free or given with a gain under a load that changes, as in {varying[0]}"

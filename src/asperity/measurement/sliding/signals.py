@@ -116,8 +116,11 @@ def sliding_signals(
     left_out = int((~use & ~outside).sum())
     if use.sum() < _FEWEST:
         used = {name: trace.channels[name].values[~outside] for name in names}
-        if all(np.isfinite(values).all() for values in used.values()):
-            used = {"F/W": friction[~outside]}
+        zeros = 0 if weight is None else int((weight[~outside] == 0).sum())
+        if zeros and all(np.isfinite(values).all() for values in used.values()):
+            got = f"0 in {zeros} of {(~outside).sum()} samples of '{trace.name_of(read[0])}'"
+            advice = "choose another column or window"
+            raise InputError("measure.load", "be above zero", got, advice)
         raise too_few(_FEWEST, int(use.sum()), trace.time[~outside], used)
     time, friction = time[use], friction[use]
     slip = None

@@ -252,7 +252,7 @@ def read(
             rate = "1 Hz"
         recorded = raw_recording(
             _with_content(file),
-            format or rules.format,
+            rules.format if format is None else format,
             layout,
             {name: getattr(rules, name) for name in layout},
         )

@@ -192,8 +192,11 @@ export class FitPanel {
       laws: settings.laws, free: this.#freed(),
       rows: this.rows(), tables: this.tables(), fixed, start,
       runs: this.runs().map((r) => r.question),
-      trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
-      fit_rate: settings.fit_rate || null,
+      // Without a recording these fields are hidden.
+      ...(this.runs().length && {
+        trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
+        fit_rate: settings.fit_rate || null,
+      }),
       report: settings.report, names: chosenNames(),
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
