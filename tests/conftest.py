@@ -5,6 +5,11 @@ import os
 from itertools import groupby, islice
 
 import pytest
+from hypothesis import settings
+
+# No assertion depends on time, so that examples have no deadline.
+settings.register_profile("no deadline", parent=settings.default, deadline=None)
+settings.load_profile("no deadline")
 
 pytest_plugins = [
     "references.browser",

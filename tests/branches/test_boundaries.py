@@ -11,7 +11,7 @@ from asperity.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-#: Accuracy of a boundary, relative: what is promised.
+#: Promised relative accuracy of a boundary.
 BOUNDARY = 1e-6
 
 

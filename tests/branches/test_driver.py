@@ -74,7 +74,7 @@ def test_a_step_that_turns_or_misses_too_much_is_taken_shorter(limit):
 
 
 def test_a_curve_ends_with_its_reason_and_steps_are_limited():
-    def half_line(x, y):  # its end is come nearer to by ever shorter steps
+    def half_line(x, y):  # approached by ever shorter steps
         return y - (0.0 if x < 1 else math.nan)
 
     def straight(x, y):

@@ -1,4 +1,4 @@
-"""Slow modulation: branches through folds and canards, and what is said of those that end."""
+"""Slow modulation: branches through folds and canards, and the reasons why branches end."""
 
 import dataclasses
 
@@ -18,12 +18,12 @@ from references.populations import population
 
 pytestmark = pytest.mark.slow
 
-#: V/(2 pi f D0), K/Kc, epsilon, and what becomes of them.
+#: V/(2 pi f D0), K/Kc, epsilon, and the outcome.
 CORNER = {
     "an orbit at the end of a canard": (4.45, 0.43, 0.23, Outcome.CONVERGED),
     "a fold": (4.62, 0.88, 0.30, Outcome.FOLDED),
     "a runaway": (17.0, 0.28, 0.42, Outcome.RUNAWAY),
-    "an orbit too unstable to be held": (69.0, 0.72, 0.64, Outcome.SENSITIVE),
+    "an orbit too unstable to follow": (69.0, 0.72, 0.64, Outcome.SENSITIVE),
 }
 
 

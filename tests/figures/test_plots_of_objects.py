@@ -1,4 +1,4 @@
-"""`.plot()` draws the numbers of the object, and what failed or is unstable is seen."""
+"""`.plot()` draws the numbers of the object, and marks failed and unstable points."""
 
 from io import BytesIO
 

@@ -1,4 +1,4 @@
-"""The folder of a fit: a page with nothing to fetch, a material that loads, all or nothing."""
+"""The folder of a fit: a self-contained page and a valid material, written as a whole or not."""
 
 import json
 import re

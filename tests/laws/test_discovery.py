@@ -1,4 +1,4 @@
-"""Laws from outside the package: how they are found, and which are refused before a solve."""
+"""Laws from outside the package: by file, module and entry point; laws that are refused."""
 
 import importlib
 import sys
@@ -26,7 +26,7 @@ number = 3
 
 @pytest.fixture(autouse=True)
 def a_registry_of_its_own(monkeypatch):
-    """What a test makes known is forgotten after it."""
+    """Laws registered in a test are removed after it."""
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
     registry.installed.cache_clear()
     yield
@@ -90,7 +90,7 @@ def test_a_law_without_all_of_its_equations_is_refused(tmp_path) -> None:
 
 
 def install(folder: Path, name: str, value: str) -> None:
-    """What an installer leaves of a package that declares an entry point."""
+    """The files that an installer writes for a package with an entry point."""
     info = folder / "mylab-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mylab\nVersion: 1.0\n")
@@ -122,7 +122,7 @@ NUMBERS = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 
 
 class Sound(RiceRuina):
-    """Not of the package, and right."""
+    """A correct law from outside the package."""
 
     name: ClassVar[str] = "sound"
 

@@ -202,7 +202,7 @@ def check_load_step(law: Law, example: Example) -> None:
 
 
 def check_age_velocity(law: Law, example: Example) -> None:
-    """The states see the velocity that the law's text names, and only that one."""
+    """The rates of the states depend on the velocity that the law names, and on no other."""
     v, state, w = sample(law)
     rates = law.state_rate(v, v, state, w)
     for rate, other, same in zip(
@@ -321,7 +321,7 @@ def test_the_null_model_is_amontons():
 
 
 def without_example(laws: Mapping[str, type[Law]]) -> set[str]:
-    """Laws of the package that the suite has no parameters for."""
+    """Laws of the package for which the suite has no parameters."""
     return {name for name, law in laws.items() if law.__module__.startswith("asperity.")} - set(
         EXAMPLES
     )

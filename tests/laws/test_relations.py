@@ -1,4 +1,4 @@
-"""What single laws are known for, and the inverse of laws that have none in closed form."""
+"""Published properties of single laws, and the inverse of laws without a closed form."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""Mistakes seen in other codes, planted here: the comparison with the integration catches each."""
+"""Planted mistakes that other codes have had: the comparison with an integration detects each."""
 
 import dataclasses
 

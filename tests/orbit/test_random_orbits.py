@@ -60,7 +60,7 @@ def ageing_over_lengths(count):
 
 @pytest.mark.parametrize("states", [1, 2, 3, 5])
 def test_laws_of_any_number_of_states_have_the_orbits_of_scipy(states):
-    """The spring's elongation and the law's states, in the equations written out once more."""
+    """Compared with a separate implementation, in the spring's elongation and the law's states."""
     lengths, epsilon = np.arange(1, states), 0.2
     slider = asp.Slider(
         ageing_over_lengths(states - 1)(mu0=MU0, A=A, B=B, D0=D0, V0=V0), spring=4 * K, load=W0

@@ -1,4 +1,4 @@
-"""Every converged point of a random batch, put back into the equations of motion."""
+"""The residual of the equations of motion at every converged point of a random batch."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Blocks: the same numbers as in one piece, a bounded size, a way to go on; and long programmes."""
+"""Blocks: the numbers of one run, a bounded size, resuming; and very long programmes."""
 
 import itertools
 
@@ -82,7 +82,7 @@ def test_an_interrupted_run_is_resumed_from_its_checkpoint(slider) -> None:
 
 
 def test_a_long_run_starts_at_once_and_holds_one_block(slider) -> None:
-    """Ten minutes at 10 kHz are six million rows: only those asked for are made."""
+    """Ten minutes at 10 kHz are six million rows: only the requested rows are computed."""
     programme = Programme(
         Slide("300 s"), Modulate("300 s", 0.2, "120 Hz"), load="7 N", velocity="1 um/s"
     )

@@ -1,4 +1,4 @@
-"""What happens on the way, and what ends it: located, named, and never followed by nonsense."""
+"""Events and terminations of a motion: located and named, without samples after the end."""
 
 import numpy as np
 import pytest

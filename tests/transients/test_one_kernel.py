@@ -1,4 +1,4 @@
-"""Loops compiled to one kernel: which are, and that nothing else changes."""
+"""Loops compiled to one kernel: which laws and loads allow it, and the motion is the same."""
 
 import importlib
 from typing import Any

@@ -1,4 +1,4 @@
-"""Programmes of load and drive: what the steps amount to."""
+"""Programmes of load and drive: the segments and values of their steps."""
 
 import subprocess
 import sys

@@ -124,7 +124,7 @@ def test_the_error_follows_the_tolerance(physical) -> None:
 
 
 def test_displacement_spring_and_drive_belong_together(physical) -> None:
-    """x = integral of V - (F - F0)/K, though x is integrated on its own."""
+    """x = integral of V - (F - F0)/K, though x is integrated separately."""
     p = physical.Experiment(lambda_=LAMBDA)
     found = transient(p.slider, MIXED, sampling="100 Hz")
     x = MIXED.position(found.time) - (found.force - 3.5) / p.K

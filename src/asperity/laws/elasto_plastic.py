@@ -5,7 +5,7 @@ the interface force F_i; sliding at dx/dt strains them elastically and the joint
 
     v_plastic = d/dt (x - F_i lambda / W)
     F_i / W   = mu0 + A ln(v_plastic / V0) + B ln(V0 Phi / D0)
-    dPhi/dt   = 1 - (dx/dt) Phi / D0        (as printed: the age sees the slider's velocity)
+    dPhi/dt   = 1 - (dx/dt) Phi / D0        (as printed: with the slider's velocity)
 
 The relation between v_plastic, the spring and the load is kinematics and is written once, in
 `asperity.slider`; the law contributes lambda.

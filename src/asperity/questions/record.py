@@ -33,7 +33,7 @@ T = TypeVar("T")
 Given = bool | float | str
 #: Characters of a part of a field's place.
 _LONGEST = 60
-#: What pydantic puts into the place of a field that may be of several types, besides texts with
+#: Names that pydantic adds to the place of a field with several types, in addition to texts with
 #: brackets and the names of records.
 _TYPES = frozenset({"bool", "float", "int", "str", "constrained-str", "nullable"})
 

@@ -7,7 +7,7 @@ automatic differentiation. Dimensionless, theta = omega t, per eps and eps^2; n 
 
     kappa = V K/(omega W0)      nu = V/(omega D0)          q = omega lambda/V
     r_n = 1 - n^2 M omega^2/K   beta_n = B nu/(n i + nu)   S_n = A - beta_n
-    D_n = 1 + n i q S'_n        S'_n = A, or S_n where the age too feels the plastic velocity
+    D_n = 1 + n i q S'_n        S'_n = A, or S_n if the age law has the plastic velocity too
 
 The interface carries r_n F_n; the spring gives the velocity v_n = -n i F_n/kappa; the asperities
 leave the plastic velocity p_n = v_n - n i q G_n, with G the interface force over the load. From

@@ -23,7 +23,7 @@ from asperity.slider import QuasiStatic, Slider
 from asperity.transients.equations import SegmentEquations
 from asperity.transients.explicit import attempt_step
 
-#: Tolerated error of a step: of logarithms and relative to forces, and the absolute one of forces.
+#: Tolerated error of a step: of logarithms and relative error of forces; absolute error of forces.
 _RTOL, _ATOL = 1e-11, 1e-13
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 

@@ -131,7 +131,7 @@ def test_a_slider_follows_where_steady_sliding_is_stable_under_the_heaviest_load
 
 
 def test_pulses_are_left_to_other_methods():
-    """What a few dozen harmonics cannot hold is not claimed."""
+    """Orbits that a few dozen harmonics do not resolve do not converge."""
     left = respond(10.0, 0.5, [0.3, 0.6, 0.9])
     assert not left.converged.any()
     assert np.isnan(left.mean_friction).all()

@@ -77,7 +77,7 @@ DRIVE = {"velocity": [2e-7, 1e-6, 8e-6], "epsilon": [0.1, 0.24, 0.28], "frequenc
 
 
 def shoot(drive=DRIVE, mass=1.6):
-    """What shooting alone finds, and the points it leaves."""
+    """The solution by shooting alone, and the points that it does not solve."""
     slider = asp.Slider(get_law("elasto-plastic")(**PAPER), spring=K, load=W0, mass=mass)
     problem, shape = flatten(checked_problem(slider, inertia=True, **drive))
     points = int(np.prod(shape))

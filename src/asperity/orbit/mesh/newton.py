@@ -142,7 +142,7 @@ def _step(
     each = jnp.abs(stages).max((1, 2))
     mask = linear[:, None]
     largest = jnp.maximum(exponent, jnp.where(mask, 0.0, each).max(0))
-    # Against round-off where there is hardly any swing: of a force, see its rate.
+    # `least_swing` keeps the relative change above round-off where a state hardly changes.
     after = nodes + moved
     swing = jnp.abs(after - after[:, :1]).max(1) + least_swing
     relative = jnp.abs(stages - stages[:, :1, :1]).max((1, 2)) / swing
