@@ -12,6 +12,7 @@ from asperity.errors import InputError
 from asperity.inference.answers import read_data
 from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
+from asperity.inference.runs.run import RecordedRun
 from asperity.laws import RiceRuina
 from asperity.questions.fit import Fit
 from asperity.recording import Channel, Trace
@@ -90,6 +91,29 @@ def test_files_with_the_drive_bring_their_velocities(tmp_path):
     question = Fit(data=[{"file": file} for file in files], fixed=MACHINE | {"W0": "1 N"})
     slow, fast = read_data(question)
     assert pytest.approx((V, 4 * V), rel=1e-6) == (slow.V, fast.V)
+
+
+def test_velocity_steps_that_fall_like_slips_are_no_stick_slip(tmp_path):
+    """On a stiff machine each step down is a drop, and friction rises between them."""
+    a, b, slip, rate = 0.012, 0.009, 10.0, 10.0
+    time = np.arange(6000) / rate
+    speed = np.where(time // 60 % 2 == 0, 1.0, 10.0)
+    friction, age = np.empty(time.size), 1.0
+    for k in range(10):
+        stretch = slice(k * 600, (k + 1) * 600)
+        v = speed[stretch][0]
+        ages = 1 / v + (age - 1 / v) * np.exp(-np.arange(1, 601) / rate * v / slip)
+        friction[stretch], age = 0.62 + a * np.log(v) + b * np.log(ages), ages[-1]
+    moved = np.cumsum(speed) / rate
+    noise = np.random.default_rng(0).standard_normal((2, time.size))
+    columns = np.c_[time, friction + 2e-6 * moved + 4.5e-4 * noise[0], moved + 0.02 * noise[1]]
+    head = "time (s),friction,load point displacement (um)"
+    np.savetxt(tmp_path / "a.csv", columns, "%.8g", ",", header=head, comments="")
+    trace = asp.read(tmp_path / "a.csv")
+    assert asp.measure(trace, stick_slip=True).clear
+    assert len(asp.measure(trace).steps) == 9
+    (run,) = read_data(Fit(data=[{"file": tmp_path / "a.csv"}]))
+    assert isinstance(run, RecordedRun)
 
 
 def test_a_modulated_recording_is_no_stick_slip(tmp_path):

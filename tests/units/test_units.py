@@ -156,6 +156,13 @@ def test_angular_frequencies_are_refused_where_hertz_is_meant(text: str) -> None
     assert "give omega/(2 pi) in Hz" in refusal(text, "frequency")
 
 
+@pytest.mark.parametrize("text", ["12.42 h", "5 ms", "1 day"])
+def test_periods_are_refused_where_hertz_is_meant(text: str) -> None:
+    assert "a period; give 1 over it in Hz, like '22.4 uHz' for 12.4 h" in refusal(
+        text, "frequency"
+    )
+
+
 def test_hertz_is_refused_where_an_angular_frequency_is_meant() -> None:
     assert "multiply by 2 pi" in refusal("120 Hz", "angular_frequency")
 

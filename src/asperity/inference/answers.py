@@ -24,6 +24,7 @@ from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law, known_law, registered
+from asperity.measurement.from_file import reads_cycles
 from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
@@ -186,7 +187,7 @@ def _stick_slip(
     except InputError:
         # The reader of runs checks the numbers again.
         return None
-    if not measurement.clear:
+    if not reads_cycles(trace, question, measurement):
         return None
     if over_load:
         raise InputError(

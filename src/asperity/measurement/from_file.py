@@ -188,6 +188,25 @@ def _either(
     return measurement, f"{what}: steady sliding is read."
 
 
+def reads_cycles(trace: Trace, question: Question, events: StickSlipMeasurement) -> bool:
+    """Whether most of a recording is stick-slip, and not velocity steps and holds.
+
+    Parameters
+    ----------
+    trace : Trace
+    question : asperity.questions.recording.Measurement
+    events : StickSlipMeasurement
+        Its slip events: peaks of velocity steps may be some, too.
+    """
+    if not events.clear:
+        return False
+    try:
+        sliding = measure_sliding(trace, question)
+    except InputError:
+        return True
+    return _rather_events(events, len(sliding.steps) + len(sliding.holds))
+
+
 def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
     """Whether slip events say more of a recording than its velocity steps and holds do.
 

@@ -104,13 +104,15 @@ def _factor_by_pint(unit: str, kind: str) -> Decimal:
 
 
 def _require_hertz(parsed: Any, root: Any) -> None:
-    """Refuse units that pint treats as Hz: rad/s, rpm and 1/s."""
+    """Refuse units that pint treats as Hz, rad/s, rpm and 1/s, and periods."""
     if str(parsed).endswith("hertz"):
         return
     if "second" in str(root) and root.dimensionality == {"[time]": -1}:
         raise _UnitError(
             ", which can be an angular frequency", "give omega/(2 pi) in Hz, like '120 Hz'"
         )
+    if root.dimensionality == {"[time]": 1}:
+        raise _UnitError(", a period", "give 1 over it in Hz, like '22.4 uHz' for 12.4 h")
     raise _UnitError
 
 

@@ -151,7 +151,9 @@ class StickSlipMeasurement(Judged):
         """Regimes, number and mean drop of the events."""
         events = self.events
         lines = [SummaryLine("regime", self.kind), SummaryLine("events", str(len(events)))]
-        return lines + [SummaryLine("drop", f"{np.mean(events.drop):.4g}")] * (len(events) > 0)
+        if len(events):
+            lines.append(SummaryLine("drop", f"{np.mean(events.drop):.4g}"))
+        return lines
 
 
 def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSlipMeasurement:
