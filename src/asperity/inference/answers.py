@@ -28,8 +28,9 @@ from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
-from asperity.parameters.arguments import FilePath, shown, typed
+from asperity.parameters.arguments import FilePath, of_type, shown, typed
 from asperity.questions import fit as questions
+from asperity.questions.record import Question
 from asperity.questions.recording import Measurement as Measured
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
@@ -314,6 +315,8 @@ def answer_comparison(
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
     """Data of a fit; files and recordings are read or converted."""
     several = data if isinstance(data, list | tuple) else [data]
+    require(several, "data", "hold readings or a recording", "none", "give a table or a recording")
+    fixed = of_type(fixed, Mapping[str, Any] | None, "fixed")
     loaded: list[Any] = []
     for one in several:
         if isinstance(one, str | os.PathLike):
@@ -327,6 +330,10 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
     return loaded
 
 
+class _Priors(Question, questions.Estimation):
+    """Priors as they are written."""
+
+
 def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, Any]:
     """Options of a fit, with materials and priors that are written as on the command line."""
     if isinstance(options.get("material"), str):
@@ -337,7 +344,7 @@ def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, 
         if isinstance(prior, Mapping):
             ready = {name: p for name, p in prior.items() if isinstance(p, Prior)}
             texts = {name: p for name, p in prior.items() if name not in ready}
-        question = questions.Estimation(prior=texts)  # type: ignore[arg-type]
+        question = _Priors(prior=texts)  # type: ignore[arg-type]
         options["prior"] = ready | priors_of(question.prior, free)
     return options
 
