@@ -470,6 +470,7 @@ def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> 
         (("--decimal", ""), "--decimal must be '.' or ',', got ''"),
         (("--format", ""), "--format must be a format, got ''"),
         (("--channel", "load = 0 N"), "--load must be above zero, got 0 in 100 of 100 samples of"),
+        (("--area", "5 cm^2"), "--area must go with a stress, got a recording without"),
         (("--channel", "x = 1/0"), "--channel x must give numbers, got no finite one"),
     ],
 )
