@@ -120,7 +120,9 @@ def read_data(
             rule = "go with one recording"
             raise InputError(name, rule, recordings, "cut the recordings beforehand")
     # Readings in a table are final: nothing would apply a gauge or a trend to them.
-    for name in () if recordings else ("trend", "drift", "initial", "gauge", "fit_rate"):
+    for name in (
+        () if recordings else ("trend", "drift", "initial", "gauge", "gauge_order", "fit_rate")
+    ):
         value = getattr(question, name)
         same = value == type(question).model_fields[name].default
         # Those that are numbers are frequencies.
@@ -134,6 +136,11 @@ def read_data(
     for data, table in zip(question.data, tables, strict=True):
         rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
         require(not table or data.window is None, "window", rule, "a table", advice)
+        of_reading = type(data.source).model_fields.items() if table else ()
+        for name, about in of_reading:
+            default = about.get_default(call_default_factory=True)
+            same = getattr(data.source, name) == default
+            require(same, f"read.{name}", rule, "a table", "leave it out, or correct the table")
         json = data.file.suffix.lower() == ".json"
         if table and not json and HEALING in (_heading(data.file) or ()):
             result.append(read_healing(data.file, held))

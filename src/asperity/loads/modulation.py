@@ -196,7 +196,7 @@ _NEGLIGIBLE = 1e-13
 def modulated(
     epsilon: ArrayLike | str = 0.0,
     *,
-    load: Mapping[int, tuple[Any, Any]] | None = None,
+    load: Mapping[int, Any] | None = None,
     pull: ArrayLike | str = 0.0,
     pull_phase: ArrayLike | str = 0.0,
     tilt: ArrayLike | str = 0.0,
