@@ -501,7 +501,7 @@ HOLDS = "hold_time,healing,V,K\n1,0.01,1e-6,1e4\n10,0.02,1e-6,1e4\n"
         (READINGS, ("--prior", "A=0.01+-0.1 m"), "--prior A must be a pure number"),
         (READINGS, ("--gauge-order", "2"), "--gauge-order must go with a recording, got 2 with a"),
         (READINGS, ("--rate", "1 Hz"), "--rate must go with a recording, got a table"),
-        (READINGS, ("--load", "1"), "--column must go with a recording, got a table"),
+        (READINGS, ("--load", "1"), "--load must go with a recording, got a table"),
         (READINGS, ("--recipe", "nix.toml"), "--recipe must go with a recording, got a table"),
         (READINGS, ("--draws", "7"), "--draws must come with --posterior, got 7 alone"),
         (READINGS, ("--gauge", "40 Hz"), "--gauge must go with a recording, got 40 Hz with a"),

@@ -136,11 +136,12 @@ def read_data(
     for data, table in zip(question.data, tables, strict=True):
         rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
         require(not table or data.window is None, "window", rule, "a table", advice)
-        of_reading = type(data.source).model_fields.items() if table else ()
-        for name, about in of_reading:
-            default = about.get_default(call_default_factory=True)
-            same = getattr(data.source, name) == default
-            require(same, f"read.{name}", rule, "a table", "leave it out, or correct the table")
+        # One source may be that of a recording next to a table.
+        given = {} if recordings else data.source.model_dump(exclude_defaults=True)
+        for name, value in given.items():
+            keyed = isinstance(value, Mapping)
+            field = Argument(name, next(iter(value))) if keyed else f"read.{name}"
+            raise InputError(field, rule, "a table", "leave it out, or correct the table")
         json = data.file.suffix.lower() == ".json"
         if table and not json and HEALING in (_heading(data.file) or ()):
             result.append(read_healing(data.file, held))
