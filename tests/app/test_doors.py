@@ -185,6 +185,39 @@ MEASURED = {
 }
 
 
+#: By field of a modulated load: the argument, the option, the label, and a value.
+MODULATED = {
+    "frequency": ("frequency", "--frequency", "Frequency", "120 Hz"),
+    "harmonics": ("harmonics", "--harmonics", "Harmonics", 8),
+    "whole_periods": ("only_whole_periods", "--whole-periods", "Whole periods only", True),
+}
+UNMODULATED = {
+    "modulated": (False, "modulated=False", "--no-modulation", "velocity steps and holds"),
+    "stick_slip": (True, "measure.stick_slip", "--stick-slip", "stick-slip"),
+}
+
+
+@pytest.mark.parametrize("name", MODULATED)
+@pytest.mark.parametrize("kind", UNMODULATED)
+def test_a_field_of_a_modulation_goes_with_one(ask, tmp_path, name, kind):
+    argument, option, label, value = MODULATED[name]
+    chosen, python, switch, shown = UNMODULATED[kind]
+    recording = tmp_path / "recording.csv"
+    recording.write_text("time (s),normal force (N)\n0,1\n1,1\n", encoding="utf-8")
+    given = () if value is True else (str(value),)
+    options = {name: value, kind: chosen}
+    said = [
+        sentence(lambda: asp.measure(recording, **{argument: value, kind: chosen})),
+        command("measure", str(recording), option, *given, switch),
+        ask("data/measure", {"recording": "0" * 32, "options": options}).json["error"],
+    ]
+    names = ((f"measure.{argument}", python), (option, switch), (label, f"What it is: {shown}"))
+    got = {"frequency": "120.0"}.get(name, value)
+    assert said == [
+        f"{field} must go without {other}, got {got}; leave one out" for field, other in names
+    ]
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [(name, value) for name, (*_, values) in MEASURED.items() for value in values],

@@ -39,6 +39,7 @@ ROW = "rice-ruina,1e-6,0.2,120"
         ("--set", "D0=0.4 s", ["--set D0 must be a length (m), got '0.4 s'"]),
         ("--set", "W0=0 N", ["--set W0 must be positive, got 0 N;"]),
         ("--set", "W0=7 kg", ["--set W0 must be a force (N), got '7 kg'"]),
+        ("--set", "inertia=2", ["--set inertia must be 1 or 0, got 2;"]),
         ("--set", "A=0.01 m", ["--set A must be a pure number, got '0.01 m'"]),
         ("--set", "alpa=0.2", ["--set alpa must be a known name, got 'alpa'", "'alpha'"]),
         ("--set", "alpha=0.2", ["rice-ruina must be given its own", "'alpha'", "linker-dieterich"]),
@@ -426,6 +427,22 @@ def test_a_protocol_that_cannot_be_run(asperity, tmp_path: Path, text: str, part
 
 
 @pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('velocity = "-1 um/s"', "start.velocity must be positive for a start in steady sliding"),
+        ('velocity = "1 um/s"\n[solver]\nrtol = 0.0', "solver.rtol must be positive, got 0"),
+        ('velocity = "1 um/s"\n[solver]\nmost_steps = 0', "solver.most_steps must be positive"),
+        ('velocity = "1 um/s"\nstates = [1.0]', "start.states must be 2 finite states"),
+    ],
+)
+def test_a_protocol_is_refused_before_anything_is_written(asperity, tmp_path, text, sentence):
+    file = tmp_path / "a.toml"
+    file.write_text(f"{PROTOCOL}[start]\n{text}", encoding="utf-8")
+    refused(asperity("run", file, "--out", tmp_path / "a.nc"), sentence)
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(
     ("options", "sentence"),
     [
         (("-V", "1 um/s", "-V", "2 um/s"), "-V must be given once, got '1 um/s' and '2 um/s'"),
@@ -445,6 +462,14 @@ def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> 
         (("--column", "W=load", "--load", "force"), "--column W must be given once"),
         (("--steps", "none.txt"), "--steps must be times or a file that can be read"),
         (("--amplitudes", "--events", "e.csv"), "--amplitudes must go without --events"),
+        (("--holds", "0.1:0.2,0.15:0.3"), "--holds must not overlap, got 0.1 to 0.2 s and 0.15"),
+        (("--holds", "0.1:0.5", "--steps", "0.2"), "--steps must lie outside --holds, got 0.2 s"),
+        (("--delimiter", ""), "--delimiter must be one character or 'blank', got ''"),
+        (("--decimal", ""), "--decimal must be '.' or ',', got ''"),
+        (("--format", ""), "--format must be a format, got ''"),
+        (("--channel", "load = 0 N"), "--load must be above zero, got 0 in 100 of 100 samples of"),
+        (("--area", "5 cm^2"), "--area must go with a stress, got a recording without"),
+        (("--channel", "x = 1/0"), "--channel x must give numbers, got no finite one"),
     ],
 )
 def test_options_of_a_recording_that_exclude_each_other(
@@ -461,6 +486,31 @@ def test_a_prior_is_given_once(asperity, tmp_path) -> None:
     refused(shown, "--prior must be given once each, got 'A' twice")
 
 
+HOLDS = "hold_time,healing,V,K\n1,0.01,1e-6,1e4\n10,0.02,1e-6,1e4\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "sentence"),
+    [
+        (READINGS, ("--fix", "V=2 um/s"), "--fix V must agree with the column of the data, got 2"),
+        (READINGS, ("--fix", "frequency=100 Hz"), "--fix frequency must agree with the column"),
+        (HOLDS, ("--fix", "V=2 um/s"), "--fix V must be given once, got a column of the data too"),
+        (READINGS, ("--prior", "A=0.01+-0"), "--prior A must have a positive deviation, got 0"),
+        (READINGS, ("--prior", "A=0.01+-0.1 m"), "--prior A must be a pure number"),
+        (READINGS, ("--gauge-order", "2"), "--gauge-order must go with a recording, got 2 with a"),
+        (READINGS, ("--rate", "1 Hz"), "--rate must go with a recording, got a table"),
+        (READINGS, ("--load", "1"), "--load must go with a recording, got a table"),
+        (READINGS, ("--recipe", "nix.toml"), "--recipe must go with a recording, got a table"),
+        (READINGS, ("--draws", "7"), "--draws must come with --posterior, got 7 alone"),
+        (READINGS, ("--gauge", "40 Hz"), "--gauge must go with a recording, got 40 Hz with a"),
+    ],
+)
+def test_what_the_data_already_say(asperity, tmp_path, text, options, sentence) -> None:
+    (tmp_path / "t.csv").write_text(text, encoding="utf-8")
+    law = ("--law", "rice-ruina", "--material", "bureau2000", "--free", "A")
+    refused(asperity("fit", tmp_path / "t.csv", *law, *options), sentence)
+
+
 PLAN = 'law = "rice-ruina"\nmaterial = "bureau2000"\n'
 AXIS = '[parameters]\nV = "1 um/s"\nfrequency = "120 Hz"\n[axes.epsilon]\n'
 
@@ -471,6 +521,11 @@ AXIS = '[parameters]\nV = "1 um/s"\nfrequency = "120 Hz"\n[axes.epsilon]\n'
         (f"seed = -1\n{PLAN}{AXIS}values = [0.1]", "asperity: seed must be at least 0"),
         (f"rate = 1\n{PLAN}{AXIS}values = [0.1]", "asperity: rate must be a known field"),
         (f"{PLAN}{AXIS}values = [0.1]\n[threshold]\nscan = 3", "threshold must be left out"),
+        (f"{PLAN}{AXIS}from = 0.1\nto = 0.2\ncount = 1", "axes.epsilon.count must be at least 2"),
+        (
+            f"{PLAN}{AXIS}values = [0.1]\n[axes.M]\nvalues = ['1 kg', '2 kg']",
+            "axes.M must have an influence, which it has with inertia, got inertia = 0; add param",
+        ),
     ],
 )
 def test_a_plan_names_its_own_keys(asperity, tmp_path, text: str, sentence: str) -> None:
@@ -509,6 +564,15 @@ def test_a_sample_without_a_name(asperity, tmp_path) -> None:
 def test_an_axis_of_a_map_is_named_by_its_option(asperity, tmp_path, axis, sentence) -> None:
     call = ("map", *OF[1:], "--law", "rice-ruina", "--out", tmp_path / "m.nc")
     refused(asperity(*call, "--x", axis, "--y", "K=1:2:3 N/um"), sentence)
+
+
+@pytest.mark.parametrize(
+    ("axis", "switch"), [("M=1:2:3 kg", "--inertia"), ("pull_phase=0:1:3", "--set pull=0.1")]
+)
+def test_an_axis_along_which_nothing_changes(asperity, tmp_path, axis, switch) -> None:
+    call = ("map", *OF[1:], "--law", "rice-ruina", "-V", "1 um/s", "-f", "120 Hz", "--y", axis)
+    result = asperity(*call, "--x", "epsilon=0.1:0.2:3", "--out", tmp_path / "m.nc")
+    refused(result, f"axis of {axis.partition('=')[0]} must have an influence", f"add {switch},")
 
 
 def test_inertia_without_a_mass(asperity) -> None:

@@ -216,6 +216,17 @@ def test_a_mistake_in_a_plan_is_one_line_and_leaves_no_file(asperity, plan, tmp_
     assert asperity("design", tmp_path / "absent.toml").exit_code == 2
 
 
+def test_a_design_that_cannot_measure_its_aim_says_so(asperity, plan):
+    """One reading at one point tells no parameter apart from the others."""
+    one = PLAN.replace("{ from = 0.1, to = 0.5, levels = 5 }", "0.1")
+    one = one.replace('["1 um/s", "10 um/s"]', '"1 um/s"').replace("delta_mu = 1e-3\n", "")
+    plan.write_text(one.replace('phase1 = "2 deg"\nmu2 = 1e-5\n', ""))
+    result = asperity("design", plan)
+    assert result.exit_code == 1
+    assert "lambda will not be determined by these readings" in result.stdout
+    assert "an unknown number of times fewer readings" in result.stdout
+
+
 def test_a_recipe_needs_its_measurements(asperity, tmp_path):
     readings, thresholds = tmp_path / "readings.csv", tmp_path / "thresholds.csv"
     readings.write_text("V,epsilon,frequency,delta_mu,delta_mu_err\n1e-6,0.3,120,-0.05,0.002\n")

@@ -183,7 +183,7 @@ def test_steps_and_holds_are_rows(pulled, tmp_path) -> None:
     header = "Time(s)\tDispl(microns)\tFriction"
     values = np.stack([time, 1e6 * slip, friction], axis=1)
     np.savetxt(file, values, "%.6f", "\t", header=header, comments="")
-    rows_of = FileRows(Source(), options(modulated=False))
+    rows_of = FileRows(Source(), options(modulated=False, harmonics=4))
     out = tmp_path / "campaign.csv"
     run_campaign([file], rows_of, out, inputs=rows_of.inputs())
     step, hold = table_of(out)

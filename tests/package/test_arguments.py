@@ -122,6 +122,41 @@ def test_public_functions_are_checked(call, name) -> None:
         call()
 
 
+TRACE = asp.samples.modulated()
+READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "mu1_err": [1e-5]}
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: asp.fit([]), "data must hold readings or a recording, got none"),
+        (lambda: asp.fit(TRACE, fixed=["A"]), "fixed must be a dictionary or None"),
+        (lambda: asp.fit(TRACE, prior={"A": 1}), "prior.A must be a table, got 1"),
+        (lambda: asp.fit(TRACE, prior=["A=1"]), r"prior.A must be VALUE\+-DEVIATION UNIT"),
+        (lambda: asp.inference.Prior(0.1, -1.0, "given"), "prior.sd must be positive, got -1"),
+        (lambda: asp.inference.table_of({**READINGS, "V": "fast"}), "data.V must be numbers in SI"),
+        (lambda: asp.inference.table_of(READINGS, run=["a", "b"]), "run must have 1 names, got 2"),
+        (lambda: asp.inference.recorded_run(TRACE, window=3), "window must be a tuple or None"),
+        (lambda: asp.measure(TRACE, load="x"), "measure.load must name a channel, got none like"),
+        (lambda: asp.recording.derive(TRACE, {"x": 3}), r"channels\['x'\] must be a text, got 3"),
+        (lambda: asp.read("a.csv", columns={"W": 1.5}), r"columns\['W'\] must be a text or a wh"),
+        (lambda: asp.loads.modulated(0.1, load=3), "load must be a dictionary or None"),
+        (lambda: asp.loads.modulated(0.1, pull_phase=np.nan), "pull_phase must be finite, got nan"),
+        (lambda: asp.loads.sampled("fast"), "load must be a finite number, got 'fast'"),
+        (lambda: asp.run(3, "run.csv"), "protocol must be a Protocol"),
+        (lambda: asp.experiment.hold_response(SLIDER, hold_time=[], velocity=1e-6), "have a point"),
+        (lambda: asp.write([], "a.csv"), "data must hold a measurement, got none"),
+        (lambda: asp.tribometer.Recorder(rate=9.0, clock_error="x"), "Recorder.clock_error must"),
+        (lambda: asp.Slider(LAW, spring=-1.0, load=7.0), "slider.spring must be positive, got -1"),
+    ],
+)
+def test_what_no_call_may_pass_on(call, sentence) -> None:
+    """Each of these was an exception from within, or an answer that left the value out."""
+    with pytest.raises(InputError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
 def test_every_public_argument_has_a_kind() -> None:
     functions = [getattr(asp, n) for n in asp.__all__ if inspect.isfunction(getattr(asp, n))]
     assert len(functions) > 15

@@ -64,6 +64,8 @@ motion through the whole of it; its stiffness K is free, its noise autoregressiv
 More than 20,000 samples are compared as means over blocks (--fit-rate).
 """
 
+#: Options of the sampling, with their defaults.
+_SAMPLING = {"chains": 4, "draws": 1000, "seed": 0}
 #: Options that are fields of the question, by the name of the field: text, and name of the value.
 _FIELDS: dict[str, tuple[str, ...]] = {
     "free": (
@@ -191,9 +193,14 @@ def _question_options(*further: Decorator) -> Decorator:
 @_question_options(
     _field("windows"),
     switch("--posterior", "Sample the posterior (extra 'bayes')."),
-    option("--chains", "N", "Chains.", Count(), default=4, show_default=True),
-    option("--draws", "N", "Draws of each chain.", Count(), default=1000, show_default=True),
-    option("--seed", "N", "Of the draws.", Count(), default=0, show_default=True),
+    *(
+        option(f"--{name}", "N", text, Count(), default=_SAMPLING[name], show_default=True)
+        for name, text in (
+            ("chains", "Chains."),
+            ("draws", "Draws of each chain."),
+            ("seed", "Of the draws."),
+        )
+    ),
     option("--out", "NC", "Where the draws go, for ArviZ.", Path),
 )
 def fit(
@@ -260,6 +267,9 @@ def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None)
     """Refuse what cannot be sampled or written before anything is computed."""
     if not posterior:
         require(out is None, "--out", "come with --posterior", "it alone", "add --posterior")
+        for name, usual in _SAMPLING.items():
+            got, rule = sampling[name], "come with --posterior"
+            require(got == usual, f"--{name}", rule, f"{got} alone", "add --posterior")
         return
     from asperity.inference.posterior import require_bayes
     from asperity.inference.posterior.sampling import require_sizes

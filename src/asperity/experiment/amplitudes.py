@@ -12,7 +12,7 @@ import cmath
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
 from asperity.measurement.campaign import column_unit, modulated_rows
 from asperity.measurement.measure import Measurement, measure
+from asperity.parameters.arguments import at_least, typed
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
@@ -253,6 +254,7 @@ class AmplitudeMotion:
         )
 
 
+@typed
 def amplitude_motion(
     slider: Slider,
     exciter: Exciter,
@@ -284,6 +286,7 @@ def amplitude_motion(
     )
     applied: list[ProgrammeStep] = [Slide(off)]
     borne: list[ProgrammeStep] = [Slide(off)]
+    require(epsilons, "amplitude_motion.epsilons", "hold an amplitude", "none", "give one")
     for epsilon in epsilons:
         outer, inner = exciter.steps(epsilon, on, slow)
         applied += [outer, Slide(off)]
@@ -302,6 +305,7 @@ def amplitude_motion(
     )  # fmt: skip
 
 
+@typed
 def amplitude_series(
     slider: Slider,
     tribometer: Tribometer,
@@ -313,7 +317,7 @@ def amplitude_series(
     modulated: float | str = "4 s",
     rise: float | str = "0.1 s",
     harmonics: int = 2,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     **options: Any,
 ) -> AmplitudeSeries:
     """Run the protocol on a simulated slider, and read the recording as one of a laboratory.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from asperity.arrays import Float
 from asperity.errors import require
 from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
+from asperity.parameters.arguments import at_least, number, typed
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -50,6 +51,7 @@ class ElasticLength:
     stiffness: float
 
 
+@typed
 def loading_recording(
     slider: Slider,
     tribometer: Tribometer,
@@ -58,7 +60,7 @@ def loading_recording(
     low: float = 0.2,
     high: float = 0.6,
     cycles: int = 6,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     **options: Any,
 ) -> Trace:
     """Record the test on a simulated slider, from steady sliding.
@@ -86,7 +88,7 @@ def loading_recording(
     InputError
         If a value breaks its rule, or the motion ends before the test does.
     """
-    speed = to_si(velocity, "velocity", "loading_recording.velocity")
+    speed = number(velocity, "loading_recording.velocity", "velocity", "positive")
     rule, got = "lie between 0 and 1 and rise", f"{low:g} and {high:g}"
     advice = "stay below the threshold of sliding, as 0.2 and 0.6 do"
     require(0 < low < high < 1, "loading_recording.low and high", rule, got, advice)
@@ -101,6 +103,7 @@ def loading_recording(
     return recorded_motion(slider, tribometer, programme, rule, seed=seed, options=options)
 
 
+@typed
 def elastic_length(
     trace: Trace,
     *,

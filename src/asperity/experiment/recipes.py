@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from asperity.experiment.motion import recorded_motion
 from asperity.loads import Hold, Programme, ProgrammeStep, Slide
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import Given, LaidOut, LoadAndVelocity
+from asperity.parameters.arguments import at_least, typed
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -80,6 +81,7 @@ def _laid_out(steps: Sequence[ProgrammeStep], level: LoadAndVelocity, name: str)
     return segments, level
 
 
+@typed
 def slide_hold_slide(
     slider: Slider,
     tribometer: Tribometer,
@@ -87,7 +89,7 @@ def slide_hold_slide(
     *,
     velocity: float | str,
     sliding: float | str = "10 s",
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     **options: Any,
 ) -> Trace:
     """Record a slide-hold-slide series on a simulated slider.
@@ -118,13 +120,14 @@ def slide_hold_slide(
     return _recording(slider, tribometer, series, velocity, "slide_hold_slide", seed, options)
 
 
+@typed
 def velocity_steps(
     slider: Slider,
     tribometer: Tribometer,
     velocities: Sequence[float | str],
     *,
     slip: float | str,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     **options: Any,
 ) -> Trace:
     """Record a series of velocity steps at equal slip on a simulated slider.

@@ -29,9 +29,10 @@ from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
-from asperity.parameters.arguments import FilePath, shown, typed
+from asperity.parameters.arguments import FilePath, of_type, shown, typed
 from asperity.parameters.columns import marked_encoding
 from asperity.questions import fit as questions
+from asperity.questions.record import Question
 from asperity.questions.recording import Measurement as Measured
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
@@ -123,7 +124,9 @@ def read_data(
             rule = "go with one recording"
             raise InputError(name, rule, recordings, "cut the recordings beforehand")
     # Readings in a table are final: nothing would apply a gauge or a trend to them.
-    for name in () if recordings else ("trend", "drift", "initial", "gauge", "fit_rate"):
+    for name in (
+        () if recordings else ("trend", "drift", "initial", "gauge", "gauge_order", "fit_rate")
+    ):
         value = getattr(question, name)
         same = value == type(question).model_fields[name].default
         # Those that are numbers are frequencies.
@@ -137,6 +140,12 @@ def read_data(
     for data, table in zip(question.data, tables, strict=True):
         rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
         require(not table or data.window is None, "window", rule, "a table", advice)
+        # One source may be that of a recording next to a table.
+        given = {} if recordings else data.source.model_dump(exclude_defaults=True)
+        for name, value in given.items():
+            keyed = isinstance(value, Mapping)
+            field = Argument(name, next(iter(value))) if keyed else f"read.{name}"
+            raise InputError(field, rule, "a table", "leave it out, or correct the table")
         json = data.file.suffix.lower() == ".json"
         if table and not json and HEALING in (_heading(data.file) or ()):
             result.append(read_healing(data.file, held))
@@ -318,6 +327,8 @@ def answer_comparison(
 def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
     """Data of a fit; files and recordings are read or converted."""
     several = data if isinstance(data, list | tuple) else [data]
+    require(several, "data", "hold readings or a recording", "none", "give a table or a recording")
+    fixed = of_type(fixed, Mapping[str, Any] | None, "fixed")
     loaded: list[Any] = []
     for one in several:
         if isinstance(one, str | os.PathLike):
@@ -331,6 +342,10 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
     return loaded
 
 
+class _Priors(Question, questions.Estimation):
+    """Priors as they are written."""
+
+
 def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, Any]:
     """Options of a fit, with materials and priors that are written as on the command line."""
     if isinstance(options.get("material"), str):
@@ -341,7 +356,7 @@ def _by_names(free: Sequence[str] | None, options: dict[str, Any]) -> dict[str, 
         if isinstance(prior, Mapping):
             ready = {name: p for name, p in prior.items() if isinstance(p, Prior)}
             texts = {name: p for name, p in prior.items() if name not in ready}
-        question = questions.Estimation(prior=texts)  # type: ignore[arg-type]
+        question = _Priors(prior=texts)  # type: ignore[arg-type]
         options["prior"] = ready | priors_of(question.prior, free)
     return options
 

@@ -22,6 +22,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
+from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 from asperity.slider.named import slider_from
 from asperity.transients.hold_and_step import hold
@@ -74,6 +75,7 @@ class HealingTable:
         return self.healing.size
 
 
+@typed
 def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> HealingTable:
     """Read a CSV of holds.
 
@@ -101,6 +103,7 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
     return healing_table({**(given or {}), **columns}, name=path.name)
 
 
+@typed
 def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> HealingTable:
     """A table of holds from columns in memory.
 

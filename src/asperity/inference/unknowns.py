@@ -13,6 +13,7 @@ from asperity.errors import Argument, InputError, closest, require
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
+from asperity.parameters.arguments import number, typed
 
 #: Share of the applied modulation that the contacts carry; only fits have this parameter.
 EPS_RATIO = Parameter(
@@ -57,6 +58,7 @@ class UnfittableLawError(InputError):
     """A law that cannot be fitted for want of numbers or samples; a comparison leaves it out."""
 
 
+@typed
 @dataclass(frozen=True)
 class Prior:
     """A normal prior of a parameter, cut off by the parameter's rule.
@@ -75,6 +77,10 @@ class Prior:
     sd: float
     source: str
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        number(self.mean, "prior.mean", "dimensionless")
+        number(self.sd, "prior.sd", "dimensionless", "positive")
 
 
 @dataclass(frozen=True)
@@ -289,8 +295,8 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
     priors = {}
     for name in names:
         if name in material and material[name].uncertainty:
-            number = material[name]
-            priors[name] = Prior(number.si, float(number.si_uncertainty or 0), material.name)
+            published = material[name]
+            priors[name] = Prior(published.si, float(published.si_uncertainty or 0), material.name)
     got, advice = f"'{material.name}', which has none for {', '.join(names)}", "leave the prior out"
     require(priors, "prior", "be a material with uncertainties of free parameters", got, advice)
     return priors

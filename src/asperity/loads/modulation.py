@@ -196,7 +196,7 @@ _NEGLIGIBLE = 1e-13
 def modulated(
     epsilon: ArrayLike | str = 0.0,
     *,
-    load: Mapping[int, tuple[Any, Any]] | None = None,
+    load: Mapping[int, Any] | None = None,
     pull: ArrayLike | str = 0.0,
     pull_phase: ArrayLike | str = 0.0,
     tilt: ArrayLike | str = 0.0,
@@ -304,13 +304,7 @@ def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] |
     terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
     for n, term in (load or {}).items():
         rule = "have harmonics from 2 on"
-        require(
-            isinstance(n, int | np.integer) and n >= 2,
-            "load",
-            rule,
-            n,
-            "give the first one as epsilon",
-        )
+        require(n >= 2, "load", rule, n, "give the first one as epsilon")
         try:
             amplitude, phase = term
         except (TypeError, ValueError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from asperity.errors import Argument, ConstantLoadError, InputError
+from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.measurement.stick_slip.measure import (
@@ -20,6 +20,8 @@ from asperity.recording.readers import read
 
 Read = TypeVar("Read")
 
+#: Numbers of the machine, which only slip events need.
+_OF_SLIPS = ("stiffness", "velocity", "mass", "normal_load")
 #: Slip events for each velocity step or hold above which these are read within stick-slip.
 _EVENTS = 10
 
@@ -126,7 +128,13 @@ def answer_measurement(
     InputError
         As in `measure_recording`.
     """
-    return _either(trace, question, measure, plain=plain)
+    result, note = _either(trace, question, measure, plain=plain)
+    for name in () if isinstance(result, StickSlipMeasurement) else _OF_SLIPS:
+        given, slips = getattr(question, name), Argument("measure.stick_slip")
+        rule, got = "go with slip events", f"{given} and a recording without them"
+        advice = f"leave it out, or give {slips} too"
+        require(given is None, f"measure.{name}", rule, got, advice)
+    return result, note
 
 
 def measured_parts(

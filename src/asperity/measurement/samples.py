@@ -17,6 +17,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.finding import Finding
+from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Channel, Trace
@@ -37,6 +38,14 @@ _NONE: Index = np.empty(0, dtype=np.intp)
 _LARGEST = 1e30
 
 
+def named_channel(trace: Trace, name: str, argument: str) -> Channel:
+    """The channel that an argument names, which messages name too; roles have their own."""
+    try:
+        return trace.channel(name)
+    except InputError as error:
+        raise (error if role_of(name) else error.about(f"measure.{argument}")) from None
+
+
 def load_channel(trace: Trace, load: str) -> Channel | None:
     """The channel of the load; None where the user names no load and no load is recorded.
 
@@ -52,7 +61,7 @@ def load_channel(trace: Trace, load: str) -> Channel | None:
         If the recording lacks the load that the user names.
     """
     named = load != "W" or "W" in trace.roles
-    return trace.channel(load) if named or trace.has(load) else None
+    return named_channel(trace, load, "load") if named or trace.has(load) else None
 
 
 def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Channel, bool]:
@@ -79,7 +88,7 @@ def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Chann
         If neither is recorded, or several channels can be meant.
     """
     if force != "F" or "F" in trace.roles:
-        shear = trace.channel(force)
+        shear = named_channel(trace, force, "force")
         return shear, shear.kind == "dimensionless"
     friction = _friction(trace)
     if "friction" in trace.roles and friction is not None:
@@ -266,7 +275,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     Where a friction coefficient is recorded in place of a shear force, the force is the friction
     times the load, and its name says so.
     """
-    W = trace.channel(load)
+    W = named_channel(trace, load, "load")
     F, name = _force(trace, force, W)
     require_one_dimension(W, F, load, force)
     names = (trace.name_of(W), name)

@@ -159,7 +159,7 @@ def output_file(
 def require_netcdf(path: str | os.PathLike[str], name: str, example: str) -> None:
     """Refuse a name that does not end as one of NetCDF; parameters as of `output_file`."""
     netcdf = Path(path).suffix.lower() == ".nc"
-    require(netcdf, name, "be a NetCDF file", f"'{path}'", f"write it like {name} {example}")
+    require(netcdf, name, "be a NetCDF file", f"'{path}'", f"write it like {example}")
 
 
 def output_files(

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from asperity.errors import InputError, closest, require
-from asperity.parameters.arguments import annotations_of, at_least, of_type, shown
+from asperity.parameters.arguments import annotations_of, at_least, of_type, shown, typed
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
 from asperity.tribometer.sensors import (
@@ -102,6 +102,7 @@ def setup_of(
     return RecordingSetup(Tribometer(sensors=sensors, recorder=recorder), exposed, seed, stiffness)
 
 
+@typed
 def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
     """Record the motion of a run; the whole motion is in memory.
 

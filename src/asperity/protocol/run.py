@@ -17,7 +17,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from asperity import materials
-from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
+from asperity.outputs import (
+    Interrupted,
+    UnfinishedOutput,
+    output_file,
+    require_disk,
+    require_netcdf,
+    undisturbed,
+)
 from asperity.parameters.arguments import FilePath, typed
 from asperity.protocol.protocol import Protocol, fields_of_protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
@@ -426,4 +433,5 @@ def run_experiment(
     >>> print(asp.run(protocol, "run.nc"))
     """
     chosen = protocol if isinstance(protocol, Protocol) else load_protocol(protocol)
+    require_netcdf(Path(out), "out", "run.nc")
     return run_protocol(chosen, Path(out), resume=resume, progress=progress)

@@ -15,6 +15,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.outputs import output_file, written_file
+from asperity.parameters.arguments import typed
 
 if TYPE_CHECKING:
     import xarray
@@ -137,6 +138,7 @@ class RunOutline:
     law: str
 
 
+@typed
 def write_csv(run: str | Path, out: str | Path) -> Path:
     """Write the rows of a run as comma-separated text with units in the headings.
 
@@ -163,6 +165,7 @@ def write_csv(run: str | Path, out: str | Path) -> Path:
     return Path(out)
 
 
+@typed
 def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     """Extremes of load, force, velocity and age over stretches of equal length.
 

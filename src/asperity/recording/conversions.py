@@ -46,6 +46,8 @@ def stress_to_force(
     wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
     if channels is not None:
         wanted = [_pressure(trace, name) for name in channels]
+    advice = "leave it out, or give the channel its unit"
+    require(wanted, "stress_to_force.area", "go with a stress", "a recording without", advice)
     converted = {
         name: replace(c, values=c.values * size, kind="force", unit="N") if name in wanted else c
         for name, c in trace.channels.items()

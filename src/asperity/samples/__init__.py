@@ -48,6 +48,7 @@ def path(name: str) -> Path:
     return _FOLDER / f"{name}.toml"
 
 
+@typed
 def protocol(name: str) -> Protocol:
     """Law, numbers, steps and instrument of a sample."""
     from asperity.protocol import load_protocol
@@ -55,6 +56,7 @@ def protocol(name: str) -> Protocol:
     return load_protocol(path(name))
 
 
+@typed
 def truth(name: str) -> Mapping[str, SourcedNumber]:
     """Numbers of the simulated slider by name, SI, each with its unit and origin."""
     return protocol(name).numbers

@@ -15,7 +15,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
-from asperity.parameters.arguments import file_path
+from asperity.parameters.arguments import file_path, typed
 from asperity.study.axes import TEXTS
 from asperity.study.plan import OF_CHUNKS
 from asperity.study.points import SweepOutcome, words
@@ -65,6 +65,7 @@ class SweepStatus:
     bytes: int
 
 
+@typed
 def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     """The dataset of a finished or unfinished sweep, with labels and units; loaded on access.
 
@@ -89,6 +90,7 @@ def dataset_of(store: SweepStore) -> xarray.Dataset:
     return xarray.open_zarr(store.path, consolidated=False, chunks=None)
 
 
+@typed
 def store_status(store: str | os.PathLike[str]) -> SweepStatus:
     """Status of a sweep, which may be running.
 
@@ -134,6 +136,7 @@ def _bytes_in(path: Path) -> int:
     return total
 
 
+@typed
 def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
     """Count, mean, standard deviation, smallest and largest value of every output.
 
@@ -173,6 +176,7 @@ def _whole(parts: list[tuple[float, ...]]) -> dict[str, float]:
 _TEXTS = (*TEXTS, "outcome")
 
 
+@typed
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
     """Write a store to one file; the suffix of the file chooses the format.
 

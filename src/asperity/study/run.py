@@ -324,6 +324,7 @@ class SweepEstimate:
     seconds: float
 
 
+@typed
 def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
     """Count the points of a plan, and solve a sample of them to estimate the time.
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
@@ -64,9 +64,14 @@ class Recorder:
     ranges: Mapping[str, tuple[Given, Given]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, kind in (("rate", "frequency"), ("cut_off", "frequency"), ("jitter", "time")):
-            stated, rule = getattr(self, name), "not negative" if name == "jitter" else "positive"
-            if stated is not None:
+        for name, kind, rule in (
+            ("rate", "frequency", "positive"),
+            ("cut_off", "frequency", "positive"),
+            ("jitter", "time", "not negative"),
+            ("clock_error", "dimensionless", "finite"),
+        ):
+            stated = getattr(self, name)
+            if stated is not None or name != "cut_off":
                 value = number(stated, f"Recorder.{name}", kind, rule)
                 object.__setattr__(self, name, value)
         for name, low, high in (("order", 1, 8), ("bits", 0, 32)):
@@ -193,6 +198,7 @@ class Tribometer:
         return Channel(sampled, sensor.reads, unit, name, unit)
 
 
+@typed
 def channel_gain(tribometer: Tribometer, channel: str, frequency: ArrayLike) -> Complex:
     """Recorded over true amplitude of a harmonic signal, e^{+i w t}.
 

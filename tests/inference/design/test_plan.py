@@ -109,6 +109,8 @@ def test_time_is_spent_on_settling_and_reading():
         ({"fixed": {"V": "1 um/s"}}, "must not have what ranges has"),
         ({"draws": 4}, "uncertainty"),
         ({"draws": -1}, "draws must be at least 0"),
+        ({"uncertainty": {"lambda": "-1 um"}}, "uncertainty.lambda must not be negative"),
+        ({"uncertainty": {"Q": 1}}, "uncertainty must be of free parameters, got 'Q'"),
         ({"draws": 4, "uncertainty": {"A": 0.001}}, "of free parameters, got 'A'"),
         ({"prior": 3}, "prior must be materials or priors by name"),
         ({"material": None}, "got none for lambda"),
@@ -124,7 +126,19 @@ def test_a_mistake_is_one_sentence(changes, message):
     with pytest.raises(InputError) as raised:
         plan_of(changed(**changes), require_unit=True)
     assert message in str(raised.value)
+    assert "plan." not in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_a_file_is_named_by_its_keys(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(
+        "law = 'rice-ruina'\nfree = ['A', 'B']\nmeasure = 'A'\npoints = 9\n"
+        "values = {A=0.1, B=0.2}\n"
+        "ranges = {V='1 um/s', epsilon=0.1, frequency='9 Hz'}\nnoise = {mu1=1e-5}\n"
+    )
+    with pytest.raises(InputError, match=r"use free or fixed\.mu0, add columns"):
+        read_plan(path)
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ from asperity.app.api.recordings import LIMITS, Source
 from asperity.app.endpoints import Answer, Job, Question, Upload
 from asperity.app.uploads import LARGEST, Uploads
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
-from asperity.parameters import NAMES, Names
+from asperity.parameters import NAMES, Names, known_name, law_parameters
 from asperity.questions.recording import Measurement
 from asperity.recording.roles import ROLES
 from asperity.slider.named import slider_from
@@ -30,7 +30,7 @@ _RTOL, _MOST_STEPS = 1e-5, 20_000
 #: Points of the curve.
 _MOST = 800
 
-_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
 class Driven(Question):
@@ -66,6 +66,8 @@ def model(question: Driven) -> dict[str, Any]:
     stiffness = numbers.pop("K/W0", None)
     if stiffness is None:
         raise InputError("numbers", "have K/W0", "none", "give the stiffness over the load in 1/m")
+    for name in numbers:
+        known_name(name, law_parameters(law), Argument("numbers", name))
     steps: list[Any] = [
         Slide(duration=length, velocity=v) if v > 0 else Hold(duration=length)
         for length, v in question.segments

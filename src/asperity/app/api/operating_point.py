@@ -34,7 +34,7 @@ _BEYOND, _BELOW = 1e4, 1e8
 
 Name = Annotated[str, Field(max_length=60)]
 #: SI, or a text with its unit.
-Value = Annotated[str, Field(max_length=60)] | float | int
+Value = bool | Annotated[str, Field(max_length=60)] | float | int
 
 
 class OperatingPoint(Question):

@@ -48,6 +48,7 @@ from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
+from asperity.parameters.arguments import typed
 
 
 @dataclass(frozen=True)
@@ -292,6 +293,7 @@ _SURPRISING, _LINEAR = 3.0, 0.1
 _SAME = 1e-12
 
 
+@typed
 def design(
     plan: DesignPlan | Mapping[str, Any] | str | Path,
     *,

@@ -28,6 +28,7 @@ from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
+from asperity.parameters.arguments import typed
 from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Noise, Range
 from asperity.questions.record import require_unit as with_unit, units_required
@@ -114,6 +115,7 @@ def expected_values(hypothesis: Objective) -> dict[str, float]:
     return {u.name: u.middle for u in hypothesis.unknowns}
 
 
+@typed
 def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
     """Read a plan from a TOML file; quantities carry their unit.
 
@@ -139,6 +141,7 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
             raise InputError(f"{error} (in '{Path(path).name}')") from None
 
 
+@typed
 def plan_of(
     content: Mapping[str, Any] | Design, *, name: str = "plan", require_unit: bool = False
 ) -> DesignPlan:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -63,7 +63,7 @@ from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material
 from asperity.parameters import MACHINE, law_parameters
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, typed
 from asperity.recording import Trace
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
@@ -89,8 +89,8 @@ def fit(
     runs: RunOptions | None = None,
     profile: bool = False,
     bare: bool = False,
-    starts: int = 64,
-    seed: int = 0,
+    starts: Annotated[int, at_least(0)] = 64,
+    seed: Annotated[int, at_least(0)] = 0,
     simpler: Sequence[Fit] = (),
     check_stiffness: bool = True,
     progress: Callable[[int, int], None] | None = None,

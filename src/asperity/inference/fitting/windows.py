@@ -18,7 +18,7 @@ from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
 from asperity.outputs.json import plain
 from asperity.parameters import law_parameters
-from asperity.parameters.arguments import counted
+from asperity.parameters.arguments import counted, typed
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
@@ -95,6 +95,7 @@ class WindowedFit:
         return {name: plain(value) for name, value in (whole | {"parameters": parameters}).items()}
 
 
+@typed
 def fit_windows(
     recording: Trace | str | os.PathLike[str],
     law: str | type[Law],

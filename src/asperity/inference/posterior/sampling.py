@@ -25,6 +25,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.outputs import Interrupted
+from asperity.parameters.arguments import typed
 
 #: Logarithm of a density as a function of z and of arrays.
 LogDensity = Callable[[Array, Any], Array]
@@ -45,6 +46,7 @@ _REPORT_INTERVAL = 0.5
 ChainState = tuple[Any, Any, Any, Any]
 
 
+@typed
 def sample_posterior(
     fit: Fit,
     *,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, number, typed
 
 #: Kind of quantity of K, by the unit of the load.
 _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
@@ -62,12 +62,14 @@ class RunOptions:
 
     linear: tuple[Linear, ...] = ("offset", "trend")
     initial: Literal["steady", "free"] = "steady"
-    gauge: tuple[int, float] | None = None
-    order: int | None = None
+    gauge: tuple[Annotated[int, at_least(1)], float] | None = None
+    order: Annotated[int, at_least(0)] | None = None
     fit_rate: float | str | None = None
 
     def __post_init__(self) -> None:
         checked_rate(self.fit_rate)
+        if self.gauge is not None:
+            number(self.gauge[1], "gauge", "frequency", "positive")
 
 
 def stiffness(run: RecordedRun) -> Parameter:

@@ -21,6 +21,7 @@ from asperity.inference.runs.levels import LevelRate, level_rates
 from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
+from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
 from asperity.recording.defects.sampling import even_times, rate_stretches
@@ -162,6 +163,7 @@ class RecordedRun:
         return {"N": "N/m", "Pa": "Pa/m"}.get(self.load_unit, "1/m")
 
 
+@typed
 def recorded_run(
     recording: Trace | str | os.PathLike[str],
     *,

@@ -18,7 +18,7 @@ from asperity.inference.runs.run import recorded_load
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
-from asperity.parameters.arguments import rising
+from asperity.parameters.arguments import rising, typed
 from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
 from asperity.recording.defects.sampling import even_times
@@ -79,6 +79,7 @@ class MeasuredStiffness:
         return Prior(self.value, self.se, source, self.unit)
 
 
+@typed
 def measured_stiffness(
     recording: Trace | str | os.PathLike[str],
     span: tuple[float, float],

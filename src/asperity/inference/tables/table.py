@@ -22,6 +22,7 @@ from asperity.errors import Argument, InputError, require
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
+from asperity.parameters.arguments import shown as shown_value, typed
 from asperity.parameters.columns import headings, readable, sheet
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_radians, to_si
@@ -166,6 +167,7 @@ class LockInTable:
         return replace(self, values=values, errors=errors, covariances=covariances)
 
 
+@typed
 def read_table(
     path: str | Path, given: Mapping[str, Any] | None = None, *, name: str = ""
 ) -> LockInTable:
@@ -330,6 +332,7 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
     return values
 
 
+@typed
 def table_of(
     columns: Mapping[str, Any],
     *,
@@ -356,11 +359,13 @@ def table_of(
         As `read_table`.
     """
     known = _known()
-    arrays = {
-        key: np.atleast_1d(np.asarray(column, dtype=float))
-        for key, column in columns.items()
-        if key not in _OF_RESPONSES
-    }
+    arrays = {}
+    for key in (key for key in columns if key not in _OF_RESPONSES):
+        try:
+            arrays[key] = np.atleast_1d(np.asarray(columns[key], dtype=float))
+        except (TypeError, ValueError):
+            rule, advice = "be numbers in SI", "convert it, as asperity.units.to_si does"
+            raise InputError(f"{name}.{key}", rule, shown_value(columns[key]), advice) from None
     rows = max((a.size for a in arrays.values()), default=0)
     _fill_frequency(arrays)
     points: dict[str, Float] = {}
@@ -413,6 +418,8 @@ def table_of(
             "all rows have the same"
         )
     values, errors = _observables(name, observed)
+    holds = run is None or len(run) == rows
+    require(holds, "run", f"have {rows} names", len(run or ()), "give the run of each row")
     runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])
     errors |= of_epsilon
     table = LockInTable(name, points, values, errors, covariances, runs, tuple(remarks))

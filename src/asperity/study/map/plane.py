@@ -12,7 +12,7 @@ import numpy as np
 from asperity.arrays import Float, between
 from asperity.errors import InputError, require
 from asperity.laws import Law
-from asperity.operating_point import known_parameters, without_mass
+from asperity.operating_point import known_parameters, require_influence, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
 from asperity.parameters.arguments import at_least, number, shown, typed
 from asperity.study.crossings import STABILITY
@@ -154,6 +154,9 @@ class MapPlane:
     fixed: Mapping[str, float]
     x: Axis
     y: Axis
+
+    def __post_init__(self) -> None:
+        require_influence((self.x.name, self.y.name), self.fixed, "axis of {}")
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -13,7 +13,6 @@ from asperity.operating_point import (
     SourcedNumber,
     numbers_for,
     refuse_foreign,
-    require_influence,
     sourced_numbers,
 )
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
@@ -209,6 +208,5 @@ def _plane(
     )  # fmt: skip
     fixed = {n: s for n, s in (defaults | of_law).items() if n not in (x.name, y.name)}
     plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
-    require_influence((x.name, y.name), plane.fixed, "axis of {}")
     plane.values(plane.nodes()[:1])
     return plane, {n: s.origin for n, s in fixed.items()}

@@ -84,7 +84,8 @@ export class ByHand {
     if (!this.values) {
       this.values = Object.fromEntries([
         ...parameters.map((p) => [p.name, BEGIN[p.name] ?? defaults[p.name].value]), ["K/W0", BEGIN["K/W0"]],
-        ["V0", this.recording.segments[0].velocity], ["mu0", this.recording.level],
+        ...[["V0", this.recording.segments[0].velocity], ["mu0", this.recording.level]]
+          .filter(([n]) => parameters.some((p) => p.name === n)),
       ]);
       this.#takeKept();
     }
