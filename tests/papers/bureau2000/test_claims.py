@@ -165,8 +165,8 @@ def test_counts_of_the_readme_are_those_of_the_ledger(claims):
     counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in verdicts)]
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     stated = re.search(
-        r"(\d+) statements of the paper: of the (\d+) that could have come out otherwise "
-        r"(\d+) are reproduced, (\d+) are misprints, (\d+) differ",
+        r"(\d+) statements of the paper: (\d+) of them are tests, which the models could have "
+        r"contradicted; of these (\d+) are reproduced, (\d+) are misprints, (\d+) differ",
         text,
     )
     assert [int(n) for n in stated.groups()] == counts
