@@ -537,7 +537,9 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
     if u is at.u or not (outliers or at.p_value >= FAR_OFF):
         return outliers, None
     end = objective.minimise(u)
-    return outliers, end if end.chi2 < at.chi2 - _LOWER else None
+    # A minimum that is not reached again would be tried without end.
+    lower = end.chi2 < at.chi2 - _LOWER and parabola_of(objective, *end) is not None
+    return outliers, end if lower else None
 
 
 def _why_undetermined(fit: Fit, name: str) -> str:
