@@ -165,7 +165,7 @@ def _invert(
 
 def _limits(bracket: ArrayLike) -> tuple[float, float]:
     ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
-    rule, got, advice = "be two ascending lengths", f"{bracket} m", "swap or correct them"
+    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
     require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
     return float(ends[0]), float(ends[1])
 

@@ -72,9 +72,9 @@ class NormalContact:
 
     def load(self, closure: ArrayLike) -> Real:
         """Return the load W = W0 exp((h0 - h)/lambda_z) (N) at the closure h0 - h (m)."""
-        return self.W0 * np.exp(
-            as_real("NormalContact.closure", closure, "length", "finite") / self.lambda_z
-        )
+        relative = as_real("NormalContact.closure", closure, "length", "finite") / self.lambda_z
+        load: Real = self.W0 * np.exp(relative)
+        return load
 
     def closure(self, load: ArrayLike) -> Real:
         """Closure h0 - h = lambda_z ln(W/W0) (m) under the normal load W (N).

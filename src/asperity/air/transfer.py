@@ -138,8 +138,6 @@ def air_vacuum_ratio(
     InputError
         Also if `layer` is None.
     """
-    if layer is None:
-        raise InputError("air_vacuum_ratio.layer", "be an AirLayer", "None", "give the layer")
     air = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
     vacuum = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z)
     return air / vacuum

@@ -123,7 +123,7 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
     spec = kind_of(kind)
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
         raise InputTypeError("value", "be a number", shown(value))
-    if isinstance(digits, bool) or not isinstance(digits, int | np.integer) or digits < 0:
+    if not (type(digits) is int and digits >= 0):
         raise InputTypeError("digits", "be a whole number from 0", shown(digits))
     return quantity_text(value, spec.si, digits)
 
