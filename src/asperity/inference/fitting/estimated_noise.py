@@ -75,11 +75,13 @@ def with_noise(
         ends += _estimated_in_turn(objective, u, ends, _COARSE)
     # On a stiff machine friction jumps between two samples: the delay of a velocity change then has
     # a minimum in each sampling interval.
-    u = min(ends, key=_DEVIANCE).u.copy()
-    for i, unknown in enumerate(objective.unknowns):
-        if unknown.nuisance and not unknown.logarithmic:
-            u[i] = unknown.middle
-    ends += _estimated_in_turn(objective, u, ends, _COARSE)
+    delays = [
+        i for i, name in enumerate(objective.unknowns) if name.nuisance and not name.logarithmic
+    ]
+    if delays:
+        u = min(ends, key=_DEVIANCE).u.copy()
+        u[delays] = [objective.unknowns[i].middle for i in delays]
+        ends += _estimated_in_turn(objective, u, ends, _COARSE)
     ends.sort(key=_DEVIANCE)
     (best,) = _estimated_in_turn(ends[0].objective, ends[0].u, (), objective.tolerance)
     objective.terms = best.objective.terms

@@ -139,8 +139,9 @@ def integrated(
     # The steps do not depend on the gauge.
     names = tuple(name for name in free.names if name != GAIN)
     numbers = jnp.stack([given[name] for name in names])
-    by_names = free.directions[:, [free.names.index(name) for name in names]]
-    by_edges = free.directions[:, -drawn.edges.size :]
+    directions = jnp.asarray(free.directions)
+    by_names = directions[:, jnp.asarray([free.names.index(name) for name in names])]
+    by_edges = directions[:, -drawn.edges.size :]
 
     def slopes_of(part: _Step, change: Array) -> tuple[Array, Curve]:
         """Derivatives of the states after a part of the steps, and of the motion at these steps."""
@@ -303,17 +304,16 @@ def _steps_taken(
         return (piece < pieces) & (n < room) & (tries < room + room // 2) & (h > 1e-13 * end)
 
     zero, first = jnp.asarray(0), 1e-3 * (drive.edges[1] - drive.edges[0])
-    # The padding is differentiated with the other steps.
-    kept = _Step(
-        jnp.zeros(room, int),
-        jnp.zeros(room),
-        jnp.full(room, first),
-        jnp.zeros(room, bool),
-        jnp.zeros((room, *y0.shape)) + y0,
+    # The padding is differentiated with the other steps, so that its steps have a length.
+    padding = (
+        _Step(zero, jnp.asarray(0.0), first, jnp.asarray(False), y0),
+        Curve(jnp.asarray(jnp.inf), jnp.asarray(1.0), jnp.zeros((5, *y0.shape))),
     )
-    curve = Curve(jnp.full(room, jnp.inf), jnp.ones(room), jnp.zeros((room, 5, *y0.shape)))
+    taken = jax.tree.map(lambda one: jnp.broadcast_to(one, (room, *one.shape)), padding)
     start = drive.edges[0], first, y0, zero, zero, zero
-    *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, kept, curve))
+    *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, *taken))
+    # A last piece that was skipped has left a step without length.
+    kept, curve = jax.tree.map(lambda all_, one: all_.at[n].set(one), (kept, curve), padding)
     return kept, curve, n, piece >= pieces
 
 
