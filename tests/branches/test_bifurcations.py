@@ -198,12 +198,6 @@ def test_a_dataset_has_units_and_provenance(hysteresis, tmp_path):
         ({"parameter": "M", "span": (1, 2), "epsilon": 0.1}, "one that the equations have"),
         ({"parameter": "pull", "epsilon": 0.1}, "one that continuation can change, got 'pull'"),
         ({"harmonics": 1}, "at least 2"),
-        ({"epsilon": 0.1}, "epsilon must be left out where it is the continued parameter, got 0.1"),
-        ({"parameter": "V", "span": (1e-6, 2e-6), "epsilon": 0.1}, "velocity must be left out"),
-        (
-            {"parameter": "eta", "span": (1, 2), "epsilon": 0.1, "radiation_damping": 3.0},
-            "radiation_damping must be left out",
-        ),
     ],
 )
 def test_bad_input_is_one_sentence(rapid, change, message):

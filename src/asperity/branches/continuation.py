@@ -169,8 +169,8 @@ def continuation(
         Values at which the branch starts and ends. A positive parameter whose ends differ by more
         than a factor of 2 is continued by equal factors.
     velocity : float or str
-        Pulling velocity V (m/s). The argument of the continued parameter is left out: `span` gives
-        its values. A continued number of the slider takes them in place of the slider's own.
+        Pulling velocity V (m/s). The velocity, epsilon or frequency may be left out if it is the
+        continued parameter: `span` replaces the parameter's value in slider and arguments.
     epsilon : float or str
         Relative amplitude of the load.
     frequency : float or str
@@ -196,8 +196,8 @@ def continuation(
     Raises
     ------
     InputError
-        If a value breaks its rule, the parameter does not exist or has an argument as well as a
-        span, the slider has arrays, or no periodic orbit exists at the start of the span.
+        If a value breaks its rule, the parameter does not exist, the slider has arrays, or no
+        periodic orbit exists at the start of the span.
 
     Examples
     --------

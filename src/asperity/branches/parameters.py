@@ -15,7 +15,7 @@ from asperity.errors import InputError, closest, require
 from asperity.laws import Law
 from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
-from asperity.parameters.arguments import number, shown
+from asperity.parameters.arguments import number
 from asperity.slider import Slider
 from asperity.slider.named import equation_parameters, equation_values, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
@@ -23,13 +23,6 @@ from asperity.slider.problem import Problem, checked_problem, flatten
 #: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
 _LOGARITHMIC = 2.0
 
-#: Arguments that give a parameter of the operating point, which a span may give in their place.
-_ARGUMENTS = {
-    "V": "velocity",
-    "epsilon": "epsilon",
-    "frequency": "frequency",
-    "eta": "radiation_damping",
-}
 #: Arguments that say what the operating point is.
 _POINT = ("velocity", "epsilon", "frequency", "modulation", "inertia", "radiation_damping")
 
@@ -152,23 +145,21 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     Raises
     ------
     InputError
-        If a value breaks its rule, one is missing, an argument gives a continued parameter too,
-        there are arrays, or there is no parameter of a name.
+        If a value breaks its rule, one is missing, there are arrays, or there is no parameter of a
+        name.
     """
     slider: Slider = arguments["slider"]
     point = {name: arguments[name] for name in _POINT}
     moving = {continued_name(type(slider.law), name): span[0] for name, span in spans.items()}
-    for symbol, name in _ARGUMENTS.items():
-        if symbol in moving:
-            rule, got = "be left out where it is the continued parameter", shown(point[name])
-            require(point[name] is None, name, rule, got, "its span says where it begins")
-            # With a modulation of its own form the equations have no epsilon, as is said later.
-            if name != "epsilon" or point["modulation"] is None:
-                point[name] = moving[symbol]
-    for name in ("velocity", "frequency"):
-        require(point[name] is not None, name, "be given", "None", "or continue in it")
+    for name, symbol in (("velocity", "V"), ("frequency", "frequency")):
+        point[name] = moving.get(symbol, point[name])
+        if point[name] is None:
+            raise InputError(name, "be given", "None", "or continue in it")
     rule, got = "depend on the velocity to have a branch with bifurcations", slider.law.name
     require(slider.law.rate_dependent, "law", rule, got, "its force is mu W for all parameters")
+    if point["modulation"] is None:
+        point["epsilon"] = moving.get("epsilon", point["epsilon"])
+    point["radiation_damping"] = moving.get("eta", point["radiation_damping"])
     flat, shape = flatten(checked_problem(slider, **point))
     rule, got = "be numbers for a continuation", f"arrays of shape {shape}"
     require(shape in ((), (1,)), "parameters", rule, got, "follow one operating point at a time")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from asperity.arrays import Bool, Float
+from asperity.measurement.verdicts.steadiness import left_of_piece
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -27,8 +28,6 @@ SLIDING_CONVENTIONS = (
 )
 
 _BINS = 90
-#: Samples of the spectrum.
-_MOST = 1 << 18
 
 
 def modulated_record(measurement: Measurement) -> dict[str, Any]:
@@ -233,7 +232,7 @@ def mean_cycle(measurement: Measurement) -> MeanCycle:
 
 
 def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
-    """Amplitudes of F/W0 without the fitted harmonics, up to the order after the last one.
+    """Amplitudes of the residual of F/W0 in the middle of the window, up to the next harmonic.
 
     Parameters
     ----------
@@ -247,22 +246,14 @@ def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
         Under a Hann window.
     """
     reading, cut = measurement.reading, slice(*measurement.window)
-    time, force = (
-        measurement.samples.time[cut][:_MOST],
-        measurement.samples.force[cut][:_MOST] / reading.W0,
-    )
-    cycles = reading.cycles(time)
-    order = np.arange(1, reading.harmonics.size + 1)
-    for n, c in zip(order, reading.harmonics, strict=True):
-        force = force - (c * np.exp(2j * np.pi * n * cycles)).real
-    grid = np.linspace(time[0], time[-1], time.size)
-    level = np.interp(grid, time, force)
-    u = np.linspace(-1, 1, grid.size)
-    level = level - np.polynomial.legendre.legval(u, np.polynomial.legendre.legfit(u, level, 1))
-    hann = np.cos(np.pi / 2 * u) ** 2
-    amplitude = 2 * np.abs(np.fft.rfft(hann * level)) / hann.sum()
+    time, force = measurement.samples.time[cut], measurement.samples.force[cut]
+    piece, left = left_of_piece(reading, time, force)
+    grid = np.linspace(time[piece][0], time[piece][-1], left.size)
+    hann = np.cos(np.linspace(-np.pi / 2, np.pi / 2, grid.size)) ** 2
+    level = hann * np.interp(grid, time[piece], left) / reading.W0
+    amplitude = 2 * np.abs(np.fft.rfft(level)) / hann.sum()
     frequency = np.fft.rfftfreq(grid.size, grid[1] - grid[0])
-    top = min(frequency[-1], (order.size + 1) * reading.frequency)
+    top = min(frequency[-1], (reading.harmonics.size + 1) * reading.frequency)
     shown = (frequency > frequency[1]) & (frequency <= top)
     return frequency[shown], amplitude[shown]
 

@@ -11,12 +11,12 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.parameters.arguments import typed
 from asperity.recording.defects.check import CHECKED, check
-from asperity.recording.expressions import Names, Quantity, evaluate
+from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
-from asperity.units.scale import base_units, kind_of_dimension, unit_text
+from asperity.units.scale import kind_of_dimension, unit_text
 
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
@@ -53,7 +53,7 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         rule = "be an expression"
         require(text.strip(), field, rule, repr(text), "write it like '2.4 N/V * Gauge'")
         require(target.strip(), "channels", "have names", "an empty one", "write 'load = ...'")
-        quantity, sources = evaluate(text, _names(trace, field), field)
+        quantity, sources = evaluate(text, trace, field)
         trace = _with_channel(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
@@ -109,61 +109,6 @@ def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: A
         shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
         advice = "add the units of gains and areas, like '2.4 N/V' or '25 cm^2'"
         raise InputError(field, f"be {nouns(fitting)}", shown, advice)
-
-
-def _names(trace: Trace, field: Argument) -> Names:
-    def find(name: str, only_channels: bool) -> tuple[Quantity, str] | None:
-        key = _key_of(trace, name)
-        if key is not None:
-            return _quantity(trace.channels[key], key, field), key
-        if not only_channels and name.lower() == "time":
-            return Quantity(trace.time, base_units("s")[1]), ""
-        return None
-
-    return Names(find, ("time", *trace.channels), trace.time)
-
-
-def _key_of(trace: Trace, name: str) -> str | None:
-    """The channel of a name, heading or role; blanks, dots at the ends and case may differ."""
-    if name in trace.channels:
-        return name
-    headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
-    if len(headings) == 1:
-        return headings[0]
-    for bare in (_bare, lambda text: _bare(text).casefold()):
-        similar = [key for key in trace.channels if bare(key) == bare(name)]
-        if len(similar) == 1:
-            return similar[0]
-    role = role_of(name)
-    if role is None or role == "time":
-        return None
-    try:
-        channel = trace.channel(name)
-    except InputError:
-        # V, N, W and F are units where no channel has the role of this name.
-        if any(name in unit for unit in ("V", "N", "W", "F")):
-            return None
-        raise
-    return trace.name_of(channel)
-
-
-def _bare(name: str) -> str:
-    """A name without blanks, and without dots and underscores at its ends."""
-    return name.replace(" ", "").strip("._")
-
-
-def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:
-    if channel.kind is not None:
-        return Quantity(channel.values, base_units(channel.unit)[1])
-    if not channel.recorded_unit:
-        # A column without a unit is dimensionless.
-        return Quantity(channel.values, ())
-    try:
-        factor, dimension = base_units(channel.recorded_unit)
-    except InputError:
-        rule, got = "be made of channels in known units", f"'{key}' in '{channel.recorded_unit}'"
-        raise InputError(field, rule, got, f"name its unit when reading, like {key}=N") from None
-    return Quantity(channel.values * factor, dimension)
 
 
 def _inherited(

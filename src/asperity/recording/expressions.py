@@ -20,6 +20,8 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, closest
+from asperity.recording.roles import role_of
+from asperity.recording.trace import Channel, Trace
 from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
 #: Characters that a text may have.
@@ -51,24 +53,6 @@ class Quantity(NamedTuple):
     dimension: Dimension
 
 
-class Names(NamedTuple):
-    """Lookup of the names in an expression.
-
-    Attributes
-    ----------
-    find : callable
-        The quantity of a name and the channel that it is, None if it names no channel.
-    known : tuple of str
-        For messages.
-    time : array, (n,)
-        Times of the samples (s).
-    """
-
-    find: Callable[[str, bool], tuple[Quantity, str] | None]
-    known: tuple[str, ...]
-    time: Float
-
-
 def _trapezoids(values: Float, time: Float) -> Float:
     return np.concatenate([[0.0], np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2)])
 
@@ -97,14 +81,14 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
-def evaluate(text: str, names: Names, field: str | Argument) -> tuple[Quantity, tuple[str, ...]]:
+def evaluate(text: str, trace: Trace, field: Argument) -> tuple[Quantity, tuple[str, ...]]:
     """Value of an expression, and the channels in it.
 
     Parameters
     ----------
     text : str
-    names : Names
-    field : str or Argument
+    trace : Trace
+    field : Argument
         Name of the expression in messages, such as ``"channels['load']"``.
 
     Raises
@@ -112,7 +96,7 @@ def evaluate(text: str, names: Names, field: str | Argument) -> tuple[Quantity, 
     InputError
         If the text is no expression, a name or unit is unknown, or dimensions do not agree.
     """
-    expression = _Expression(text, names, field)
+    expression = _Expression(text, trace, field)
     # Overflow gives infinity, which the check of the channel reports.
     with np.errstate(all="ignore"):
         quantity = expression.value()
@@ -122,8 +106,8 @@ def evaluate(text: str, names: Names, field: str | Argument) -> tuple[Quantity, 
 class _Expression:
     """A parsed text, and the quantities of its names, numbers and units."""
 
-    def __init__(self, text: str, names: Names, field: str | Argument) -> None:
-        self.text, self.names, self.field = text, names, field
+    def __init__(self, text: str, trace: Trace, field: Argument) -> None:
+        self.text, self.trace, self.field = text, trace, field
         self.operands: list[Quantity] = []
         self.sources: list[str] = []
         if len(text) > _LONGEST:
@@ -207,24 +191,21 @@ class _Expression:
         return Quantity(np.float64(factor), dimension)
 
     def _channel(self, name: str, only_channels: bool) -> Quantity:
-        known = self.names.find(name, only_channels)
-        if known is not None:
-            quantity, source = known
-            if source:
-                self.sources.append(source)
-            return quantity
-        try:
-            if only_channels:
-                raise InputError
-            factor, dimension = base_units(name)
-        except InputError:
-            others = [] if only_channels else [*_FUNCTIONS, *_STATISTICS]
-            self._fail(
-                "be made of channels that are there",
-                f"'{name}' in '{self.text}'",
-                closest(name, [*self.names.known, *others]),
-            )
-        return Quantity(np.float64(factor), dimension)
+        key = _key_of(self.trace, name)
+        if key is not None:
+            self.sources.append(key)
+            return _quantity(self.trace.channels[key], key, self.field)
+        known = ["time", *self.trace.channels]
+        if not only_channels:
+            if name.lower() == "time":
+                return Quantity(self.trace.time, _SECONDS)
+            try:
+                factor, dimension = base_units(name)
+                return Quantity(np.float64(factor), dimension)
+            except InputError:
+                known += [*_FUNCTIONS, *_STATISTICS]
+        got, advice = f"'{name}' in '{self.text}'", closest(name, known)
+        raise InputError(self.field, "be made of channels that are there", got, advice)
 
     def _evaluated(self, node: ast.expr) -> Quantity:
         match node:
@@ -241,7 +222,7 @@ class _Expression:
                 apply, power, seconds = _FUNCTIONS[name]
                 value = self._evaluated(inner)
                 dimension = _product((value.dimension, power), (_SECONDS, seconds))
-                value = Quantity(apply(value.values, self.names.time), dimension)
+                value = Quantity(apply(value.values, self.trace.time), dimension)
             case ast.Call(func=ast.Name(id=name), args=[inner, *limits]) if name in _STATISTICS:
                 value = self._statistic(name, self._evaluated(inner), limits)
             case _:
@@ -275,7 +256,7 @@ class _Expression:
 
     def _statistic(self, name: str, value: Quantity, limits: list[ast.expr]) -> Quantity:
         """A statistic of all samples, or of those from the first limit to the second."""
-        time = self.names.time
+        time = self.trace.time
         values = np.broadcast_to(np.asarray(value.values, dtype=np.float64), time.shape)
         inside = np.ones(time.size, bool)
         example = f"write it like {name}(x, 0 s, 5 s)"
@@ -309,3 +290,46 @@ def _product(*powers: tuple[Dimension, float]) -> Dimension:
 
 def _described(value: Quantity) -> str:
     return f"a quantity in {unit_text(value.dimension)}" if value.dimension else "a pure number"
+
+
+def _key_of(trace: Trace, name: str) -> str | None:
+    """The channel of a name, heading or role; blanks, dots at the ends and case may differ."""
+    if name in trace.channels:
+        return name
+    headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
+    if len(headings) == 1:
+        return headings[0]
+    for bare in (_bare, lambda text: _bare(text).casefold()):
+        similar = [key for key in trace.channels if bare(key) == bare(name)]
+        if len(similar) == 1:
+            return similar[0]
+    role = role_of(name)
+    if role is None or role == "time":
+        return None
+    try:
+        channel = trace.channel(name)
+    except InputError:
+        # V, N, W and F are units where no channel has the role of this name.
+        if any(name in unit for unit in ("V", "N", "W", "F")):
+            return None
+        raise
+    return trace.name_of(channel)
+
+
+def _bare(name: str) -> str:
+    """A name without blanks, and without dots and underscores at its ends."""
+    return name.replace(" ", "").strip("._")
+
+
+def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:
+    if channel.kind is not None:
+        return Quantity(channel.values, base_units(channel.unit)[1])
+    if not channel.recorded_unit:
+        # A column without a unit is dimensionless.
+        return Quantity(channel.values, ())
+    try:
+        factor, dimension = base_units(channel.recorded_unit)
+    except InputError:
+        rule, got = "be made of channels in known units", f"'{key}' in '{channel.recorded_unit}'"
+        raise InputError(field, rule, got, f"name its unit when reading, like {key}=N") from None
+    return Quantity(channel.values * factor, dimension)

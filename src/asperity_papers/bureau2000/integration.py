@@ -49,25 +49,15 @@ class IntegratedPoint:
     @property
     def size(self) -> int:
         """Number of states."""
-        return 2 if not self.M else (4 if self.lambda_ else 3)
+        return 3 if self.M else 2
 
     def rates(self, t: float, flat: Float, epsilon: float) -> Float:
         """Time derivatives of copies of the states, laid out as (size, copies)."""
         Y = flat.reshape(self.size, -1)
         w = 1 + epsilon * np.cos(self.omega * t)
         log_w_rate = -epsilon * self.omega * np.sin(self.omega * t) / w
-        if not self.M:
-            out = self._quasi_static(Y, w, log_w_rate)
-        elif self.lambda_:
-            out = self._elastic(Y, w, log_w_rate)
-        else:
-            out = self._rigid(Y, w, log_w_rate)
-        return np.concatenate(out)
-
-    def _slip(self, interface: Float, phi: Float, w: float) -> Float:
-        """Eq. (1) solved for the velocity of its rate term, over V; `interface` is F_i/W0."""
-        exponent = (interface / w - self.mu - self.B * phi) / self.A
-        return _exp(exponent)
+        of_states = self._inertial if self.M else self._quasi_static
+        return np.concatenate(of_states(Y, w, log_w_rate))
 
     def _ageing(self, v: Float, phi: Float, log_w_rate: float) -> Float:
         """Eq. (6) for phi; Eq. (2) at alpha = 0. `v` over V."""
@@ -77,36 +67,22 @@ class IntegratedPoint:
     def _quasi_static(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
         y, phi = Y
         f = self.mu + y
+        # Eq. (1) solved for the velocity of its rate term, over V.
+        slip = _exp((f / w - self.mu - self.B * phi) / self.A)
         # d/dt (x - F lambda/W) = V slip with x = V t - F/K: Eq. (29) differentiated.
         asperities = self.lambda_ / w
-        rate = (self.V * (1 - self._slip(f, phi, w)) + asperities * f * log_w_rate) / (
-            self.W0 / self.K + asperities
-        )
+        driven = self.V * (1 - slip) + asperities * f * log_w_rate
+        rate = driven / (self.W0 / self.K + asperities)
         v = 1 - rate * self.W0 / (self.K * self.V)
         return [rate, self._ageing(v, phi, log_w_rate)]
 
-    def _rigid(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
+    def _inertial(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
+        assert not self.lambda_  # elastic asperities are integrated without inertia only
         y, phi, u = Y
         v = _exp(u)
         friction = w * (self.mu + self.A * u + self.B * phi)
         u_rate = self.W0 * (self.mu + y - friction) / (self.M * self.V * v)
-        return [
-            self.K * self.V / self.W0 * (1 - v),
-            self._ageing(v, phi, log_w_rate),
-            u_rate,
-        ]
-
-    def _elastic(self, Y: Float, w: float, log_w_rate: float) -> list[Float]:
-        y, phi, u, g = Y
-        interface = self.mu + g
-        v = 1 + u
-        slip = self._slip(interface, phi, w)
-        return [
-            self.K * self.V / self.W0 * (1 - v),
-            self._ageing(v, phi, log_w_rate),
-            self.W0 * (y - g) / (self.M * self.V),
-            w / self.lambda_ * self.V * (v - slip) + interface * log_w_rate,
-        ]
+        return [self.K * self.V / self.W0 * (1 - v), self._ageing(v, phi, log_w_rate), u_rate]
 
 
 @dataclass(frozen=True)
@@ -153,7 +129,7 @@ def periodic_orbit(p: IntegratedPoint, epsilon: float, drop: float = 0.0) -> Int
         If Newton's method does not close the orbit.
     """
     start = np.zeros(p.size)
-    start[0] = start[-1 if p.size == 4 else 0] = drop
+    start[0] = drop
     nudge = 1e-7 * np.ones(p.size)
     for _ in range(_NEWTON_STEPS):
         copies = np.column_stack([start, start[:, None] + np.diag(nudge)])

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity import Slider, periodic_response
+from asperity import Slider, periodic_response, perturbation_response
 from asperity.air import AirLayer, effective_modulation
 from asperity.ledger import Paper
 from asperity.materials import Material, load
@@ -372,29 +372,7 @@ def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
     return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
 
 
-def steady_growth(slider: Slider, V: ArrayLike) -> Float:
-    """Growth rate (1/s) of a perturbation of unmodulated sliding; positive where it is unstable.
-
-    Linearised about steady sliding at V, with l = lambda K/W0 and perturbations growing as
-    e^{s t}, the quasi-static equations of section III give, the age law being on the slider's
-    velocity::
-
-        (1 + l) A W0/V s^2 + [K - (B - (1 + l) A) W0/D0] s + K V/D0 = 0.
-
-    For l = 0 the bracket changes sign at the paper's Kc = (B - A) W0/D0. Load rates are absent,
-    hence Linker-Dieterich ageing has the stability of Rice-Ruina's.
-    """
-    law: Any = slider.law
-    numbers = (law.A, law.B, law.D0, law.elastic_length, slider.K, slider.W0)
-    A, B, D0, length, K, W0 = (np.asarray(x, dtype=float) for x in numbers)
-    V = np.asarray(V, dtype=float)
-    A = A * (1 + length * K / W0)
-    quadratic, constant = A * W0 / V, K * V / D0
-    linear = K - (B - A) * W0 / D0
-    root = np.sqrt(linear**2 - 4 * quadratic * constant + 0j)
-    return np.asarray(((root - linear) / (2 * quadratic)).real)
-
-
-def steady_multiplier(slider: Slider, V: ArrayLike, frequency: ArrayLike) -> Float:
+def steady_multiplier(slider: Slider, V: ArrayLike, frequency: float | Float) -> Float:
     """Growth of a perturbation of steady sliding over one period 1/frequency (Hz)."""
-    return np.exp(steady_growth(slider, V) / np.asarray(frequency))
+    response = perturbation_response(slider, velocity=V, frequency=frequency)
+    return np.exp(np.asarray(response.eigenvalues)[..., 0].real / frequency)

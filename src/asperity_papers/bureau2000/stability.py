@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import elementwise
 
 import asperity as asp
 from asperity.ledger import FigureNumbers
@@ -17,10 +18,6 @@ from asperity_papers.bureau2000.machine import (
     Machine,
     steady_multiplier,
 )
-
-#: The secant iteration ends when no threshold moves by more than this; tests ask for 1e-6.
-_TOLERANCE = 1e-9
-_MOST_STEPS = 12
 
 
 def variants(machine: Machine) -> dict[str, tuple[str, dict[str, float]]]:
@@ -47,8 +44,6 @@ def log_multiplier(machine: Machine, variant: str, V: Float, epsilon: Float) -> 
 def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, Float]) -> Float:
     """Amplitude eps_eff at which modulation makes sliding stable, for each velocity.
 
-    Secant iteration on ln|m|, which is smooth and nearly quadratic in eps there.
-
     Parameters
     ----------
     machine : Machine
@@ -64,24 +59,10 @@ def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, F
     array, shape (n,)
         NaN where the multiplier does not cross 1 between them.
     """
-
-    def level(epsilon: Float) -> Float:
-        return log_multiplier(machine, variant, V, epsilon)
-
-    old, new = bracket
-    at_old, at_new = level(old), level(new)
-    for _ in range(_MOST_STEPS):
-        # Once two iterates agree to the last digit there is no secant, and nothing left to do.
-        flat = at_new == at_old
-        step = np.where(flat, 0.0, at_new * (new - old) / np.where(flat, 1.0, at_new - at_old))
-        old, at_old = new, at_new
-        new = np.clip(new - step, bracket[0], bracket[1])
-        if np.abs(new - old).max() < _TOLERANCE:
-            break
-        at_new = level(new)
-    # At an end of the bracket the iterates agree as well, without a crossing.
-    crossed = (np.abs(new - old) < _TOLERANCE) & (np.abs(at_old) < _TOLERANCE)
-    return np.where(crossed, new, np.nan)
+    root = elementwise.find_root(
+        lambda epsilon, V: log_multiplier(machine, variant, V, epsilon), bracket, args=(V,)
+    )
+    return np.where(root.success, root.x, np.nan)
 
 
 def floquet_curves(machine: Machine) -> list[FigureCurve]:

@@ -17,7 +17,6 @@ from asperity.units import format_si
 if TYPE_CHECKING:
     from asperity.experiment import StickSlip
 
-
 #: Shares by which stiffnesses and loads of one machine differ at most.
 _SAME = 0.05
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
+from asperity.measurement.series import weighted_line
 
 #: Fewest recordings for a slope, and most iterations for their scatter about it.
 _FEWEST, _PASSES = 3, 30
@@ -81,27 +82,24 @@ def of_campaign(stick_durations: Float, drops: Float, uncertainties: Float) -> S
     n = x.size
     if n < _FEWEST:
         return _without_result(n, f"{n} recordings are too few; at least {_FEWEST} are needed")
+    if np.ptp(x) == 0:
+        return _without_result(n, "all recordings have one and the same stick time")
     extra = 0.0
     for _ in range(_PASSES):
-        weight = 1 / (uncertainty**2 + extra)
-        centre = float(weight @ x) / float(weight.sum())
-        power = float(weight @ (x - centre) ** 2)
-        if power == 0:
-            return _without_result(n, "all recordings have one and the same stick time")
-        slope = float(weight @ ((x - centre) * y)) / power
-        level = float(weight @ (y - slope * (x - centre))) / float(weight.sum())
-        squares = (y - level - slope * (x - centre)) ** 2
-        excess = float(weight @ squares) - (n - 2)
-        extra = max(extra + excess / float((weight**2) @ squares), 0.0)
-    spread = 1 / np.sqrt(power)
+        variance = uncertainty**2 + extra
+        line = weighted_line(x, y, np.sqrt(variance))
+        squares = (y - line.beta[0] - line.beta[1] * x) ** 2
+        excess = (line.excess - 1) * (n - 2)
+        extra = max(extra + excess / float(np.sum(squares / variance**2)), 0.0)
+    slope, spread = float(line.beta[1]), float(np.sqrt(line.covariance[1, 1]))
     half = float(stdtrit(n - 2, 0.975)) * spread
-    interval = float(slope - half), float(slope + half)
+    interval = slope - half, slope + half
     reason = ""
     if np.ptp(x) < 1:
         reason = f"stick times range over {np.ptp(x):.2g} e-folds; at least one is needed"
     elif interval[0] <= 0 <= interval[1]:
         reason = f"the 95 % interval, {interval[0]:.2g} to {interval[1]:.2g}, holds zero"
-    return StickSlipHealing(slope, float(spread), interval, n, reason)
+    return StickSlipHealing(slope, spread, interval, n, reason)
 
 
 def _without_result(recordings: int, reason: str) -> StickSlipHealing:

@@ -365,45 +365,13 @@ def _recorded_slip(time: Float, displacement: Float, events: SlipEvents) -> tupl
     return slip, steepest_fall(-forward, onset, end, slip) / step
 
 
-@dataclass(frozen=True)
-class _Middles:
-    """Middle halves of the sticks of stick-slip, from sums over the force.
-
-    Attributes
-    ----------
-    after : int array, (m,)
-        Event that ends each stick.
-    total : array, (n + 1,)
-        Cumulative sums of the force less its mean.
-    first, stop : int array, (m,)
-        First sample of the middle half, and the sample after its last.
-    mean, centre : array, (m,)
-        Mean force, and mean time (s), of the middle half.
-    """
-
-    after: Index
-    total: Float
-    first: Index
-    stop: Index
-    mean: Float
-    centre: Float
-
-    @classmethod
-    def of(cls, result: StickSlipMeasurement) -> _Middles:
-        events, time = result.events, result.time
-        after = np.concatenate(
-            [[], *(np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks)]
-        ).astype(np.intp)
-        level = result.friction.mean()
-        total = np.concatenate([[0.0], np.cumsum(result.friction - level)])
-        quarter = events.stick_duration[after] / 4
-        first = np.searchsorted(time, events.end[after - 1] + quarter)
-        stop = np.maximum(np.searchsorted(time, events.onset[after] - quarter), first + 1)
-        mean = (total[stop] - total[first]) / (stop - first) + level
-        return cls(after, total, first, stop, mean, (time[first] + time[stop - 1]) / 2)
+def _stick_lines(events: SlipEvents, after: Index, time: Float) -> Float:
+    """Force on the line of the stick that ends in each event `after`, at times (s)."""
+    ahead = events.force_before[after] + events.creep[after]
+    return np.asarray(ahead + events.loading_slope[after] * (time - events.onset[after]))
 
 
-def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
+def _ringing(result: StickSlipMeasurement, after: Index) -> float:
     """Largest mean departure of the force after slips from the lines of the sticks, over the drop.
 
     The departures are means over a quarter of the slip duration, within three slip durations after
@@ -412,15 +380,17 @@ def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
     """
     events, (time, force) = result.events, (result.time, result.friction)
     width = max(float(np.median(events.slip_duration)) / 4, 2 * (time[1] - time[0]))
-    edges = events.end[sticks.after - 1][:, None] + width * np.arange(13)
+    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+    # One row for each time after the slip, one column for each stick.
+    edges = events.end[after - 1] + width * np.arange(13)[:, None]
     at = np.searchsorted(time, edges)
-    count = np.diff(at, axis=1)
-    mean = np.diff(sticks.total[at], axis=1) / np.maximum(count, 1) + force.mean()
-    centre = (edges[:, 1:] + edges[:, :-1]) / 2 - sticks.centre[:, None]
-    off = mean - sticks.mean[:, None] - events.loading_slope[sticks.after][:, None] * centre
-    inside = (at[:, 1:] <= sticks.first[:, None]) & (count > 0)
+    count = np.diff(at, axis=0)
+    mean = np.diff(total[at], axis=0) / np.maximum(count, 1) + force.mean()
+    off = mean - _stick_lines(events, after, (edges[1:] + edges[:-1]) / 2)
+    quarter = events.stick_duration[after] / 4
+    inside = (edges[1:] <= events.end[after - 1] + quarter) & (count > 0)
     largest = 0.0
-    for column, known in zip(off.T, inside.T, strict=True):
+    for column, known in zip(off, inside, strict=True):
         values = column[known]
         error = float(np.std(values) / np.sqrt(values.size)) if values.size > _FEW else np.inf
         usual = abs(float(np.mean(values))) if values.size else 0.0
@@ -428,7 +398,7 @@ def _ringing(result: StickSlipMeasurement, sticks: _Middles) -> float:
     return largest / float(np.median(events.drop))
 
 
-def _undetected_share(result: StickSlipMeasurement, sticks: _Middles) -> tuple[float, float]:
+def _undetected_share(result: StickSlipMeasurement, after: Index) -> tuple[float, float]:
     """Share of the loading that undetected small events release, and its standard error.
 
     If such events are few, sticks load less in their first half than their slope predicts; creep
@@ -437,16 +407,18 @@ def _undetected_share(result: StickSlipMeasurement, sticks: _Middles) -> tuple[f
     of the loading alone, because noise is symmetrical, and their mean includes the falls. The
     result is the most significant of these estimates over all widths of means; NaN with few sticks.
     """
-    events, time, after = result.events, result.time, sticks.after
+    events, time, force = result.events, result.time, result.friction
     if after.size < STICK_SLIP["events"][1] or not result.loading_slope > 0:
         return np.nan, np.nan
-    total, first, stop = sticks.total, sticks.first, sticks.stop
-    rise = sticks.mean - events.force_after[after - 1]
-    load = result.loading_slope * (sticks.centre - events.end[after - 1])
+    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+    begin, end, half = events.end[after - 1], events.onset[after], events.stick_duration[after] / 2
+    first, stop = np.searchsorted(time, [begin + half / 2, end - half / 2])
+    rise = _stick_lines(events, after, begin + half) - events.force_after[after - 1]
+    load = result.loading_slope * half
     lack = 1 - rise.sum() / load.sum()
     off = rise - (1 - lack) * load
     best = float(lack), float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
-    rounding = resolution(result.friction) / np.sqrt(12.0)
+    rounding = resolution(force) / np.sqrt(12.0)
     for share in (8, 16, 32):
         width = int(np.median(stop - first)) // share
         if not width:
@@ -506,9 +478,10 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     )
     drift = float(np.ptp(events.force_before + events.force_after)) / 2 / drop
     ask("drift", drift, f"the middle of the drops varies along the track by {drift:.2g} drops")
-    sticks = _Middles.of(result)
-    if sticks.after.size:
-        ringing = _ringing(result, sticks)
+    trains = [np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks]
+    after = np.concatenate([np.empty(0, np.intp), *trains])
+    if after.size:
+        ringing = _ringing(result, after)
         ask(
             "ringing",
             ringing,
@@ -517,7 +490,7 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
             ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
             "much",
         )
-    hidden, error = _undetected_share(result, sticks)
+    hidden, error = _undetected_share(result, after)
     if np.isfinite(hidden):
         ask(
             "hidden events",

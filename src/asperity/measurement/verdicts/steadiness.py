@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.lock_in.normal_equations import Basis, inverted
+from asperity.lock_in.normal_equations import inverted
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
@@ -74,7 +74,9 @@ def left_of_piece(reading: LockInReading, time: Float, values: Float) -> tuple[s
     """The middle piece of a window, and the residual of a separate fit to it."""
     at = max(0, (time.size - _PIECE) // 2)
     piece = slice(at, at + _PIECE)
-    return piece, _residual(reading.blocks.basis, time[piece], values[piece])
+    basis, part = reading.blocks.basis, values[piece]
+    columns = basis.columns(time[piece])[: basis.linear]
+    return piece, part - inverted(columns @ columns.T) @ (columns @ part) @ columns
 
 
 def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
@@ -83,12 +85,6 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
         return None
     lowest = 2.5 / float(time[-1] - time[0])
     return strongest_line(time, values, between=(lowest, highest))
-
-
-def _residual(basis: Basis, time: Float, values: Float) -> Float:
-    """Residual of a separate fit to a piece of a window."""
-    columns = basis.columns(time)[: basis.linear]
-    return values - inverted(columns @ columns.T) @ (columns @ values) @ columns
 
 
 def leakage(reading: LockInReading) -> Check:

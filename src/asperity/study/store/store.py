@@ -182,18 +182,10 @@ class SweepStore:
     def _sync(self, files: list[Path]) -> None:
         for file in files:
             to_disk(file)
-        for folder in self._folders(files):
-            sync_folder(folder)
-
-    def _folders(self, files: list[Path]) -> Iterator[Path]:
-        """Folders of the files up to those of their arrays, each once, inner folders first."""
-        seen = set()
-        for file in files:
-            folder = file.parent
-            while folder not in seen and folder != self.path:
-                seen.add(folder)
-                yield folder
-                folder = folder.parent
+        # Each folder once, the inner folders first.
+        inside = {f for file in files for f in file.relative_to(self.path).parents}
+        for folder in sorted(inside - {Path()}, key=lambda f: -len(f.parts)):
+            sync_folder(self.path / folder)
 
     def sweep_orphans(self) -> int:
         """Remove half-written files of killed processes; returns their number."""
