@@ -486,6 +486,15 @@ def test_a_prior_is_given_once(asperity, tmp_path) -> None:
     refused(shown, "--prior must be given once each, got 'A' twice")
 
 
+def test_a_table_with_headings_of_its_own(asperity, tmp_path) -> None:
+    """It is read as a recording, and the sentence says how a table would be known."""
+    (tmp_path / "t.csv").write_text("Haltezeit;Reibung\n1;0,01\n10;0,02\n", encoding="utf-8")
+    shown = asperity("fit", tmp_path / "t.csv")
+    refused(shown, "--time must be a column, got none among 'Haltezeit', 'Reibung'")
+    assert "in a table of readings name one of the columns mean_friction, " in shown.stderr
+    assert shown.stderr.endswith("in a table of holds healing\n")
+
+
 HOLDS = "hold_time,healing,V,K\n1,0.01,1e-6,1e4\n10,0.02,1e-6,1e4\n"
 
 
