@@ -464,6 +464,8 @@ def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> 
         (("--amplitudes", "--events", "e.csv"), "--amplitudes must go without --events"),
         (("--holds", "0.1:0.2,0.15:0.3"), "--holds must not overlap, got 0.1 to 0.2 s and 0.15"),
         (("--holds", "0.1:0.5", "--steps", "0.2"), "--steps must lie outside --holds, got 0.2 s"),
+        (("--steps", "0.2", "--stick-slip"), "--stick-slip must go without --steps, got both"),
+        (("--holds", "0.1:0.2", "--harmonics", "3"), "--harmonics must go without --holds, got 3"),
         (("--delimiter", ""), "--delimiter must be one character or 'blank', got ''"),
         (("--decimal", ""), "--decimal must be '.' or ',', got ''"),
         (("--format", ""), "--format must be a format, got ''"),
