@@ -99,6 +99,21 @@ def test_half_a_surrogate_pair_is_refused_wherever_json_is_read(ask, path):
             assert "whole characters" in answer.json["error"]
 
 
+#: Bodies that no endpoint takes.
+BODIES = [
+    *("", "[]", "null", '"x"', "{", '{"nix": 1}', '{"law": NaN}', '{"law": {"a": [1e999]}}'),
+    '{"law": 5, "numbers": [], "text": 5, "paper": [], "figure": -1, "recording": {}, "laws": 7}',
+]
+
+
+@pytest.mark.parametrize("path", ENDPOINTS)
+def test_every_endpoint_refuses_what_is_no_question(ask, path):
+    for body in BODIES:
+        answer = ask(path, body.encode())
+        assert answer.status == 400, body
+        assert " must " in answer.json["error"], body
+
+
 def test_a_whole_surrogate_pair_is_a_character(ask):
     answer = ask("explore", b'{"law": "\\ud83d\\ude00"}')
     assert "got '\U0001f600'" in answer.json["error"]

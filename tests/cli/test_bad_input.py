@@ -464,6 +464,8 @@ def test_an_option_with_one_value_is_given_once(asperity, options, sentence) -> 
         (("--amplitudes", "--events", "e.csv"), "--amplitudes must go without --events"),
         (("--holds", "0.1:0.2,0.15:0.3"), "--holds must not overlap, got 0.1 to 0.2 s and 0.15"),
         (("--holds", "0.1:0.5", "--steps", "0.2"), "--steps must lie outside --holds, got 0.2 s"),
+        (("--steps", "0.2", "--stick-slip"), "--stick-slip must go without --steps, got both"),
+        (("--holds", "0.1:0.2", "--harmonics", "3"), "--harmonics must go without --holds, got 3"),
         (("--delimiter", ""), "--delimiter must be one character or 'blank', got ''"),
         (("--decimal", ""), "--decimal must be '.' or ',', got ''"),
         (("--format", ""), "--format must be a format, got ''"),
@@ -484,6 +486,15 @@ def test_a_prior_is_given_once(asperity, tmp_path) -> None:
     priors = ("--prior", "A=0.01+-0.1", "--prior", "A=0.02+-0.1")
     shown = asperity("fit", tmp_path / "t.csv", "--free", "A", *priors)
     refused(shown, "--prior must be given once each, got 'A' twice")
+
+
+def test_a_table_with_headings_of_its_own(asperity, tmp_path) -> None:
+    """It is read as a recording, and the sentence says how a table would be known."""
+    (tmp_path / "t.csv").write_text("Haltezeit;Reibung\n1;0,01\n10;0,02\n", encoding="utf-8")
+    shown = asperity("fit", tmp_path / "t.csv")
+    refused(shown, "--time must be a column, got none among 'Haltezeit', 'Reibung'")
+    assert "in a table of readings name one of the columns mean_friction, " in shown.stderr
+    assert shown.stderr.endswith("in a table of holds healing\n")
 
 
 HOLDS = "hold_time,healing,V,K\n1,0.01,1e-6,1e4\n10,0.02,1e-6,1e4\n"

@@ -148,7 +148,10 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.write([], "a.csv"), "data must hold a measurement, got none"),
         (lambda: asp.tribometer.Recorder(rate=9.0, clock_error="x"), "Recorder.clock_error must"),
         (lambda: asp.Slider(LAW, spring=-1.0, load=7.0), "slider.spring must be positive, got -1"),
-        (lambda: asp.sensitivities(SLIDER, **{**POINT, "velocity": np.empty(0)}), "have a point"),
+        (
+            lambda: asp.sensitivities(SLIDER, **{**POINT, "velocity": np.empty(0)}),
+            "at least one number",
+        ),
         (lambda: asp.units.from_si(["x"], "um/s", "velocity"), "value must be a number or an arr"),
         (lambda: asp.units.from_si(1.0, 3, "velocity"), "unit must be a text, got 3"),
         (lambda: asp.units.to_si(1.0, ["velocity"], "x"), "units.kind must be a text, got an arr"),
@@ -158,6 +161,13 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.air.NormalContact(7.0, 1e-6).load("fast"), "closure must be a finite number"),
         (lambda: asp.air.NormalContact(7.0, 1e-6).load_harmonics(1e-7, 2.5), "count must be a who"),
         (lambda: Axis.parse(3), "text must be a text, got 3"),
+        (lambda: asp.units.from_si(True, "um/s", "velocity"), "value must be a number or an arr"),
+        (lambda: asp.units.quantity_text(1.0, None), "unit must be a text, got None"),
+        (lambda: asp.parameters.law_parameters(3), "law must be a class, got 3"),
+        (lambda: asp.parameters.law_parameters(int), "law must be the class of a law, got the cla"),
+        (lambda: asp.parameters.known_name(3, {}), "name must be a text, got 3"),
+        (lambda: asp.parameters.display_name("A", "x"), "names must be one of friction"),
+        (lambda: asp.Slider(LAW, spring=1e-320, load=7.0), "range of double precision, got 9."),
     ],
 )
 def test_what_no_call_may_pass_on(call, sentence) -> None:

@@ -152,12 +152,25 @@ def read_data(
         elif table:
             result.append(read_table(data.file, at, name=data.name))
         else:
-            trace, reading = read(data), _reading(data)
+            trace, reading = _recording(data, read), _reading(data)
             cycle = None
             if data.steps is None and data.velocities is None:
                 cycle = _stick_slip(trace, reading["name"], question.fixed, data.window)
             result.append(cycle or recorded_run(trace, window=data.window, **reading))
     return result
+
+
+def _recording(data: questions.Data, read: Reader) -> Trace:
+    """The recording in a file; a file without a time is perhaps a table with other headings."""
+    try:
+        return read(data)
+    except InputError as error:
+        if error.field == Argument("columns", "time"):
+            raise error.noting(
+                f"; in a table of readings name one of the columns {', '.join(OBSERVABLES)}, "
+                f"in a table of holds {HEALING}"
+            ) from None
+        raise
 
 
 def _stick_slip(

@@ -182,7 +182,7 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
                 of_type(part, parts[1], f"{name}[{key!r}]")
             return value
     elif origin is type:
-        if isinstance(value, type) and issubclass(value, parts[0]):
+        if isinstance(value, type) and issubclass(value, parts or object):
             return value
     elif isinstance(value, NoneType if origin is None else origin):
         return value
@@ -207,6 +207,7 @@ _WORDS: Mapping[Any, str] = {
     Literal: "a text",
     tuple: "a tuple",
     Sequence: "a list",
+    Iterable: "a list",
     Mapping: "a dictionary",
     collections.abc.Callable: "a function",
 }

@@ -7,6 +7,7 @@ notebooks as short texts and tables, arrays by what they hold.
 from __future__ import annotations
 
 import html
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -94,10 +95,17 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     if is_traced(value):
         return value
     array = np.asarray(to_si(value, kind, label), dtype=float)
-    if not np.all(RULES[rule].holds(array)):
-        bad = array[~RULES[rule].holds(array)]
-        got = f"{bad.flat[0]:g} {KINDS[kind].si}".rstrip()
-        raise InputError(label, RULES[rule].words, got, RULES[rule].advice)
+    # As in texts: a number below the smallest normal double has few digits, and its reciprocal may
+    # be infinite.
+    small = (array != 0) & (np.abs(array) < sys.float_info.min)
+    within = "lie within the range of double precision", "give 0 or a larger number"
+    for wrong, words, advice in (
+        (~RULES[rule].holds(array), RULES[rule].words, RULES[rule].advice),
+        (small, *within),
+    ):
+        if np.any(wrong):
+            got = f"{array[wrong].flat[0]:g} {KINDS[kind].si}".rstrip()
+            raise InputError(label, words, got, advice)
     return array
 
 

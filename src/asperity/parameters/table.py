@@ -19,8 +19,8 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from asperity.errors import Argument, InputError, closest
-from asperity.parameters.arguments import shown
+from asperity.errors import Argument, InputError, closest, require
+from asperity.parameters.arguments import shown, typed
 from asperity.parameters.parameter import Names, Output, Parameter
 
 
@@ -78,6 +78,7 @@ MODULATION = _parameters(
 EXPERIMENT: Mapping[str, Parameter] = MappingProxyType({**MACHINE, **DRIVE, **MODULATION})
 
 
+@typed
 def plain_name(name: str) -> str:
     """The bare name of a parameter, without additions by Python or a message.
 
@@ -86,8 +87,9 @@ def plain_name(name: str) -> str:
     return name.removeprefix("law.").rstrip("_")
 
 
+@typed
 @cache
-def law_parameters(law: Any) -> Mapping[str, Parameter]:
+def law_parameters(law: type) -> Mapping[str, Parameter]:
     """The parameters of a friction law, as its fields declare them.
 
     Parameters
@@ -98,9 +100,10 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
     Raises
     ------
     InputError
-        If a field has the name of a parameter of the experiment.
+        If it is no such class, or a field has the name of a parameter of the experiment.
     """
-    parameters = {}
+    require(dataclasses.is_dataclass(law), "law", "be the class of a law", shown(law))
+    parameters: dict[str, Parameter] = {}
     for declared in dataclasses.fields(law):
         name = plain_name(declared.name)
         if name in EXPERIMENT:
@@ -122,6 +125,7 @@ def point_parameters(law: Any) -> dict[str, Parameter]:
     return {**law_parameters(law), **EXPERIMENT}
 
 
+@typed
 def all_parameters(laws: Iterable[Any]) -> dict[str, Parameter]:
     """`point_parameters` of several laws together.
 
@@ -138,6 +142,7 @@ def required(law: Any) -> tuple[str, ...]:
     return tuple(name for name, p in point_parameters(law).items() if p.default is None)
 
 
+@typed
 def canonical_name(name: str, known: Mapping[str, Parameter]) -> str | None:
     """The one name of a parameter of `known`, by that name or an alias; None if it has none."""
     if name in known:
@@ -148,6 +153,7 @@ def canonical_name(name: str, known: Mapping[str, Parameter]) -> str | None:
     return next((p.name for p in known.values() if name in p.aliases), None)
 
 
+@typed
 def known_name(
     name: str, known: Mapping[str, Parameter], label: str | Argument = "parameter"
 ) -> str:
@@ -164,6 +170,7 @@ def known_name(
     return canonical
 
 
+@typed
 def suggestion(name: str, known: Mapping[str, Parameter]) -> str:
     """``did you mean 'x'?``, or the names there are."""
     meant = [p.name for p in known.values() if name.lower() in p.meant]
@@ -181,6 +188,7 @@ _WORDS = re.compile(
 )
 
 
+@typed
 def symbol_of(parameter: Parameter, names: Names = "friction") -> str:
     """LaTeX symbol of a parameter in a set of names.
 
@@ -196,7 +204,8 @@ def symbol_of(parameter: Parameter, names: Names = "friction") -> str:
     return usual[1].strip()
 
 
-def display_name(name: str, names: Names = "friction", law: Any = None) -> str:
+@typed
+def display_name(name: str, names: Names = "friction", law: type | None = None) -> str:
     """A name, or a quotient or difference of names, as plain text in a set of names.
 
     Parameters
@@ -213,7 +222,8 @@ def display_name(name: str, names: Names = "friction", law: Any = None) -> str:
     return re.sub(r"[A-Za-z]\w*", lambda word: known.get(plain_name(word[0]), word[0]), name)
 
 
-def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
+@typed
+def in_names(text: str, names: Names = "friction", law: type | None = None) -> str:
     """A sentence with the names of parameters in it written in a set of names."""
     if names == "friction":
         return text

@@ -161,10 +161,8 @@ class FitOptions(Estimation):
     def _order_of_a_gauge(self) -> FitOptions:
         # Without a corner frequency there is no low-pass that could have an order.
         same = self.gauge_order == FitOptions.model_fields["gauge_order"].default
-        rule, advice = (
-            f"go with {Argument('gauge')}",
-            "give its corner frequency, of a recording, or leave it out",
-        )
+        rule = f"go with {Argument('gauge')}"
+        advice = "give its corner frequency, of a recording, or leave it out"
         require(same or self.gauge is not None, "gauge_order", rule, self.gauge_order, advice)
         return self
 

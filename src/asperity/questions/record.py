@@ -266,7 +266,8 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
     if reported["type"] == "extra_forbidden":
         known = _fields_at(model, reported["loc"][:-1])
         # A word that only one field takes says more than the likeness of names: scale = "log".
-        meant = [n for n in known if reported["input"] in _choices(model, reported["loc"], n)]
+        word = reported["input"] if isinstance(reported["input"], str) else None
+        meant = [n for n in known if word in _choices(model, reported["loc"], n)]
         near = f"did you mean '{meant[0]}'?" if len(meant) == 1 else closest(place[-1], known)
         advice = near if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)

@@ -165,7 +165,7 @@ class Measurement(Question):
 
     @model_validator(mode="after")
     def _consistent(self) -> Measurement:
-        frequency, modulated = Argument("measure.frequency"), Argument("measure.modulated")
+        frequency = Argument("measure.frequency")
         given = self.frequency is not None or not self.exact_frequency
         rule, advice = f"go with {frequency}", "give the frequency or leave it out"
         require(given, "measure.exact_frequency", rule, "none", advice)
@@ -191,10 +191,14 @@ class Measurement(Question):
             rule, got = f"go without {Argument('measure.holds')}", "both"
             advice = "write 0 as the velocity of a hold"
             require(self.holds is None, "measure.velocities", rule, got, advice)
+        # Steps and holds alone say too that there is no modulation.
+        named = next((n for n in ("steps", "holds") if getattr(self, n)), "modulated")
+        kind = Argument(f"measure.{named}")
         alone = self.modulated is None or not self.stick_slip
-        require(alone, "measure.stick_slip", f"go without {modulated}", "both", "leave one out")
+        require(alone, "measure.stick_slip", f"go without {kind}", "both", "leave one out")
         if self.modulated is False or self.stick_slip:
-            kind = Argument("modulated", value="False")
+            if named == "modulated":
+                kind = Argument("modulated", value="False")
             for name in _OF_MODULATION[: None if self.stick_slip else -1]:
                 got, field = getattr(self, name), type(self).model_fields[name]
                 other = Argument("measure.stick_slip") if self.stick_slip else kind

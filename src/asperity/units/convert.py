@@ -90,7 +90,8 @@ def from_si(value: Any, unit: str, kind: str) -> Any:
     kind_of(kind)
     require_text(unit, "unit")
     factor = unit_factor(normalised(unit), kind, "unit", unit)
-    if isinstance(value, int | float) and math.isfinite(value):
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    if plain and math.isfinite(value):
         return float(EXACT.divide(Decimal(repr(float(value))), factor))
     if not is_traced(value):
         array = np.asarray(value)
@@ -120,21 +121,27 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
     InputError
         If there is no such kind, or an argument has another type.
     """
-    spec = kind_of(kind)
-    if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
-        raise InputTypeError("value", "be a number", shown(value))
-    if not (type(digits) is int and digits >= 0):
-        raise InputTypeError("digits", "be a whole number from 0", shown(digits))
-    return quantity_text(value, spec.si, digits)
+    return quantity_text(value, kind_of(kind).si, digits)
 
 
 def quantity_text(value: float, unit: str, digits: int = 4) -> str:
-    """Text of a value, in an SI unit, in the unit that reads best."""
+    """Text of a value, in an SI unit, in the unit that reads best.
+
+    Raises
+    ------
+    InputError
+        If an argument has another type.
+    """
+    if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
+        raise InputTypeError("value", "be a number", shown(value))
+    require_text(unit, "unit")
+    if not (type(digits) is int and digits >= 0):
+        raise InputTypeError("digits", "be a whole number from 0", shown(digits))
     value = float(value)
-    shown, power = display_unit(value, unit, digits)
+    best, power = display_unit(value, unit, digits)
     if value and math.isfinite(value):
         value = float(Decimal(repr(value)).scaleb(-power))
-    return f"{value:.{digits}g} {shown}".rstrip()
+    return f"{value:.{digits}g} {best}".rstrip()
 
 
 def display_unit(value: float, unit: str, digits: int = 4) -> tuple[str, int]:

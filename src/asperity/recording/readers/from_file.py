@@ -305,7 +305,11 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
         try:
             yield caught
         except InputError as error:
-            raise type(error)(printable(str(error), _LONGEST)) from None
+            shortened = printable(str(error), _LONGEST)
+            # An error that needs no shortening keeps its parts.
+            if shortened == str(error):
+                raise
+            raise type(error)(shortened) from None
 
 
 def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:
