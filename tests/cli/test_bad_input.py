@@ -497,7 +497,7 @@ HOLDS = "hold_time,healing,V,K\n1,0.01,1e-6,1e4\n10,0.02,1e-6,1e4\n"
         (HOLDS, ("--fix", "V=2 um/s"), "--fix V must be given once, got a column of the data too"),
         (READINGS, ("--prior", "A=0.01+-0"), "--prior A must have a positive deviation, got 0"),
         (READINGS, ("--prior", "A=0.01+-0.1 m"), "--prior A must be a pure number"),
-        (READINGS, ("--gauge-order", "2"), "--gauge-order must go with a recording, got 2 with a"),
+        (READINGS, ("--gauge-order", "2"), "--gauge-order must go with --gauge, got 2; give its"),
         (READINGS, ("--rate", "1 Hz"), "--rate must go with a recording, got a table"),
         (READINGS, ("--load", "1"), "--load must go with a recording, got a table"),
         (READINGS, ("--recipe", "nix.toml"), "--recipe must go with a recording, got a table"),
@@ -550,6 +550,7 @@ def test_a_law_whose_file_ends_the_program(asperity, tmp_path) -> None:
 
 def test_a_sample_without_a_name(asperity, tmp_path) -> None:
     refused(asperity("samples", "--out", tmp_path / "a.csv"), "NAME must be given with --out")
+    refused(asperity("samples", "--seed", "3"), "NAME must be given with --seed")
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,10 @@ import asperity as asp
 from asperity import Slider, laws
 from asperity.errors import InputError
 from asperity.experiment import stick_slip_response
-from asperity.measurement.stick_slip.campaign import StickSlipCampaign, of_campaign
+from asperity.measurement.stick_slip.campaign import StickSlipCampaign
 from asperity.measurement.stick_slip.catalogue import COLUMNS, write_catalogue
 from asperity.measurement.stick_slip.events import SlipEvents
+from asperity.measurement.stick_slip.healing import of_campaign
 from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 from asperity.measurement.stick_slip.threshold import linear_frequency, thresholds
 from asperity.recording import Channel, Trace

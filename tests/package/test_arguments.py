@@ -148,6 +148,16 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.write([], "a.csv"), "data must hold a measurement, got none"),
         (lambda: asp.tribometer.Recorder(rate=9.0, clock_error="x"), "Recorder.clock_error must"),
         (lambda: asp.Slider(LAW, spring=-1.0, load=7.0), "slider.spring must be positive, got -1"),
+        (lambda: asp.sensitivities(SLIDER, **{**POINT, "velocity": np.empty(0)}), "have a point"),
+        (lambda: asp.units.from_si(["x"], "um/s", "velocity"), "value must be a number or an arr"),
+        (lambda: asp.units.from_si(1.0, 3, "velocity"), "unit must be a text, got 3"),
+        (lambda: asp.units.to_si(1.0, ["velocity"], "x"), "units.kind must be a text, got an arr"),
+        (lambda: asp.units.format_si("x", "velocity"), "value must be a number, got a str"),
+        (lambda: asp.units.format_si(1.0, "velocity", "4"), "digits must be a whole number from"),
+        (lambda: asp.air.transfer_function(9.0, W0=7, M=1, lambda_z=1e-6, layer=3), "layer must"),
+        (lambda: asp.air.NormalContact(7.0, 1e-6).load("fast"), "closure must be a finite number"),
+        (lambda: asp.air.NormalContact(7.0, 1e-6).load_harmonics(1e-7, 2.5), "count must be a who"),
+        (lambda: Axis.parse(3), "text must be a text, got 3"),
     ],
 )
 def test_what_no_call_may_pass_on(call, sentence) -> None:

@@ -320,3 +320,11 @@ def test_numbers_are_radians_as_they_are() -> None:
 def test_what_is_no_angle(angle: str) -> None:
     with pytest.raises(InputError, match="tilt must be an angle in rad or deg"):
         to_radians(angle, "tilt")
+
+
+@pytest.mark.parametrize("text", ["1e-320 m", "2.2e-308 m", "-1e-303 um"])
+def test_a_number_with_too_few_digits_is_refused(text: str) -> None:
+    """Of doubles below the smallest normal one some have an infinite reciprocal."""
+    with pytest.raises(InputError, match="lie within the range of double precision"):
+        to_si(text, "length", "slider.x")
+    assert to_si("2.3e-308 m", "length", "slider.x") == 2.3e-308

@@ -14,12 +14,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.air.layer import AirLayer
 from asperity.air.normal_contact import as_real
 from asperity.air.transfer import effective_modulation
 from asperity.arrays import Float
 from asperity.errors import InputError, require
+from asperity.parameters.arguments import typed
 
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
 #: monotone over decades, so that a few points a decade reveal it.
@@ -56,15 +58,16 @@ class InverseResult:
         return bool(self.solutions)
 
 
+@typed
 def patch_radius(
-    ratio: float,
-    frequency: float,
+    ratio: ArrayLike,
+    frequency: ArrayLike,
     *,
-    W0: float,
-    M: float,
-    lambda_z: float,
+    W0: ArrayLike,
+    M: ArrayLike,
+    lambda_z: ArrayLike,
     layer: AirLayer,
-    bracket: tuple[float, float] = (1e-5, 10.0),
+    bracket: ArrayLike = (1e-5, 10.0),
 ) -> InverseResult:
     """Radii R (m) of the patch of contacts at which eps_eff/eps equals `ratio`.
 
@@ -94,15 +97,16 @@ def patch_radius(
     return _invert("R", ratio, frequency, (W0, M, lambda_z), layer, bracket)
 
 
+@typed
 def gap(
-    ratio: float,
-    frequency: float,
+    ratio: ArrayLike,
+    frequency: ArrayLike,
     *,
-    W0: float,
-    M: float,
-    lambda_z: float,
+    W0: ArrayLike,
+    M: ArrayLike,
+    lambda_z: ArrayLike,
     layer: AirLayer,
-    bracket: tuple[float, float] = (1e-8, 1e-2),
+    bracket: ArrayLike = (1e-8, 1e-2),
 ) -> InverseResult:
     """Gaps h0 (m) at which eps_eff/eps equals `ratio`.
 
@@ -123,11 +127,11 @@ def _check_single(*values: object) -> None:
 
 def _invert(
     field: str,
-    ratio: float,
-    frequency: float,
-    machine: tuple[float, float, float],
+    ratio: ArrayLike,
+    frequency: ArrayLike,
+    machine: tuple[ArrayLike, ArrayLike, ArrayLike],
     layer: AirLayer,
-    bracket: tuple[float, float],
+    bracket: ArrayLike,
 ) -> InverseResult:
     """Solutions of the field of the layer; `machine` is W0, M and lambda_z."""
     _check_single(ratio, frequency, layer, *machine)
@@ -153,15 +157,15 @@ def _invert(
     text = "found"
     if not result:
         text = (
-            f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {ratio:g}; "
+            f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {wanted:g}; "
             f"there it ranges from {lowest:.6g} to {highest:.6g}"
         )
     return InverseResult(result, lowest, highest, text)
 
 
-def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
+def _limits(bracket: ArrayLike) -> tuple[float, float]:
     ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
-    rule, got, advice = "be two ascending lengths", f"{bracket} m", "swap or correct them"
+    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
     require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
     return float(ends[0]), float(ends[1])
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from asperity.air.normal_contact import Real, as_real
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError
-from asperity.parameters.arguments import broadcast_shape, one_of
+from asperity.parameters.arguments import broadcast_shape, one_of, typed
 
 GasFlow = Literal["continuum", "slip", "free-molecular"]
 #: Kind of quantity of the fields of a layer.
@@ -66,6 +66,7 @@ def _ratio_by_asymptotics(s: Float) -> Complex:
     return ratio
 
 
+@typed
 def bessel_ratio(squeeze: ArrayLike) -> Any:
     """J2(gamma R)/J0(gamma R) at gamma R = (1 - i)/sqrt(2) s, for any s >= 0.
 
@@ -238,6 +239,7 @@ def _profile(rho: Float, s: Float) -> Complex:
     return np.where(s < 1, top / sum(terms), 1 - bare)
 
 
+@typed
 def shear_viscosity_ratio(
     V: ArrayLike, *, W0: ArrayLike, A: ArrayLike, layer: AirLayer, as_printed: bool = False
 ) -> Real:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import factorial
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.parameters import obeying
-from asperity.parameters.arguments import broadcast_shape
+from asperity.parameters.arguments import at_least, broadcast_shape, typed
 
 #: A number or an array of numbers, in SI.
 Real: TypeAlias = float | Float
@@ -72,7 +72,9 @@ class NormalContact:
 
     def load(self, closure: ArrayLike) -> Real:
         """Return the load W = W0 exp((h0 - h)/lambda_z) (N) at the closure h0 - h (m)."""
-        return self.W0 * np.exp(np.asarray(closure, dtype=float) / self.lambda_z)
+        relative = as_real("NormalContact.closure", closure, "length", "finite") / self.lambda_z
+        load: Real = self.W0 * np.exp(relative)
+        return load
 
     def closure(self, load: ArrayLike) -> Real:
         """Closure h0 - h = lambda_z ln(W/W0) (m) under the normal load W (N).
@@ -86,7 +88,8 @@ class NormalContact:
         closure: Real = self.lambda_z * np.log(relative)
         return closure
 
-    def load_harmonics(self, amplitude: ArrayLike, count: int = 4) -> Float:
+    @typed
+    def load_harmonics(self, amplitude: ArrayLike, count: Annotated[int, at_least(1)] = 4) -> Float:
         """Harmonics of W/W0 when the gap moves sinusoidally, without linearising.
 
         With h = h_mean - a cos(wt) and a mean load that stays W0, the law gives exactly
@@ -124,7 +127,10 @@ class NormalContact:
         rise: Real = self.lambda_z * np.where(beta < 1, small, np.log(ive(0, beta)) + beta)[()]
         return rise
 
-    def closure_harmonics(self, epsilon: ArrayLike, count: int = 4) -> Float:
+    @typed
+    def closure_harmonics(
+        self, epsilon: ArrayLike, count: Annotated[int, at_least(1)] = 4
+    ) -> Float:
         """Harmonics (m) of the closure when the contacts' load is sinusoidal.
 
         For W = W0 (1 + eps cos wt) and rho = eps/(1 + sqrt(1 - eps^2)),

@@ -22,9 +22,10 @@ from numpy.typing import ArrayLike
 from asperity.air.layer import AirLayer
 from asperity.air.normal_contact import NormalContact, Real, as_real
 from asperity.errors import InputError
-from asperity.parameters.arguments import broadcast_shape
+from asperity.parameters.arguments import broadcast_shape, typed
 
 
+@typed
 def transfer_function(
     frequency: ArrayLike,
     *,
@@ -87,6 +88,7 @@ def _reciprocal(denominator: Any) -> Any:
     return np.where(d == 0, np.inf, 1 / safe + 0.0)[()]
 
 
+@typed
 def effective_modulation(
     frequency: ArrayLike,
     *,
@@ -104,6 +106,7 @@ def effective_modulation(
     return modulus
 
 
+@typed
 def modulation_phase(
     frequency: ArrayLike,
     *,
@@ -121,6 +124,7 @@ def modulation_phase(
     return phase
 
 
+@typed
 def air_vacuum_ratio(
     frequency: ArrayLike, *, W0: ArrayLike, M: ArrayLike, lambda_z: ArrayLike, layer: AirLayer
 ) -> Real:
@@ -134,8 +138,6 @@ def air_vacuum_ratio(
     InputError
         Also if `layer` is None.
     """
-    if layer is None:
-        raise InputError("air_vacuum_ratio.layer", "be an AirLayer", "None", "give the layer")
     air = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
     vacuum = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z)
     return air / vacuum

@@ -1,8 +1,9 @@
-"""Coefficients of Runge-Kutta methods: explicit ones of order 5 and 8, and collocation.
+"""Coefficients of Runge-Kutta methods: explicit of order 8, Rosenbrock of order 5, collocation.
 
 Sources: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
-(Springer, 1993), sections II.5 and II.6; E. Hairer, G. Wanner, Solving Ordinary Differential
-Equations II, 2nd ed. (Springer, 1996), section IV.5.
+(Springer, 1993), section II.5; E. Hairer, G. Wanner, Solving Ordinary Differential
+Equations II, 2nd ed. (Springer, 1996), sections IV.5 and IV.7;
+G. Steinebach, BIT Numer. Math. 63, 27 (2023).
 """
 
 from __future__ import annotations
@@ -65,33 +66,47 @@ def dormand_prince_8() -> ExplicitTableau:
     )
 
 
-class LowOrderTableau(NamedTuple):
-    """The method of order 5 of Dormand and Prince, with dense output of order 4.
+class RosenbrockTableau(NamedTuple):
+    """The method Rodas5P of order 5, with dense output of order 4.
+
+    In the transformed stages u_k of length h of Hairer and Wanner (1996), eq. (7.25):
+
+        (1 / (gamma h) - J) u_k = f(t + nodes_k h, y + sum A_kj u_j) + sum C_kj u_j / h
+                                  + h by_time_k df/dt.
 
     Attributes
     ----------
-    C : array, shape (7,)
+    gamma : float
+    nodes : array, shape (8,)
         Times of the stages in parts of the step.
-    A : array, shape (7, 7)
-        Row k gives the state at stage k; the last row gives the end of the step.
-    E : array, shape (7,)
-        Weights of the error estimate.
-    D : array, shape (7,)
-        Weights of the last term of the dense output.
+    A, C : array, shape (8, 8)
+        The last state plus the last stage is the end of the step, and this stage estimates the
+        error of the solution of order 4.
+    by_time : array, shape (8,)
+    dense : array, shape (3, 8)
+        Dense output y0 + x (y1 - y0 + (1 - x) (d0 + x (d1 + x d2))), of d = dense @ u.
     """
 
-    C: Float
+    gamma: float
+    nodes: Float
     A: Float
-    E: Float
-    D: Float
+    C: Float
+    by_time: Float
+    dense: Float
 
 
 @cache
-def dormand_prince_5() -> LowOrderTableau:
+def rodas_5p() -> RosenbrockTableau:
     """The coefficients, from a file."""
-    table = tomllib.loads(files(__package__).joinpath("dormand_prince_5.toml").read_text())
-    C, E, D = (np.array(table[name]) for name in "CED")
-    return LowOrderTableau(C, _rows(table["A"], 7), E, D)
+    table = tomllib.loads(files(__package__).joinpath("rodas_5p.toml").read_text())
+    return RosenbrockTableau(
+        table["gamma"],
+        np.array(table["nodes"]),
+        _rows(table["A"], 8),
+        _rows(table["C"], 8),
+        np.array(table["by_time"]),
+        np.array(table["dense"]),
+    )
 
 
 def _rows(rows: list[list[float]], columns: int) -> Float:

@@ -26,9 +26,9 @@ Examples:
     "File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
     click.Path(path_type=Path),
 )
-@option("--seed", None, "Of the noise.", Count(), default=0, show_default=True)
+@option("--seed", None, "Of the noise; 0 by default.", Count())
 @output_options()
-def samples(name: str | None, out: Path | None, seed: int, output: Output) -> None:
+def samples(name: str | None, out: Path | None, seed: int | None, output: Output) -> None:
     """List the sample recordings, or make one of them.
 
     NAME is one of the list. Law and numbers of the simulated slider are printed, V as it is at the
@@ -43,7 +43,9 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
     from asperity.units import format_si
 
     if name is None:
-        require(out is None, "NAME", "be given with --out", "nothing", "name a sample of the list")
+        for given, value in (("--out", out), ("--seed", seed)):
+            advice = "name a sample of the list"
+            require(value is None, "NAME", f"be given with {given}", "nothing", advice)
         titles = {sample: known.protocol(sample).title for sample in known.names()}
         output.answer(lambda: titles, lambda: [Section("", rows=tuple(titles.items()))], indent="")
         return
@@ -52,7 +54,7 @@ def samples(name: str | None, out: Path | None, seed: int, output: Output) -> No
     check_path(target, "--out")
     output_file(target, "--out")
     truth = known.protocol(name)
-    trace = known.record(name, seed)
+    trace = known.record(name, seed or 0)
     write(trace, target)
     numbers = {key: number.value for key, number in truth.numbers.items()}
     numbers["V"] = truth.programme.level.velocity

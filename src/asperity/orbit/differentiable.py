@@ -637,6 +637,7 @@ def sensitivities(
     model = ResponseFunction.of(ParametrisedProblem.of(problem), harmonics=2, multipliers=True)
     numbers = model.equations.values(problem)
     points = int(np.prod(shape, dtype=int))
+    require(points, "arguments", "have a point", "an array of size 0", "give a value")
     blocks = [
         model.value_and_jacobian({n: v[i : i + _BLOCK] for n, v in numbers.items()})
         for i in range(0, points, _BLOCK)

@@ -41,7 +41,10 @@ def shown(value: Any) -> str:
         return f"a {type(value).__name__} of {len(value)}"
     if callable(value):
         return f"the function {getattr(value, '__name__', type(value).__name__)}"
-    name = type(value).__name__
+    return _with_article(type(value).__name__)
+
+
+def _with_article(name: str) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
@@ -215,7 +218,7 @@ def _words(kind: Any) -> str:
         return " or ".join(dict.fromkeys(map(_words, parts)))
     if origin is Annotated:
         return _words(parts[0])
-    return _WORDS.get(origin) or f"a {origin.__name__}"
+    return _WORDS.get(origin) or _with_article(origin.__name__)
 
 
 def at_least(least: int) -> Callable[[int, str], int]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WrapValidator, model_validator
 
-from asperity.errors import InputError, require
+from asperity.errors import Argument, InputError, require
 from asperity.questions.record import (
     Given,
     Names,
@@ -156,6 +156,17 @@ class FitOptions(Estimation):
     gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
     fit_rate: float | str | None = None
     stiffness_from: Span | None = None
+
+    @model_validator(mode="after")
+    def _order_of_a_gauge(self) -> FitOptions:
+        # Without a corner frequency there is no low-pass that could have an order.
+        same = self.gauge_order == FitOptions.model_fields["gauge_order"].default
+        rule, advice = (
+            f"go with {Argument('gauge')}",
+            "give its corner frequency, of a recording, or leave it out",
+        )
+        require(same or self.gauge is not None, "gauge_order", rule, self.gauge_order, advice)
+        return self
 
 
 class _OfData(Question, FitOptions):

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
 
 import numpy as np
 from pydantic import (
@@ -265,7 +265,10 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
     value = shown(reported["input"])
     if reported["type"] == "extra_forbidden":
         known = _fields_at(model, reported["loc"][:-1])
-        advice = closest(place[-1], known) if known else "leave it out"
+        # A word that only one field takes says more than the likeness of names: scale = "log".
+        meant = [n for n in known if reported["input"] in _choices(model, reported["loc"], n)]
+        near = f"did you mean '{meant[0]}'?" if len(meant) == 1 else closest(place[-1], known)
+        advice = near if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)
     if reported["type"] == "literal_error":
         expected = reported["ctx"]["expected"].replace("'", "")
@@ -290,14 +293,26 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
 
 def _fields_at(model: type[BaseModel], place: tuple[Any, ...]) -> list[str]:
     """Names of the fields of the table at a place."""
+    return list(_types_at(model, place))
+
+
+def _choices(model: type[BaseModel], place: tuple[Any, ...], name: str) -> list[Any]:
+    """Words from which a field of the table around a place is chosen."""
+    kind = _types_at(model, place[:-1])[name]
+    kinds = [kind, *get_args(kind)]
+    return [word for one in kinds if get_origin(one) is Literal for word in get_args(one)]
+
+
+def _types_at(model: type[BaseModel], place: tuple[Any, ...]) -> dict[str, Any]:
+    """Types of the fields of the table at a place, by their names in a file."""
     at: Any = model
     for part in place:
         fields = at.model_fields if _is_model(at) else {}
         kind = next((f.annotation for n, f in fields.items() if part in (n, f.alias)), at)
         at = next(iter(_models_in(kind)), None)
         if at is None:
-            return []
-    return [f.alias or name for name, f in at.model_fields.items()]
+            return {}
+    return {f.alias or name: f.annotation for name, f in at.model_fields.items()}
 
 
 def _is_model(kind: Any) -> bool:

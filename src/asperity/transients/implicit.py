@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.runge_kutta import radau_iia
-from asperity.algebra.small_systems import jacobian_columns, product, solve_columns
+from asperity.algebra.small_systems import jacobian_columns, solve_columns, spectral_radius
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
@@ -38,9 +38,6 @@ _NEWTON_SHARE = 0.01
 
 #: Product of step and largest eigenvalue below which explicit steps would cost less.
 _MILD = 8.0
-
-#: Squarings of the Jacobian in the estimate of its largest eigenvalue.
-_SQUARINGS = 4
 
 
 class _ModalTableau(NamedTuple):
@@ -171,19 +168,7 @@ def _step(
     filtered = (inverses[:, :, 0].real @ raw[:n]) * real / h
     error = jnp.concatenate([filtered, raw[n:]]) / scale
     size = jnp.sqrt(jnp.mean(jnp.square(error)))
-    return Z, jnp.where(converged, size, jnp.inf), steps, _largest_eigenvalue(jacobian)
-
-
-def _largest_eigenvalue(matrix: Array) -> Array:
-    """Upper estimate of the modulus: limit of |matrix^k|^(1/k)."""
-    sizes = []
-    for _ in range(_SQUARINGS):
-        sizes.append(jnp.abs(matrix).max() + 1e-300)
-        matrix = product(matrix / sizes[-1], matrix / sizes[-1])
-    root = jnp.abs(matrix).max()
-    for size in reversed(sizes):
-        root = size * jnp.sqrt(root)
-    return root
+    return Z, jnp.where(converged, size, jnp.inf), steps, spectral_radius(jacobian)
 
 
 def _left(size: Array, rate: Array) -> Array:

@@ -10,8 +10,8 @@ from typing import Any, overload
 
 import numpy as np
 
-from asperity.errors import InputError
-from asperity.units.kinds import KINDS, Kind, kind_of
+from asperity.errors import InputError, InputTypeError
+from asperity.units.kinds import KINDS, Kind, kind_of, require_text, shown
 from asperity.units.scale import EXACT, normalised, unit_factor
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
@@ -85,12 +85,18 @@ def from_si(value: Any, unit: str, kind: str) -> Any:
     Raises
     ------
     InputError
-        If `unit` is not a unit of `kind`.
+        If `unit` is not a unit of `kind`, or `value` is no number.
     """
     kind_of(kind)
+    require_text(unit, "unit")
     factor = unit_factor(normalised(unit), kind, "unit", unit)
     if isinstance(value, int | float) and math.isfinite(value):
         return float(EXACT.divide(Decimal(repr(float(value))), factor))
+    if not is_traced(value):
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise InputTypeError("value", "be a number or an array of them", shown(value))
+        value = value if hasattr(value, "dtype") else array
     # One rounding instead of two: 10^-n is inexact in binary, 10^n is not.
     if factor < 1:
         return value * float(EXACT.divide(Decimal(1), factor))
@@ -108,8 +114,18 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
         A key of `KINDS`.
     digits : int
         Significant digits.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind, or an argument has another type.
     """
-    return quantity_text(value, kind_of(kind).si, digits)
+    spec = kind_of(kind)
+    if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
+        raise InputTypeError("value", "be a number", shown(value))
+    if not (type(digits) is int and digits >= 0):
+        raise InputTypeError("digits", "be a whole number from 0", shown(digits))
+    return quantity_text(value, spec.si, digits)
 
 
 def quantity_text(value: float, unit: str, digits: int = 4) -> str:
@@ -149,13 +165,6 @@ def is_traced(value: Any) -> bool:
     return jax is not None and isinstance(value, jax.core.Tracer)
 
 
-def _shown(value: Any) -> str:
-    """The value as a line of text; arrays by their type."""
-    if np.ndim(value):
-        return f"an array of {np.asarray(value).dtype}"
-    return f"{value!r}" if isinstance(value, int | float | None) else f"a {type(value).__name__}"
-
-
 def _stacked(rows: list[Any], name: str) -> Any:
     try:
         return np.array(rows, dtype=float)
@@ -170,7 +179,7 @@ def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
         raise InputError(
             name,
             f"be {spec.noun}",
-            _shown(value),
+            shown(value),
             f"give a number in SI or a text like '{spec.example}'",
         )
     bad = array[~np.isfinite(array)]
@@ -200,7 +209,8 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
         raise _beyond_doubles(name, text, spec)
     value = float(EXACT.multiply(digits.scaleb(power if digits else 0, EXACT), factor))
-    if math.isinf(value) or (value == 0 and digits != 0):
+    # Below the smallest normal double a number has few digits, and its reciprocal may be infinite.
+    if math.isinf(value) or (digits and abs(value) < sys.float_info.min):
         raise _beyond_doubles(name, text, spec)
     return value
 

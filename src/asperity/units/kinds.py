@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from types import MappingProxyType
+from typing import Any
 
-from asperity.errors import InputError, closest
+import numpy as np
+
+from asperity.errors import InputError, InputTypeError, closest
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,25 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 )
 
 
+def shown(value: Any) -> str:
+    """A value as a line of text; arrays by their type."""
+    if np.ndim(value):
+        return f"an array of {np.asarray(value).dtype}"
+    if value is None or isinstance(value, int | float):
+        return repr(value)
+    name = type(value).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def require_text(value: object, name: str) -> None:
+    """Refuse what is no text; `asperity.parameters.arguments.typed` stands above this package."""
+    if not isinstance(value, str):
+        raise InputTypeError(name, "be a text", shown(value))
+
+
 def kind_of(kind: str) -> Kind:
     """Look a kind up by name; an unknown name raises `InputError`."""
+    require_text(kind, "units.kind")
     try:
         return KINDS[kind]
     except KeyError:

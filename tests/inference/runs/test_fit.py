@@ -467,6 +467,27 @@ def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, f
         fit([readings(), term.run], "rice-ruina", free, fixed=given)
 
 
+@pytest.mark.parametrize(("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7)])
+def test_a_stiff_machine_hides_its_stiffness_and_nothing_else(monkeypatch, case, stiffness, seed):
+    """The spring relaxes within 0.03 and 0.01 um of slip; samples are 0.3 to 1 um apart.
+
+    Of the second, a minimum lies where a change of the velocity is a sampling interval late.
+    """
+    monkeypatch.setattr(coverage, "STIFFNESS", stiffness)
+    runs = runs_of(
+        CASES[case], seed + 1, noise=lambda random, n, rate: 2e-4 * random.normal(size=n)
+    )
+    fitted = fit(list(runs)[-1], "rice-ruina", FREE)
+    for name in FREE:
+        p = fitted.parameters[name]
+        low, high = p.interval_95
+        width = max(high - p.value, p.value - low)
+        assert abs(p.value - TRUE[name]) < 2 * width
+        assert width < 0.15 * p.value
+    low, high = fitted.parameters["K"].interval_95
+    assert low / 1.5 < stiffness * coverage.LOAD < 1.5 * high
+
+
 def test_a_transient_longer_than_its_recording_leaves_its_length_open(monkeypatch):
     """It is a trend, of any D0 and of B in proportion, whose A - B has no sign."""
     monkeypatch.setitem(coverage.TRUTH, "D0", 60e-6)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from asperity.algebra.runge_kutta import rodas_5p
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.motion import recorded_friction, run_equations
 from asperity.inference.runs.reading import reading_at
@@ -19,6 +20,11 @@ TIMES = np.linspace(0.0, 70.0, 281)
 FREE = ("A", "B", "D0", "K", "alpha", "shift_1", "start_force", "start_state_0")
 MOTION = run_equations(get_law("linker-dieterich"), 3e-6)
 AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_state_0": -0.3}
+
+
+#: The spring relaxes within A W/K = 0.03 um of slip: the slider moves 7 to 20 times as far between
+#: two samples.
+STIFF = {**AT, "K": 3e5}
 
 
 def by_scipy(values, TIMES=TIMES):
@@ -50,30 +56,32 @@ def by_scipy(values, TIMES=TIMES):
     return friction
 
 
-@pytest.fixture(scope="module")
-def computed():
+@pytest.fixture(scope="module", params=[AT, STIFF], ids=["soft", "stiff"])
+def computed(request):
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
-    return recorded_friction(MOTION, AT, FREE, drive, reading_at(TIMES))
+    computed = recorded_friction(MOTION, request.param, FREE, drive, reading_at(TIMES))
+    return request.param, *computed
 
 
 def test_friction_is_that_of_an_independent_integration(computed):
     # Local errors of 1e-7 relative, of steps that each move the states by some 0.1.
-    np.testing.assert_allclose(computed[0], by_scipy(AT), atol=2e-7)
+    np.testing.assert_allclose(computed[1], by_scipy(computed[0]), atol=2e-7)
 
 
 @pytest.mark.parametrize("name", FREE)
 def test_derivatives_are_those_of_an_independent_integration(computed, name):
-    size = {"K": 4.0, "D0": 1e-8, "shift_1": 1e-2}.get(name, 1e-4)
-    more, less = ({**AT, name: AT[name] + sign * size} for sign in (1, -1))
+    values = computed[0]
+    size = {"K": 1e-3 * values["K"], "D0": 1e-8, "shift_1": 1e-2}.get(name, 1e-4)
+    more, less = ({**values, name: values[name] + sign * size} for sign in (1, -1))
     expected = (by_scipy(more) - by_scipy(less)) / (2 * size)
-    found = computed[1][:, FREE.index(name)]
+    found = computed[2][:, FREE.index(name)]
     # Differences of second order; a shift moves the step across samples.
     near = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
     scale = np.abs(expected).max()
     np.testing.assert_allclose(found[near], expected[near], atol=1e-3 * scale)
 
 
-def test_means_over_blocks_are_those_of_an_independent_integration(computed):
+def test_means_over_blocks_are_those_of_an_independent_integration():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
     # Blocks of 0.6 s, each change of the drive within one, and a gap.
     edges = np.linspace(0.0, 69.0, 116)
@@ -91,6 +99,93 @@ def test_means_over_blocks_are_those_of_an_independent_integration(computed):
     for name, mean, point in zip(FREE, slopes[some].T, points.T, strict=True):
         # That to the time of the step jumps within a fiftieth of a block.
         np.testing.assert_allclose(mean, point, atol=1e-2 * np.abs(point).max(), err_msg=name)
+
+
+def test_the_coefficients_are_of_order_5_and_damp_stiff_modes():
+    """Equations with closed solutions, by stages as the table's docstring writes them."""
+    table = rodas_5p()
+
+    def step(f, J, by_time, t, y, h):
+        inverse, u = np.linalg.inv(np.eye(y.size) / (table.gamma * h) - J(t, y)), []
+        for k in range(8):
+            state = y + sum((a * v for a, v in zip(table.A[k], u, strict=False)), 0 * y)
+            right = f(t + table.nodes[k] * h, state) + h * table.by_time[k] * by_time(t, y)
+            u.append(
+                inverse
+                @ (right + sum((c * v for c, v in zip(table.C[k], u, strict=False)), 0 * y) / h)
+            )
+        new = state + u[-1]
+        d = table.dense @ np.array(u)
+        return new, u[-1], y + 0.5 * (new - y + 0.5 * (d[0] + 0.5 * (d[1] + 0.5 * d[2])))
+
+    # y1' = -2 t y1^2, y1 = 1/(1 + t^2), and y2' = y1 y2 cos t / (...): y2 = exp(sin t) by its rate.
+    def f(t, y):
+        return np.array([-2 * t * y[0] ** 2, y[1] * np.cos(t) + y[0] - 1 / (1 + t**2)])
+
+    def J(t, y):
+        return np.array([[-4 * t * y[0], 0.0], [1.0, np.cos(t)]])
+
+    def by_time(t, y):
+        return np.array([-2 * y[0] ** 2, -y[1] * np.sin(t) + 2 * t / (1 + t**2) ** 2])
+
+    def solution(t):
+        return np.array([1 / (1 + t**2), np.exp(np.sin(t))])
+
+    sizes = np.array([0.2, 0.1, 0.05, 0.025])
+    errors = []
+    for h in sizes:
+        y, worst, middle = solution(0.3), 0.0, 0.0
+        for k in range(round(1.2 / h)):
+            y, estimate, half = step(f, J, by_time, 0.3 + k * h, y, h)
+            worst = max(worst, np.abs(estimate).max())
+            middle = max(middle, np.abs(half - solution(0.3 + (k + 0.5) * h)).max())
+        errors.append([np.abs(y - solution(1.5)).max(), worst, middle])
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])[-1]
+    # The solution is of order 5; the estimate is the local error of order 4, and so is the error of
+    # the dense output, of one step each.
+    assert orders[0] > 4.7
+    assert orders[1] > 4.7
+    assert orders[2] > 4.7
+    linear = step(
+        lambda t, y: -1e9 * y,
+        lambda t, y: np.array([[-1e9]]),
+        lambda t, y: 0 * y,
+        0.0,
+        np.ones(1),
+        1.0,
+    )
+    assert abs(linear[0][0]) < 1e-6
+
+
+def test_a_load_of_hundreds_of_lines_has_room():
+    """Some 8 steps follow the evolution of friction after each change of the load."""
+    pieces = 300
+    edges = np.linspace(0.0, 300.0, pieces + 1)
+    load = 1 + 0.01 * np.random.default_rng(1).normal(size=pieces + 1)
+    load[0] = 1.0
+    one, nothing = np.ones(pieces), np.zeros(pieces)
+    drive = Drive(edges, one, nothing, load[:-1], np.diff(load) / np.diff(edges))
+    times = np.linspace(0.0, 300.0, 900)
+    values = {**VALUES, "alpha": 0.2, "K": 1e5}
+    friction, _ = recorded_friction(MOTION, values, (), drive, reading_at(times))
+    p = values
+
+    def rates(t, y, k):
+        w = load[k] + drive.load_slope[k] * (t - edges[k])
+        v = p["V0"] * np.exp((y[0] / w - p["mu0"] - p["B"] * y[1]) / p["A"])
+        slope = p["alpha"] / p["B"] * drive.load_slope[k] / w
+        return [p["K"] * (3e-6 - v), (p["V0"] * np.exp(-y[1]) - v) / p["D0"] - slope]
+
+    y, expected = np.array([p["mu0"] * load[0], 0.0]), np.empty(times.size)
+    for k in range(pieces):
+        here = (edges[k] <= times) & ((times < edges[k + 1]) | (k == pieces - 1))
+        at = np.unique([*times[here], edges[k + 1]])
+        solution = solve_ivp(
+            rates, edges[k : k + 2], y, "LSODA", at, args=(k,), rtol=1e-10, atol=1e-12
+        )
+        expected[here] = solution.y[0, : here.sum()] / np.interp(times[here], edges, load)
+        y = solution.y[:, -1]
+    np.testing.assert_allclose(friction, expected, atol=2e-6)
 
 
 def test_a_motion_that_runs_away_is_no_motion():

@@ -151,3 +151,11 @@ def test_a_plan_may_not_name_its_reader(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text('self = 5\nlaw = "rice-ruina"\naxes.K.values = []\n')
     with pytest.raises(InputError, match="self must be a known field"):
         load_plan(tmp_path / "plan.toml")
+
+
+def test_the_word_of_one_field_is_meant_for_it(tmp_path: Path) -> None:
+    """By the likeness of names "scale" is "cases", which takes no such word."""
+    grid = '{ from = 0.1, to = 0.2, count = 3, scale = "log" }'
+    (tmp_path / "plan.toml").write_text(f'law = "rice-ruina"\naxes.epsilon = {grid}\n')
+    with pytest.raises(InputError, match=r"scale must be a known field, .* mean 'spacing'"):
+        load_plan(tmp_path / "plan.toml")

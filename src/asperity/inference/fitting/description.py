@@ -154,7 +154,7 @@ def described_fit(
                 "standard errors"
                 if profiled
                 else "intervals of the normal approximation are wrong there, and those by profile "
-                f"likelihood ({Argument('profile')}) take minutes for a recording"
+                f"likelihood ({Argument('profile')}) take several times as long as the fit"
             )
         )
     return _with_warnings(_fit_with(objective, at, estimates, rivals), outliers, warnings)
@@ -290,7 +290,8 @@ def _profiled(
     """Coordinates whose intervals are by profile likelihood.
 
     All coordinates on request. Otherwise those for which the normal approximation fails, and those
-    correlated with them; but none with recordings, which would take minutes.
+    correlated with them; but none with recordings, which would take several times as long as the
+    fit.
     """
     if everything:
         return set(range(len(objective.unknowns)))

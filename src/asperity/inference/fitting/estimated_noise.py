@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,10 @@ _COARSE = 1e-4
 _EVALUATIONS = 30
 
 
+#: Sort key of minima with noise.
+_DEVIANCE = attrgetter("deviance")
+
+
 def under_drift(objective: Objective) -> Objective:
     """The objective with a slow drift as the noise of all recordings, for the search."""
     terms = (t.under_drift() if isinstance(t, RunTerm) else t for t in objective.terms)
@@ -41,7 +46,8 @@ def with_noise(
 
     `searched` is the objective under a drift, with the given `minima`. A minimisation under white
     noise begins at each of them; if its result is not allowed under the drift, the minimum itself
-    is used too. From each of these starts, noise and parameters are then estimated in turn. The
+    is used too. From each of these starts, noise and parameters are then estimated in turn, and at
+    last from the best result with the delays of all velocity changes at their start values. The
     resulting minima are compared by the likelihood including the noise, because the noise of one
     minimum includes its misfit, and other minima are none under this noise. The objective takes the
     noise of the best minimum.
@@ -67,7 +73,14 @@ def with_noise(
     ends: list[_MinimumWithNoise] = []
     for u in _distinct_starts(objective, starts):
         ends += _estimated_in_turn(objective, u, ends, _COARSE)
-    ends.sort(key=lambda end: end.deviance)
+    # On a stiff machine friction jumps between two samples: the delay of a velocity change then has
+    # a minimum in each sampling interval.
+    u = min(ends, key=_DEVIANCE).u.copy()
+    for i, unknown in enumerate(objective.unknowns):
+        if unknown.nuisance and not unknown.logarithmic:
+            u[i] = unknown.middle
+    ends += _estimated_in_turn(objective, u, ends, _COARSE)
+    ends.sort(key=_DEVIANCE)
     (best,) = _estimated_in_turn(ends[0].objective, ends[0].u, (), objective.tolerance)
     objective.terms = best.objective.terms
     objective.forget()

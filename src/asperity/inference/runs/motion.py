@@ -36,10 +36,12 @@ from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
 from asperity.slider.problem import equation_of_motion
 
-#: Numbers of steps that programs have room for: the second is used if no start can be computed with
-#: the first. A motion with more steps is taken for stick-slip, which a fit of sliding cannot
-#: follow.
-ROOMS = (2048, 32768)
+#: Programs have room for so many steps, and for at least so many for each piece of the drive: after
+#: a change of the load, some 8 follow the evolution of friction.
+_STEPS, _STEPS_EACH = 2048, 16
+#: Room that is used if no start can be computed with less. A motion with more steps is taken for
+#: stick-slip, which a fit of sliding cannot follow.
+MOST_STEPS = 32768
 #: Larger derivatives belong to a motion that runs away; their squares would overflow.
 _STEEPEST = 1e100
 #: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
@@ -79,13 +81,18 @@ def run_equations(
     return equation_of_motion(slider, V, 1.0, inertia=inertia, eta=eta)
 
 
+def room_for(drive: Drive) -> int:
+    """Number of steps of the integrator for which a sliding motion has room."""
+    return max(_STEPS, _STEPS_EACH * len(filled_up(drive).pull))
+
+
 def recorded_friction(
     motion: Motion,
     values: Mapping[str, float],
     free: tuple[str, ...],
     drive: Drive,
     reading: Reading,
-    room: int = ROOMS[0],
+    room: int | None = None,
 ) -> tuple[Float, Float] | None:
     """Friction at the samples of a run; None if the motion runs away or cannot be computed.
 
@@ -101,8 +108,8 @@ def recorded_friction(
         Names in `values` for derivatives.
     drive : Drive
     reading : Reading
-    room : int
-        Largest number of steps of the integrator.
+    room : int, optional
+        Largest number of steps of the integrator, that of `room_for` by default.
 
     Returns
     -------
@@ -113,6 +120,7 @@ def recorded_friction(
     given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
     drive = filled_up(drive)
     arrays, wanted = arranged(given, free, motion.size, len(drive.edges))
+    room = room or room_for(drive)
     friction, slopes, done = through(motion, wanted, arrays, drive, reading.filled_up(), room=room)
     n = len(reading.index)
     f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
@@ -256,7 +264,7 @@ def _friction(
     def state(i: int) -> Array:
         # State by state: states without influence on the force are then not computed.
         c = [curve.coefficients[:, j, i][step] for j in range(5)]
-        return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + (1 - x) * c[4])))
+        return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + x * c[4])))
 
     y = [state(i) for i in range(curve.coefficients.shape[2])]
     piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1

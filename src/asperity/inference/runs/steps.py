@@ -1,7 +1,11 @@
 """Integration of the motion through a recording, with derivatives.
 
-The integrator is the pair of Dormand and Prince (J. Comput. Appl. Math. 6, 19, 1980) of orders 5
-and 4 with adaptive steps that end at every change of the drive, and its continuous extension.
+The integrator is the Rosenbrock method Rodas5P (G. Steinebach, BIT Numer. Math. 63, 27, 2023) of
+order 5, with adaptive steps that end at every change of the drive, and its continuous extension. It
+is L-stable: on a stiff machine the spring relaxes within a small part of the slip between samples,
+and an explicit method would take steps at its limit of stability, where the motion is accurate and
+its derivatives are not.
+
 Derivatives are those of the discrete solution at its steps; the ends of steps move with the changes
 of the drive.
 """
@@ -18,8 +22,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.flatten_util import ravel_pytree
 
-from asperity.algebra.runge_kutta import dormand_prince_5
+from asperity.algebra.runge_kutta import rodas_5p
+from asperity.algebra.small_systems import apply, inverse_points
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, shifted
 from asperity.inference.runs.reading import GAIN
@@ -28,10 +34,6 @@ from asperity.slider.named import slider_from
 
 #: Relative and absolute local error of a step, for states of order 1.
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-9
-#: Number of squarings that give the largest eigenvalue within 2 %.
-_SQUARINGS = 8
-#: Steps in the first piece take at most 1 over this number of the room.
-_SHARE_STEADY = 4.0
 #: Number of steps that are differentiated in parallel.
 _IN_PARALLEL = 64
 #: Keys of the departures of the initial states, and of the delays of the edges of the drive.
@@ -124,40 +126,50 @@ def integrated(
     that of the directions.
     """
 
-    def begun(x: Array) -> tuple[Motion, Drive, Mapping[str, Array]]:
-        values = free.values(given, x)
-        return with_values(motion, values), shifted(drive, values), values
-
     def first_states(x: Array) -> Array:
-        now, _, values = begun(x)
-        return _first_states(now, values)
+        values = free.values(given, x)
+        return _first_states(with_values(motion, values), values)
 
-    x = free.numbers(given)
-    taken, curve, steps, done = _steps_taken(*begun(x), room)
+    x, drawn = free.numbers(given), shifted(drive, given)
+    taken, curve, steps, done = _steps_taken(with_values(motion, given), drawn, given, room)
     count, m = len(free.directions), taken.states.shape[1]
     nothing = jax.tree.map(lambda all_: jnp.zeros((count, *all_.shape)), curve)
     if not count:
         return curve, nothing, steps, done
-    ahead = jax.scipy.linalg.block_diag(free.directions, jnp.eye(m))
+    # The steps do not depend on the gauge.
+    names = tuple(name for name in free.names if name != GAIN)
+    numbers = jnp.stack([given[name] for name in names])
+    by_names = free.directions[:, [free.names.index(name) for name in names]]
+    by_edges = free.directions[:, -drawn.edges.size :]
 
     def slopes_of(part: _Step, change: Array) -> tuple[Array, Curve]:
         """Derivatives of the states after a part of the steps, and of the motion at these steps."""
 
-        def one(step: _Step, direction: Array) -> tuple[Array, Curve]:
-            """Derivatives along one direction of the parameters, or of the states."""
+        def one(step: _Step) -> tuple[Array, Curve]:
+            """Derivatives along the directions, and to the states at the beginning of the step.
 
-            def moved(x: Array, y: Array) -> tuple[Array, Curve]:
-                now, drawn, values = begun(x)
-                begin = drawn.edges[step.piece] + step.since
-                length = jnp.where(step.last, drawn.edges[step.piece + 1] - begin, step.length)
-                new, _, rows = _stepped(now, drawn, values, step.piece, begin, length, y)
+            A step depends on two edges only: those of its piece.
+            """
+            ends = step.piece + jnp.arange(2)
+            piece = [all_[step.piece][None] for all_ in drawn[1:]]
+
+            def moved(numbers: Array, edges: Array, y: Array) -> tuple[Array, Curve]:
+                values = {**given, **dict(zip(names, numbers, strict=True))}
+                now, begin = with_values(motion, values), edges[0] + step.since
+                length = jnp.where(step.last, edges[1] - begin, step.length)
+                new, _, rows = _stepped(
+                    now, Drive(edges, *piece), values, jnp.asarray(0), begin, length, y
+                )
                 return new, Curve(begin, length, rows)
 
-            along = direction[: x.size], direction[x.size :]
-            return jax.jvp(moved, (x, step.states), along)[1]
+            at = numbers, drawn.edges[ends], step.states
+            flat, parts = ravel_pytree(at)
+            each = jax.vmap(lambda unit: jax.jvp(moved, at, parts(unit))[1])(jnp.eye(flat.size))
+            weights = jnp.concatenate([by_names, by_edges[:, ends]], axis=1)
+            weights = jax.scipy.linalg.block_diag(weights, jnp.eye(m))
+            return jax.tree.map(lambda all_: jnp.tensordot(weights, all_, 1), each)
 
-        each_direction = jax.vmap(one, (None, 0))
-        after, result = jax.vmap(each_direction, (0, None), 1)(part, ahead)
+        after, result = jax.vmap(one, 0, 1)(part)
 
         def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
             return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
@@ -226,23 +238,33 @@ def _stepped(
     y: Array,
 ) -> tuple[Array, Array, Array]:
     """States after a step, their error, and the coefficients of the continuous extension."""
+    table, size = rodas_5p(), y.size
 
     @jax.jit  # traced once for all stages
     def rates(at: Array, state: Array) -> Array:
         return motion.rates(state, excitation(drive, values, piece, at))
 
-    # Explicit sums: products of such small matrices would take most of the time.
-    table, new = dormand_prince_5(), y
-    k: list[Array] = []
-    for node, row in zip(table.C, table.A, strict=True):
-        new = y + length * _combined(row, k) if k else y
-        k.append(rates(begin + node * length, new))
-    # The last stage is the solution of order 5.
-    rise = new - y
-    first = length * k[0] - rise
-    second = rise - length * k[6] - first
-    rows = jnp.stack([y, rise, first, second, length * _combined(table.D, k)])
-    return new, length * _combined(table.E, k), rows
+    def along(direction: Array) -> Array:
+        return jax.jvp(rates, (begin, y), (direction[0], direction[1:]))[1]
+
+    by_time, *columns = jax.vmap(along)(jnp.eye(size + 1))
+    diagonal = 1 / (table.gamma * length)
+    inverse = inverse_points(
+        [[diagonal * (i == j) - columns[j][i] for j in range(size)] for i in range(size)]
+    )
+    stages: list[Array] = []
+    for node, row, coupling, weight in zip(
+        table.nodes, table.A, table.C, table.by_time, strict=True
+    ):
+        state = y + _combined(row, stages) if stages else y
+        right = rates(begin + node * length, state) + length * weight * by_time
+        if stages:
+            right += _combined(coupling, stages) / length
+        # Explicit sums: products of such small matrices would take most of the time.
+        stages.append(jnp.stack(apply(inverse, right)))
+    new = state + stages[-1]
+    rows = jnp.stack([y, new - y, *(_combined(row, stages) for row in table.dense)])
+    return new, stages[-1], rows
 
 
 def _steps_taken(
@@ -252,17 +274,10 @@ def _steps_taken(
     pieces = drive.pull.shape[0]
     y0 = _first_states(motion, values)
     end = drive.edges[-1]
-    # In steady sliding no error limits the step. Beyond the region of stability of the method,
-    # derivatives would grow from rounding errors.
-    longest = jnp.maximum(
-        1 / _fastest_rate(motion, drive, values, y0),
-        _SHARE_STEADY * (drive.edges[1] - drive.edges[0]) / room,
-    )
 
     def body(carry: Any) -> Any:
         t, h, y, piece, n, tries, kept, curve = carry
         edge = drive.edges[piece + 1]
-        h = jnp.where(piece == 0, jnp.minimum(h, longest), h)
         last = t + 1.01 * h >= edge
         step = jnp.where(last, edge - t, h)
         new, error, rows = _stepped(motion, drive, values, piece, t, step, y)
@@ -287,32 +302,19 @@ def _steps_taken(
         _, h, _, piece, n, tries, *_ = carry
         return (piece < pieces) & (n < room) & (tries < room + room // 2) & (h > 1e-13 * end)
 
-    zero = jnp.asarray(0)
+    zero, first = jnp.asarray(0), 1e-3 * (drive.edges[1] - drive.edges[0])
+    # The padding is differentiated with the other steps.
     kept = _Step(
         jnp.zeros(room, int),
         jnp.zeros(room),
-        jnp.zeros(room),
+        jnp.full(room, first),
         jnp.zeros(room, bool),
-        # The padding is computed with the other steps.
         jnp.zeros((room, *y0.shape)) + y0,
     )
     curve = Curve(jnp.full(room, jnp.inf), jnp.ones(room), jnp.zeros((room, 5, *y0.shape)))
-    start = drive.edges[0], 1e-3 * (drive.edges[1] - drive.edges[0]), y0, zero, zero, zero
+    start = drive.edges[0], first, y0, zero, zero, zero
     *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, kept, curve))
     return kept, curve, n, piece >= pieces
-
-
-def _fastest_rate(motion: Motion, drive: Drive, values: Mapping[str, Array], y: Array) -> Array:
-    """Largest size of an eigenvalue of the motion at the beginning (1/s), by repeated squaring."""
-    at = excitation(drive, values, jnp.asarray(0), drive.edges[0])
-    power = jax.jacfwd(lambda state: motion.rates(state, at))(y)
-    logarithm = jnp.asarray(0.0)
-    for k in range(_SQUARINGS):
-        size = jnp.maximum(jnp.linalg.norm(power), 1e-300)
-        logarithm += jnp.log(size) / 2.0**k
-        power = power / size
-        power = power @ power
-    return jnp.exp(logarithm)
 
 
 def _combined(weights: Float, rates: Sequence[Array]) -> Array:

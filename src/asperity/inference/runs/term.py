@@ -17,10 +17,11 @@ from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.motion import (
-    ROOMS,
+    MOST_STEPS,
     RunArrays,
     RunResiduals,
     recorded_friction,
+    room_for,
     run_equations,
 )
 from asperity.inference.runs.noise import (
@@ -112,7 +113,7 @@ class RunTerm(DataTerm):
         self._own = dict(own or {})
         self._order = order
         # In a list that copies share: the number of steps does not depend on the noise.
-        self._room = [ROOMS[0]]
+        self._room = [room_for(run.drive)]
         self.motion = run_equations(
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
@@ -176,7 +177,7 @@ class RunTerm(DataTerm):
 
     def use_search(self, always: bool) -> None:
         """As in `DataTerm`: allow the motion the largest number of steps from now on."""
-        self._room[:] = [ROOMS[-1]] if always else self._room
+        self._room[:] = [max(MOST_STEPS, *self._room)] if always else self._room
 
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None

@@ -128,7 +128,7 @@ def find_falls(force: Float, noise: Noise) -> Falls:
     most, candidates, averages = noise.longest, [], _Averages(force, noise)
     for octave in range(most + 1):
         scatter = noise.of_means(octave, octave)
-        falls = averages.falls(octave, scatter[octave])
+        falls = averages.falls(octave, scatter[octave], 0.0)
         if falls[0].size and _cycle(*falls, force.size) >= _PER_CYCLE << octave:
             candidates.append((*_evidence(*falls), octave, falls))
     evidence = max((c[0] for c in candidates), default=0)
@@ -195,9 +195,14 @@ class _Averages:
         hop = max(1, width // 4)
         return (self._total[width::hop] - self._total[:-width:hop]) / width, hop
 
-    def _falls(self, octave: int, scatter: float) -> tuple[Index, Index]:
-        """Peaks and troughs of means, without those at the ends of the recording."""
+    def _falls(self, octave: int, scatter: float, tilt: float) -> tuple[Index, Index]:
+        """Peaks and troughs of means, without those at the ends of the recording.
+
+        `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
+        """
         means, hop = self.means(octave)
+        if tilt:
+            means = means + tilt * hop * np.arange(means.size)
         at = turning_points(means, self._noise.threshold(scatter, 1 << octave))
         if at.size < 2:
             return at[:0], at[:0]
@@ -225,7 +230,11 @@ def _at_all_widths(
         longest = wider
         scatter = noise.of_means(longest, max(octave, _octave(cycle / _PER_CYCLE_OF_NOISE)))
         thresholds = _thresholds(noise, scatter)
-        sets = [averages.falls(k, scatter[k]) for k in range(longest + 1)]
+        # Means that are long make falls longer than slips.
+        tilt = _tilt(force, *_steep_part(averages, peak, trough, thresholds))
+        sets = [
+            averages.falls(k, scatter[k], tilt) for tilt in (0.0, tilt) for k in range(longest + 1)
+        ]
         if not any(p.size for p, _ in sets):
             peak = trough = np.empty(0, dtype=np.intp)
             break
@@ -269,6 +278,19 @@ def _steep_part(
 
 def _octave(samples: float) -> int:
     return int(np.log2(max(samples, 1.0)))
+
+
+def _tilt(force: Float, peak: Index, trough: Index) -> float:
+    """Rate of fall between those of loading and of slip, per sample.
+
+    The geometric mean of both: a pause in a fall is as far from loading as from slip.
+    """
+    fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
+    if peak.size < 2:
+        return 0.0
+    wait = np.maximum(peak[1:] - trough[:-1], 1)
+    rise = float(np.median((force[peak[1:]] - force[trough[:-1]]) / wait))
+    return max(np.sqrt(max(rise * fall, 0.0)) - rise, 0.0)
 
 
 def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:

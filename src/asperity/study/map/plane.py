@@ -80,6 +80,7 @@ class Axis:
             raise InputError(f"axis of {self.name}", rule, got, advice)
 
     @classmethod
+    @typed
     def parse(cls, text: str, log: bool = False, label: str = "axis") -> Axis:
         """Read ``NAME=LOW:HIGH:COUNT UNIT``, as ``K=0.05:0.5:200 N/um``; messages call it `label`.
 
