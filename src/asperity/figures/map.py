@@ -80,9 +80,7 @@ def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
     return figure
 
 
-def draw_plane(
-    axis: Axes, dataset: xarray.Dataset, show: str, norm: Normalize | None = None
-) -> QuadMesh:
+def draw_plane(axis: Axes, dataset: xarray.Dataset, show: str) -> QuadMesh:
     """The plane alone, without colour bar and legend.
 
     Parameters
@@ -90,18 +88,20 @@ def draw_plane(
     axis : Axes
     dataset : Dataset
     show : str
-    norm : Normalize, optional
-        Colours in common with another plane.
     """
     x, y = (dataset[dataset.attrs[side]] for side in "xy")
     units = [axis_unit(side) for side in (x, y)]
     log = [dataset.attrs[f"{side}_scale"] == "log" for side in "xy"]
     values = np.ma.masked_invalid(dataset[show].values)
-    norm = norm or colours(dataset, show)
     edges = [_edges(v.values / u[0], k) for v, u, k in zip((x, y), units, log, strict=True)]
     axis.set_facecolor(_FAILED["facecolor"])
     mesh = axis.pcolormesh(
-        *edges, values, norm=norm, cmap=_colour_map(show), rasterized=True, shading="flat"
+        *edges,
+        values,
+        norm=colours(dataset, show),
+        cmap=_colour_map(show),
+        rasterized=True,
+        shading="flat",
     )
     _draw_failed(axis, dataset, units)
     _draw_boundary(axis, dataset, units)

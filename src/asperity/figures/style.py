@@ -73,35 +73,28 @@ def save_table(
 
 RICE_RUINA = "#0072B2"
 LINKER_DIETERICH = "#D55E00"
-LINKER_DIETERICH_LOW = "#B0528F"
 ELASTO_PLASTIC = "#00805B"
 STATED = "#8A5A00"
 STATED_FILL = "#E9C46A"
 GREY = "#767676"
-#: Curves with inertia, together with curves of the same law without it.
-INERTIA = "#2B2B33"
-
-#: A variant of a law, or of the machine.
-VARIANT = "#C05A00"
-#: Measured and simulated points.
-POINTS = "#B3261E"
-
-SLOW, FAST = "solid", "dashed"
 
 #: Styles by name, for figures that are described in a file.
 COLOURS = {
     "rice-ruina": RICE_RUINA,
     "linker-dieterich": LINKER_DIETERICH,
-    "linker-dieterich-low": LINKER_DIETERICH_LOW,
+    "linker-dieterich-low": "#B0528F",
     "elasto-plastic": ELASTO_PLASTIC,
-    "inertia": INERTIA,
-    "variant": VARIANT,
+    # Curves with inertia, together with curves of the same law without it.
+    "inertia": "#2B2B33",
+    # A variant of a law, or of the machine.
+    "variant": "#C05A00",
     "stated": STATED,
     "stated-fill": STATED_FILL,
-    "points": POINTS,
+    # Measured and simulated points.
+    "points": "#B3261E",
     "grey": GREY,
 }
-DASHES = {"slow": SLOW, "fast": FAST}
+DASHES = {"slow": "solid", "fast": "dashed"}
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.resources.abc import Traversable
+from inspect import signature
 from typing import Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import Field
@@ -56,14 +57,13 @@ class RuleWords(Record):
             rule = "be a rule of the ledger"
             advice = closest(self.accept, (*rules.RULES, "formula", "undecided"))
             raise InputError(f"{claim}.rule.accept", rule, f"'{self.accept}'", advice)
-        make, names = rules.RULES[self.accept]
+        make = rules.RULES[self.accept]
+        *names, _ = signature(make).parameters
         values = []
         for name in names:
-            value = getattr(self, name)
-            if value is None:
-                rule = f"be given for '{self.accept}'"
-                raise InputError(f"{claim}.rule.{name}", rule, "nothing", "add it")
-            values.append(rules.number(value, numbers, f"{claim}.rule.{name}"))
+            value, place = getattr(self, name), f"{claim}.rule.{name}"
+            require(value is not None, place, f"be given for '{self.accept}'", "nothing", "add it")
+            values.append(rules.number(value, numbers, place))
         return make(*values, self.what)
 
 

@@ -52,7 +52,6 @@ TEXTS, NUMBERS = ("figure", "observable", "series", "x", "source"), ("y", "y_err
 Agreement: TypeAlias = Literal["agrees", "disagrees", "undecided"]
 
 _MARKERS = ("o", "s", "^", "D", "v")
-_COLOUR = "#B3261E"
 
 
 @dataclass(frozen=True)
@@ -246,6 +245,8 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Observables) ->
         From `with_curves`, of this figure.
     observables : Observables
     """
+    from asperity.figures.style import COLOURS
+
     handles: dict[str, Any] = {}
     markers = dict(zip(rows["series"].unique(), _MARKERS * len(rows), strict=False))
     for column, (place, panel) in observables.items():
@@ -255,7 +256,7 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Observables) ->
                 panel.x_scale * points["x"],
                 panel.y_scale * points["y"],
                 yerr=panel.y_scale * points["y_err"],
-                linestyle="none", marker=markers[series], markersize=5, color=_COLOUR,
+                linestyle="none", marker=markers[series], markersize=5, color=COLOURS["points"],
                 markerfacecolor="white", capsize=2.5, elinewidth=1.0, zorder=6,
             )  # fmt: skip
     sources = ", ".join(map(str, rows["source"].unique()[:2])) + ", …" * (

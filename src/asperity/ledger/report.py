@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asperity._version import __version__
-from asperity.ledger.claims import VERDICTS, Claim
+from asperity.ledger.claims import Claim
 from asperity.ledger.contents import KINDS
 from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
@@ -159,7 +158,6 @@ def reproduce(
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
     begin("done")
     figures = [figure for _, drawn in shown for figure in drawn]
-    tests = Counter[str](claim.verdict for claim in claims if claim.is_test)
     return ReproductionSummary(
         paper=paper.contents.paper.short,
         folder=out,
@@ -167,7 +165,7 @@ def reproduce(
         points=sum(figure.points for figure in figures),
         failed=sum(figure.failed for figure in figures),
         claims=len(claims),
-        tests={v: tests[v] for v in VERDICTS if tests[v] or v != "undecided"},
+        tests=counts([claim for claim in claims if claim.is_test]),
         exceptions=tuple(
             (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
         ),

@@ -204,16 +204,10 @@ def formula_value(
         return float(value(ast.parse(formula, mode="eval").body))
 
 
-#: Rules that claims.toml may name, with the names of their numbers in the order of arguments.
-RULES: Mapping[str, tuple[Callable[..., AcceptanceRule], tuple[str, ...]]] = {
-    "rounds-to": (rounds_to, ("stated", "last_digit")),
-    "about": (about, ("stated",)),
-    "within": (within, ("stated", "tolerance")),
-    "of-order": (of_order, ("stated",)),
-    "below": (below, ("limit",)),
-    "above": (above, ("limit",)),
-    "between": (between, ("low", "high")),
-    "change-below": (change_below, ("limit",)),
+#: Rules that claims.toml may name; their arguments are the numbers of a rule.
+RULES: Mapping[str, Callable[..., AcceptanceRule]] = {
+    make.__name__.replace("_", "-"): make
+    for make in (rounds_to, about, within, of_order, below, above, between, change_below)
 }
 
 

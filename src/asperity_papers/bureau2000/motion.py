@@ -98,14 +98,14 @@ _MARKED = (0.47, 0.62, 0.70, 0.77)
 QUASI_STATIC, UNDAMPED, DAMPED = "no inertia", "inertia", "inertia, damped"
 
 
-def contact_damping(machine: Machine, quality: float = QUALITY) -> float:
-    """Damper between slider and track (N s/m) that gives the resonance a quality factor.
+def contact_damping(machine: Machine) -> float:
+    """Damper between slider and track (N s/m) that gives the resonance its `QUALITY`.
 
-    It is parallel to the asperities and the joint: sqrt(M W0/lambda)/quality. What it adds to the
+    It is parallel to the asperities and the joint: sqrt(M W0/lambda)/QUALITY. What it adds to the
     mean force, its value times V, is below 0.001 W0 at 10 um/s.
     """
     p = machine.numbers
-    return float(np.sqrt(p.M * p.W0 / p.lambda_) / quality)
+    return float(np.sqrt(p.M * p.W0 / p.lambda_) / QUALITY)
 
 
 def resonance_curves(machine: Machine) -> list[FigureCurve]:

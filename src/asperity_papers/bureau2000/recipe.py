@@ -269,11 +269,8 @@ def _steady_and_threshold(
 
 def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thresholds) -> Float:
     """Closed-form estimates of mu0, ln(B - A), ln A and ln D0."""
-    mean, weight = steady.values["mean_friction"], 1 / steady.errors["mean_friction"] ** 2
-    centre = np.average(log_v, weights=weight)
-    slope = np.average((log_v - centre) * mean, weights=weight) / np.average(
-        (log_v - centre) ** 2, weights=weight
-    )
+    mean, error = steady.values["mean_friction"], steady.errors["mean_friction"]
+    slope, level = np.polyfit(log_v, mean, 1, w=1 / error)
     if slope >= 0:
         rule, got = "have friction that weakens with velocity", f"a slope of {slope:.3g} with ln V"
         raise InputError(f"{steady.name}", rule, got, "without weakening there is no bifurcation")
@@ -282,7 +279,7 @@ def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thres
     contrast = float(np.median(omega / thresholds.V)) * -slope / k
     return np.array(
         [
-            np.average(mean, weights=weight) - slope * centre,
+            level,
             math.log(-slope),
             math.log(-slope / contrast**2),
             math.log(-slope / k),

@@ -7,7 +7,6 @@ values sliding is unsteady without modulation, with which its protocol begins.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -288,18 +287,13 @@ def experiment_in_background() -> Iterator[Callable[[], SimulatedPoints]]:
     On a single core it is done when it is asked for. Left early, by Ctrl-C or an error, the
     process ends.
     """
-    if _cores() < 2:
+    from loky import ProcessPoolExecutor, cpu_count
+
+    if cpu_count() < 2:
         yield experiment
         return
-    from loky import ProcessPoolExecutor
-
     executor = ProcessPoolExecutor(max_workers=1, env=_ONE_THREAD)
     try:
         yield executor.submit(experiment).result
     finally:
         executor.shutdown(wait=False, kill_workers=True)
-
-
-def _cores() -> int:
-    """Cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

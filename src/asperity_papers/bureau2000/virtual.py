@@ -37,14 +37,6 @@ NORMAL = 1.96
 #: Value, standard uncertainty, and the model's value.
 Read: TypeAlias = tuple[float, float, float]
 
-#: Quantities whose bars are drawn.
-_DRAWN = {
-    "virtual-02": ("delta_mu",),
-    "virtual-03": ("mean_friction",),
-    "virtual-04": ("mu1", "mu2"),
-    "virtual-05": ("delta_mu",),
-}
-
 
 @dataclass(frozen=True)
 class RecoveredQuantity:
@@ -375,7 +367,7 @@ def introduction(figures: Sequence[VirtualFigure]) -> str:
 
 def _within(figure: VirtualFigure) -> np.ndarray:
     """Whether each drawn 95 % interval contains the model."""
-    points, names = figure.points, _DRAWN[figure.numbers.name]
+    points, names = figure.points, WORDS.figures[figure.numbers.name].observables
     return np.concatenate(
         [
             abs(points[name] - points[f"{name}_model"]) <= NORMAL * points[f"{name}_uncertainty"]

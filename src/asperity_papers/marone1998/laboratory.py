@@ -70,10 +70,10 @@ class Laboratory:
         p = self.numbers
         return self.granite(name, A=p.A_2, B=p.B_2, D0=p.D0_2)
 
-    def gouge(self, name: str = AGEING) -> RiceRuina:
+    def gouge(self) -> RiceRuina:
         """Quartz gouge of Figure 5, with the memory length of granite: its is not printed."""
         p = self.numbers
-        return self.granite(name, A=p.B_5 - p.B_less_A_5, B=p.B_5)
+        return self.granite(AGEING, A=p.B_5 - p.B_less_A_5, B=p.B_5)
 
     def holds(self, name: str, k: Any, V: Any, time: Any, **changes: Any) -> Holds:
         """Holds of granite at stiffness (1/m), velocity (m/s) and hold times (s), as arrays."""
