@@ -42,7 +42,7 @@ def main() -> None:
             continue
         for law, fixed in LAWS.items():
             over = fit_windows(
-                folder / file, law, FREE, windows, reading={"name": file}, fixed=fixed, starts=16
+                folder / file, law, FREE, windows, reading={"name": file}, fixed=fixed
             )
             first = over.fits[0]
             (term,) = first.objective.terms
@@ -53,13 +53,15 @@ def main() -> None:
             for name in (*FREE, "K"):
                 p = over.parameters[name]
                 scale = 1 / run.W0 if name == "K" else 1.0
+                unit = "1/m" if name == "K" else p.unit
+                column = ("K/W0" if name == "K" else name) + (f" ({unit})" if unit else "")
                 low, high = (scale * end for end in p.interval_95)
                 each = ", ".join(f"{scale * value:.4g}" for value in p.values)
                 print(
-                    f"| {law} | {'K/W0 (1/m)' if name == 'K' else f'{name} {p.unit}'.strip()} | "
-                    f"{scale * p.value:.4g} | {low:.3g} to {high:.3g} | {scale * p.se_noise:.2g} | "
-                    f"{scale * p.se_window:.2g} | {scale * white.parameters[name].se:.2g} | "
-                    f"{each} |" + (" undetermined" if name in over.undetermined else ""),
+                    f"| {law} | {column} | {scale * p.value:.4g} | {low:.3g} to {high:.3g} | "
+                    f"{scale * p.se_noise:.2g} | {scale * p.se_window:.2g} | "
+                    f"{scale * white.parameters[name].se:.2g} | {each} |"
+                    + (" undetermined" if name in over.undetermined else ""),
                     flush=True,
                 )
             noise = term.noise

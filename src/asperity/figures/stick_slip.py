@@ -58,8 +58,7 @@ def _draw_whole(axis: Axes, measurement: StickSlipMeasurement) -> None:
                 fontsize=7,
             )
         names.add(regime.kind)
-    axis.set(xlabel=f"time after {start:.6g} s (s)", ylabel="$F/W$")
-    axis.margins(x=0)
+    _label(axis, start)
 
 
 def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
@@ -79,8 +78,15 @@ def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
         linewidth=1.2,
         markersize=4,
     )
-    axis.set(xlabel=f"time after {start:.6g} s (s)", ylabel="$F/W$")
+    _label(axis, start)
+
+
+def _label(axis: Axes, start: float) -> None:
+    """Labels of friction over the time after `start`, with room for the letter of the panel."""
+    axis.set(xlabel=f"time after {start:.6g} s (s)" if start else "time (s)", ylabel="$F/W$")
     axis.margins(x=0)
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high + 0.15 * (high - low))
 
 
 def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
@@ -103,8 +109,10 @@ def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
         0.985, measurement.smallest_drop, "smallest drop that is seen", fontsize=7,
         va="bottom", ha="right", transform=axis.get_yaxis_transform(),
     )  # fmt: skip
-    axis.set_xscale("log")
-    axis.margins(x=0.04)
+    longest, shortest = (end(events.stick_duration[known]) for end in (np.max, np.min))
+    if longest > 10 * shortest:
+        axis.set_xscale("log")
+    axis.margins(x=0.06, y=0.2)
     axis.set_ylim(bottom=0)
 
 
