@@ -190,6 +190,36 @@ def test_settling_harmonics_are_fitted(truth, draws) -> None:
     assert np.sqrt(np.mean(np.square(without))) > 3
 
 
+@draws(6, 60)
+def test_an_error_of_the_frequency_is_no_settling(truth, draws) -> None:
+    """It turns the phase of a force with little noise, by much more than that noise."""
+    off = []
+    for seed in range(draws):
+        rng = np.random.default_rng(seed)
+        truth = truth.but(epsilon=0.02, frequency=rng.uniform(50, 70))
+        time = np.arange(12_000) / 4000
+        load = truth.load(time) + 0.02 * rng.standard_normal(time.size)
+        force = truth.force(time) + 1e-4 * rng.standard_normal(time.size)
+        found = lock_in(time, load, force, settles=True)
+        assert not any(settling.present for settling in found.settlings)
+        phasor, true = found.phasor(1), np.angle(truth.harmonics[0])
+        off.append((phasor.phase - true) / phasor.phase_uncertainty)
+    assert np.abs(off).max() < 4.5
+
+
+def test_a_response_that_drifts_is_read_as_its_mean(truth) -> None:
+    """It resembles the beginning of a settling, whose end is not extrapolated."""
+    time = np.arange(12_000) / 4000
+    phi = 2 * np.pi * truth.frequency * time + truth.phase
+    own = truth.W0 * (truth.harmonics[0] * np.exp(1j * phi)).real
+    force = truth.force(time) + 0.04 * (time / time[-1] - 0.5) * own
+    force += 3e-4 * np.random.default_rng(2).standard_normal(time.size)
+    found = lock_in(time, truth.load(time), force, settles=True)
+    assert any(settling.odds > 1e3 for settling in found.settlings if settling.order == 1)
+    first = found.phasor(1)
+    assert abs(first.amplitude - abs(truth.harmonics[0])) < 4 * first.amplitude_uncertainty
+
+
 @pytest.mark.parametrize("rho", [0.0, 0.95])
 @draws(4, 25)
 def test_a_steady_recording_keeps_its_uncertainty(truth, red_noise, rho, draws) -> None:

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.special import j0, j1
 
 import asperity as asp
 from asperity.lock_in.demodulation import lock_in
@@ -56,6 +57,16 @@ def load_wanders(time, load, force):
     return time, load + 0.3 * np.sin(np.pi * time), force
 
 
+def second_shaker(time, load, force):
+    return time, load + 0.5 * np.cos(2 * np.pi * 143.7 * time), force
+
+
+def phase_wanders(time, load, force):
+    phi = 2 * np.pi * 60.013 * time + 0.7
+    wandering = np.cos(phi + 0.5 * np.sin(2 * np.pi * 5.3 * time)) - np.cos(phi)
+    return time, load + 7 * 0.24 * wandering, force
+
+
 def response_changes(time, load, force):
     phi = 2 * np.pi * 60.013 * time + 0.7
     return time, load, force + 7e-3 * np.sin(2 * np.pi * 0.15 * time) * np.cos(phi - 1.5)
@@ -89,7 +100,9 @@ DOUBTS = {
     "units a thousand apart": (in_kilonewton, {"friction"}, "suspicious"),
     "zero of the load": (off_zero, {"contact", "friction"}, "bad"),
     "drift of the load": (load_drifts, {"steady load"}, "suspicious"),
-    "slow wave of the load": (load_wanders, {"steady load"}, "suspicious"),
+    "slow wave of the load": (load_wanders, {"steady load", "other modulation"}, "suspicious"),
+    "a second modulation": (second_shaker, {"other modulation", "steady load"}, "suspicious"),
+    "a phase that wanders": (phase_wanders, {"other modulation", "steady load"}, "bad"),
     "a response that changes": (
         response_changes,
         {"steady response", "shifting response"},
@@ -107,6 +120,9 @@ NUMBERS = {
     "sign of the force": ("friction", -0.4, 1e-3),
     "zero of the load": ("contact", 7 * 0.24, 1e-3),
     "drift of the load": ("steady load", 0.03 * END / 7.15, 1e-2),
+    "a second modulation": ("other modulation", (0.5 / 1.68) ** 2, 1e-2),
+    # Either sideband of a wandering phase has the amplitude J1 / J0 of the line, of half a radian.
+    "a phase that wanders": ("other modulation", (j1(0.5) / j0(0.5)) ** 2, 5e-2),
     # Half of the line's slope is fitted as drift: ten half-turns hold next to none.
     "slow wave of the load": ("steady load", 0.3 / 7, 0.05),
     "steps of the load": ("resolution", 0.5 / 1.68, 0.05),
@@ -125,6 +141,28 @@ def test_what_cannot_be_believed_is_named(made, trace, doubt) -> None:
         name, number, rel = NUMBERS[doubt]
         check = next(c for c in found.checks if c.name == name)
         assert check.number == pytest.approx(number, rel=rel)
+
+
+def test_noise_is_no_sideband_of_few_periods(made, trace) -> None:
+    """Of thirty periods all sidebands are next to the line."""
+    for seed in range(8):
+        time, load, force = (a[:1000] for a in made(seed=seed, epsilon=0.02))
+        load += 0.02 * np.random.default_rng(seed).standard_normal(time.size)
+        checks = {c.name: c for c in measure(trace(time, load, force)).checks}
+        assert checks["leakage"].number > 0.01
+        assert checks["leakage"].verdict == "ok"
+    time, load, force = (a[:1000] for a in made())
+    swelling = 0.2 * np.sin(2 * np.pi * 8 * time) * (load - load.mean())
+    checks = {c.name: c for c in measure(trace(time, load + swelling, force)).checks}
+    assert checks["leakage"].verdict == "bad"
+
+
+def test_a_pause_with_a_saturated_gauge_is_named(truth, protocol, trace) -> None:
+    """Its level is too low, and with it the change of friction."""
+    time, load, force = protocol(truth, noise=3e-2)
+    found = measure(trace(time, load, np.minimum(force, 7 * 0.4)))
+    assert {c.name: c.verdict for c in found.checks}["saturation"] == "bad"
+    assert found.reading.start > 6
 
 
 def test_a_force_of_zero_has_a_verdict(made, trace) -> None:

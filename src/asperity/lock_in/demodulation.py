@@ -19,7 +19,7 @@ import numpy as np
 
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
-from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
+from asperity.lock_in.noise import local_noise, noise_around, residual_sums, sum_covariance
 from asperity.lock_in.normal_equations import (
     Basis,
     BlockSums,
@@ -154,8 +154,11 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     full = _on_basis(basis, beta, change)
     settlings: tuple[Settling, ...] = ()
     if settles:
-        white = float(_white(blocks, residual_sums(blocks, full))[1, 1])
-        settlings = find_settlings(blocks, 1, full[:, 1], inner, white)
+        residual = residual_sums(blocks, full)
+        white = _white(blocks, residual)
+        around, _ = noise_around(1, blocks, residual[:, 1], white, settles=False)
+        variance = float(around[0, 0].real * outer[linear, linear]) if refine else 0.0
+        settlings = find_settlings(blocks, 1, full[:, 1], inner, float(white[1, 1]), variance)
         without_settling = without(blocks, 1, settlings)
         beta[:, 1] -= inner @ (moments - without_settling.totals()[1])[:linear, 1]
         blocks, full = without_settling, _on_basis(basis, beta, change)

@@ -9,6 +9,11 @@ For each tau the amplitude is linear. Within a block e^(-t/tau) is a straight li
 of the block's length over tau, so the columns are combinations of the summed columns, and no second
 pass over the samples is needed.
 
+The frequency is that of the load. Its error turns the phase of every harmonic evenly through the
+window; it is a parameter of the fit to each harmonic, with the variance that the load gives it. A
+settling of a harmonic that does not end in the window cannot be told from a slow change of the
+response, or of the load's amplitude, and is not extrapolated.
+
 The likelihood (Student's t, because the noise is estimated from few lines) weighs the models
 without a settling and with each tau. The correction of the reading is the weighted mean, and its
 covariance includes that of the amplitude and the variance over tau.
@@ -23,6 +28,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.lock_in.noise import harmonic_sums, noise_around
 from asperity.lock_in.normal_equations import BlockSums, inverted
+from asperity.lock_in.reference import frequency_direction
 
 #: Prior odds of a settling times the Occam factor of its amplitude, for the mean and for a
 #: harmonic, which has two amplitudes. With these odds for the mean, a settling is preferred in 3 to
@@ -32,6 +38,8 @@ _ODDS = (0.005, 0.0005)
 #: A settling with a time constant above this share of the window does not end in the window: with a
 #: linear drift in the model, the final level is an extrapolation.
 OPEN = 1 / 3
+#: A settling ends in the window if the probability of a time constant above `OPEN` is lower.
+_UNFINISHED = 0.05
 #: Longest time constant, in windows; number of time constants of a grid; and shortest time constant
 #: of a harmonic, in periods, below which it overlaps with other harmonics.
 _LONGEST, _TRIED, _SHORTEST = 2.0, 41, 4.0
@@ -66,7 +74,7 @@ class Settling:
         Probability that the time constant exceeds `OPEN` of the window, if there is a settling.
     shift : array, (linear,)
         Correction of the coefficients. It refers to the fit of the sums without `removed` if the
-        odds are above one, else to that of the original sums.
+        settling is present, else to that of the original sums.
     covariance : array, (linear, linear)
         Correction of the covariance of the coefficients.
     removed : array, (blocks, size)
@@ -100,13 +108,13 @@ class Settling:
 
     @property
     def present(self) -> bool:
-        """Whether the settling is more probable than not."""
-        return self.odds > 1
+        """Whether it is more probable than not; of a harmonic, only if it ends in the window."""
+        return self.odds > 1 and (not self.order or self.determined)
 
     @property
     def determined(self) -> bool:
         """Whether the settling ends in the window."""
-        return self.unfinished < 0.05
+        return self.unfinished < _UNFINISHED
 
 
 def settling_of_mean(blocks: BlockSums) -> Settling | None:
@@ -119,11 +127,16 @@ def settling_of_mean(blocks: BlockSums) -> Settling | None:
     left = (blocks.moments[:, 0, 0] - blocks.gram[:, 0] @ fitted) / np.sqrt(blocks.count)
     # If there are too few blocks for spectral lines, the differences between blocks are noise.
     white = float(left @ left) / max(blocks.count.size - linear, 1)
-    return _Profile(blocks, 0, fitted, inner, white, 0).settling()
+    return _Profile(blocks, 0, fitted, inner, white, 0, 0.0).settling()
 
 
 def find_settlings(
-    blocks: BlockSums, channel: int, fitted: Float, inner: Float, white: float
+    blocks: BlockSums,
+    channel: int,
+    fitted: Float,
+    inner: Float,
+    white: float,
+    omega_variance: float,
 ) -> tuple[Settling, ...]:
     """The possible settlings of a channel: of its mean and of each harmonic.
 
@@ -137,6 +150,8 @@ def find_settlings(
         Inverse of the normal matrix.
     white : float
         Variance of the residual.
+    omega_variance : float
+        Variance of the angular frequency, in (rad/s)^2; 0 if it is exact.
     """
     linear = blocks.basis.linear
     settlings: dict[int, Settling] = {}
@@ -150,7 +165,9 @@ def find_settlings(
             left = (cleaned.moments - blocks.moments)[:, :linear, channel].sum(0)
             coefficients = fitted.copy()
             coefficients[:linear] += inner @ left
-            settling = _Profile(cleaned, channel, coefficients, inner, white, order).settling()
+            settling = _Profile(
+                cleaned, channel, coefficients, inner, white, order, omega_variance
+            ).settling()
             if settling is not None and settling.possible:
                 settlings[order] = settling
         sweep = [order for order, settling in sorted(settlings.items()) if settling.present]
@@ -180,6 +197,7 @@ class _Profile:
         inner: Float,
         white: float,
         order: int,
+        omega_variance: float,
     ) -> None:
         basis, n = blocks.basis, blocks.basis.harmonics
         self._blocks, self._channel, self._order = blocks, channel, order
@@ -197,22 +215,33 @@ class _Profile:
         shortest = max(4 * float(self._half.max()), periods * 2 * np.pi / basis.omega)
         self._range = np.log([shortest, max(_LONGEST * span, 2 * shortest)])
         self._left = blocks.moments[:, :, channel] - blocks.gram @ fitted
+        # Change of this harmonic with the frequency, by a standard deviation, apart from what the
+        # linear columns make up for; and its sums.
+        self._turn = np.zeros(basis.size)
+        if order:
+            turn = frequency_direction(basis, fitted[: basis.linear])
+            self._turn[level + 2 * n] = np.sqrt(omega_variance) * turn[level + 2 * n]
+            across = (blocks.gram.sum(0) @ self._turn)[: basis.linear]
+            self._turn[: basis.linear] = -inner @ across
+        self._turned = blocks.gram @ self._turn
 
     def settling(self) -> Settling | None:
         """The settling of this order; None if the blocks are too few for a fit."""
         if self._half.size < 8:
             return None
         begin, end = self._range
-        before = np.inf
+        # The frequency is free until the noise is known.
+        before, noise = np.inf, 0.0
         for _ in range(_MOST_ZOOMS):
             logs = np.linspace(begin, end, _TRIED)
-            gain, amplitude, schur, moved = self._solved(np.exp(logs))
+            gain, amplitude, schur, moved, turn = self._solved(np.exp(logs), noise)
             best = int(np.argmax(gain))
             removed = self._removed(np.exp(logs[best : best + 1]), amplitude[best])
             explained = (
                 self._blocks.gram[:, :, : self._inner.shape[0]] @ moved[best] @ amplitude[best]
             )
-            noise, dof = self._noise(self._left - removed + explained, settles=True)
+            left = self._left - removed + explained - turn[best] * self._turned
+            noise, dof = self._noise(left, settles=True)
             fits = _log_likelihood(gain[best] - gain, noise, dof, self._columns[0].size)
             counts = np.flatnonzero(fits > -_NEGLIGIBLE)
             # The residual of a coarse grid of time constants counts as noise; refine it.
@@ -231,9 +260,12 @@ class _Profile:
         longest = float(np.exp(logs[int(np.searchsorted(chances, 0.95))]))
         late = np.exp(logs) > OPEN * 2 * self._blocks.basis.half_width
         unfinished = float(weights[late].sum() / weights.sum())
+        present = odds > 1 and (not self._order or unfinished < _UNFINISHED)
         if odds < 1:
             # A settling that does not end in the window cannot be distinguished from drift.
             weights[late] = 0.0
+        elif not present:
+            weights[:] = 0.0
         weights = np.append(weights, np.exp(none))
         weights /= weights.sum()
         # Changes of the coefficients: minus the amplitude times the coefficients of the column.
@@ -251,7 +283,7 @@ class _Profile:
             odds,
             longest,
             unfinished,
-            mean - changes[best] if odds > 1 else mean,
+            mean - changes[best] if present else mean,
             spread,
             removed,
             noise,
@@ -272,8 +304,11 @@ class _Profile:
             return [level]
         return [level - slope * self._u, slope]
 
-    def _solved(self, decays: Float) -> tuple[Float, Float, Float, Float]:
-        """Gain, amplitudes, normal matrices and coefficients of the columns for each decay."""
+    def _solved(self, decays: Float, noise: float) -> tuple[Float, Float, Float, Float, Float]:
+        """Gain, amplitudes, normal matrices, coefficients of the columns, and turn for each decay.
+
+        The turn is that of the phase of the harmonic, in standard deviations of the frequency.
+        """
         gram, linear = self._blocks.gram, self._blocks.basis.linear
         lines = self._lines(decays)
         pairs = list(zip(lines, self._columns, strict=True))
@@ -292,8 +327,16 @@ class _Profile:
         )
         moved = self._inner @ across[:, :linear]
         schur = square - across[:, :linear].transpose(0, 2, 1) @ moved
+        weight = float(self._turned.sum(0) @ self._turn) + noise
+        share = np.zeros_like(right)
+        if self._turn.any():
+            share = np.einsum("l,tlq->tq", self._turn, across) / weight
+        alone = float(self._turn @ self._left.sum(0)) / max(weight, 1e-300)
+        schur -= weight * share[:, :, None] * share[:, None, :]
+        right -= weight * alone * share
         amplitude = np.linalg.solve(schur, right[..., None])[..., 0]
-        return (amplitude * right).sum(1), amplitude, schur, moved
+        turn = alone - (share * amplitude).sum(1)
+        return (amplitude * right).sum(1), amplitude, schur, moved, turn
 
     def _removed(self, decay: Float, amplitude: Float) -> Float:
         """Sums of all columns times a settling, (blocks, size)."""

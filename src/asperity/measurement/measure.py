@@ -259,6 +259,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.contact(reading),
         checks.friction(reading.mean_friction),
         steadiness.leakage(reading),
+        checks.other_modulation(reading, time, load_values),
         steadiness.steady_load(reading, time, load_values),
         steadiness.steady_response(reading),
         checks.transient(reading, chosen_by, pauses),
@@ -273,11 +274,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         instrument.hum(reading, time, force_values),
         steadiness.shifting_response(reading, time, force_values),
         checks.drift(reading, *sides),
-        *checks.findings(
-            about_window(samples, float(time[0]), float(time[-1])),
-            time.size,
-            float(time[-1] - time[0]),
-        ),
+        *_findings(samples, first, stop, [before, after]),
     )
     static = _static_friction(reading, [b for b in (before, after) if b], pauses)
     doubt = reading.uncertainty("mean_friction")
@@ -327,6 +324,22 @@ class _Pause(NamedTuple):
     force: MeanLevel
     load: MeanLevel
     friction: MeanLevel
+
+
+def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None]) -> list[Check]:
+    """Findings on the window, and what else is wrong with the pauses that are read."""
+    time = samples.time
+
+    def about(start: float, end: float) -> list[Check]:
+        count = int(np.sum((time >= start) & (time <= end)))
+        return checks.findings(about_window(samples, start, end), count, end - start)
+
+    answers = about(float(time[first]), float(time[stop - 1]))
+    for side in sides:
+        named = {check.name for check in answers}
+        more = about(side.force.start, side.force.end) if side else []
+        answers += [c for c in more if c.verdict != "ok" and c.name not in named]
+    return answers
 
 
 def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadInterval]:

@@ -11,7 +11,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
-from asperity.measurement.verdicts.steadiness import slow_line
+from asperity.measurement.verdicts.steadiness import other_line
 from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
 from asperity.recording.finding import Finding
 
@@ -145,7 +145,7 @@ def drift_rate(reading: LockInReading) -> Rate:
 
 def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
     """Whether the force oscillates slowly, by itself."""
-    line = slow_line(reading, time, force)
+    line = other_line(reading, time, force, 1)
     number, sentence, seen = 0.0, "no slow oscillation is significant", False
     if line is not None:
         number = line.amplitude / max(abs(reading.mean_force), 1e-300)
@@ -156,6 +156,24 @@ def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
                 f"{percent(number)} of its mean"
             )
     return LOCK_IN.check("stick-slip", number, sentence, significant=seen)
+
+
+def other_modulation(reading: LockInReading, time: Float, load: Float) -> Check:
+    """Whether the load is modulated at one frequency: a second line lowers the friction as well.
+
+    The number is the power of the second line over that of the first, because the mean of friction
+    changes with the square of a small amplitude.
+    """
+    line = other_line(reading, time, load, 0)
+    number, sentence, seen = 0.0, "the load has no significant line that is no harmonic", False
+    if line is not None and line.amplitude > _LINE * line.background:
+        share = line.amplitude / abs(_nonzero(reading.epsilon * reading.W0))
+        number, seen = share**2, True
+        sentence = (
+            f"the load has a line at {line.frequency:.4g} Hz, no harmonic, of {percent(share)} of "
+            "its amplitude, or its phase wanders"
+        )
+    return LOCK_IN.check("other modulation", number, sentence, significant=seen)
 
 
 def resolution(reading: LockInReading, load: Float, force: Float) -> Check:

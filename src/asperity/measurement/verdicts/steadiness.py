@@ -34,26 +34,32 @@ _PIECES, _FEWEST_PERIODS = 8, 3
 _BEYOND = 6.0
 
 
-def slow_line(reading: LockInReading, time: Float, force: Float) -> SpectralLine | None:
-    """The strongest line of the force's residual below the modulation, or below 20 Hz.
+def other_line(
+    reading: LockInReading, time: Float, values: Float, channel: int
+) -> SpectralLine | None:
+    """The strongest line of a residual that is no harmonic of the modulation.
+
+    Of the load, at any frequency; of the force, below the modulation or 20 Hz, where stick-slip is.
 
     Parameters
     ----------
     reading : LockInReading
-    time, force : array, (n,)
-        Times and force of the window.
+    time, values : array, (n,)
+        Times and channel of the window.
+    channel : int
+        0 for the load, 1 for the force.
     """
     f = reading.frequency
-    piece, left = left_of_piece(reading, time, force)
-    # Stick-slip may be faster than a slow modulation.
-    highest = max(0.9 * f, _STICK_SLIP)
-    # Means over a third of a period keep what is slower.
+    piece, left = left_of_piece(reading, time, values)
     span = float(time[piece][-1] - time[piece][0])
+    # Stick-slip may be faster than a slow modulation.
+    highest = max(0.9 * f, _STICK_SLIP) if channel else left.size / span / 2
+    # Means over a third of a period keep what is slower.
     blocks = int(min(left.size, max(64, 3.3 * highest * span)))
     candidates = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
     if time.size > _PIECE:
         count = reading.blocks.count
-        slow = reading.residual[:-1, 0, 1].real / count[:-1]
+        slow = reading.residual[:-1, 0, channel].real / count[:-1]
         candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
     # Lines at harmonics above those that are fitted belong to the modulation.
     width = 2 / span
@@ -90,26 +96,32 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
 def leakage(reading: LockInReading) -> Check:
     """Whether the load is one line, as the reading takes it to be."""
     carrier = abs(reading.epsilon * reading.W0) * reading.samples / 2
-    number, beyond = _sidebands(reading, 0, carrier)
+    near, far = _sidebands(reading, 0, carrier)
+    if near.size and not far.size:
+        # The sidebands of few periods reach to the next harmonic. Noise is that at the last one.
+        noise = float(reading.noise.spectra[-1, 0, 0].real)
+        far = np.array([2 * noise * reading.samples / carrier**2])
+    number = float(np.sqrt(near.sum()))
     return LOCK_IN.check(
         "leakage",
         number,
         f"sidebands of the load hold {percent(number)} of its amplitude; if much, it is no "
         "steady line of one frequency: choose a window in which it is",
-        significant=beyond > 3.0,
+        significant=_stands_out(near, far),
     )
 
 
 def steady_response(reading: LockInReading) -> Check:
     """Whether mu1 and its phase are the same in all of the window."""
     carrier = reading.phasor(1).amplitude * abs(reading.W0) * reading.samples / 2
-    number, beyond = _sidebands(reading, 1, carrier)
+    near, far = _sidebands(reading, 1, carrier)
+    number = float(np.sqrt(near.sum()))
     return LOCK_IN.check(
         "steady response",
         number,
         f"sidebands of the force hold {percent(number)} of its first harmonic; mu1 changes within "
         "the window, or another line is next to it, if that is much",
-        significant=3.0 < beyond < np.inf,
+        significant=_stands_out(near, far),
     )
 
 
@@ -128,22 +140,27 @@ def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
     )
 
 
-def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[float, float]:
-    """Amplitude of the sidebands over that of the line; their power over that farther off."""
+def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[Float, Float]:
+    """Power of the lines next to the modulation, and of lines farther off, over that of the line.
+
+    The power of both sides of the modulation is added.
+    """
     blocks, basis = reading.blocks, reading.blocks.basis
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
     most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)
     offsets = np.arange(2, most + 1)
     if not offsets.size or not carrier:
-        return 0.0, np.inf
+        return np.zeros(0), np.zeros(0)
     angle = 2 * np.pi * np.concatenate([-offsets, offsets])[:, None] * at
     turned = (np.cos(angle) - 1j * np.sin(angle)) @ reading.residual[:, 1, channel]
     power = (np.abs(turned / carrier) ** 2).reshape(2, -1).sum(0)
     near = offsets <= _SIDEBANDS
-    number = float(np.sqrt(power[near].sum()))
-    if near.all():
-        return number, np.inf
-    return number, float(power[near].mean() / max(float(power[~near].mean()), 1e-300))
+    return power[near], power[~near]
+
+
+def _stands_out(near: Float, far: Float) -> bool:
+    """Whether the power near a line exceeds that farther off, which is noise."""
+    return bool(near.size and far.size and near.mean() > 3.0 * max(far.mean(), 1e-300))
 
 
 def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bool]:

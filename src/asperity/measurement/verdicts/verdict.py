@@ -99,6 +99,7 @@ LOCK_IN = Limits(
         "resolution": (0.1, 1.0),
         "contact": (0.95, 1.0),
         "leakage": (0.01, 0.1),
+        "other modulation": (0.01, 0.1),
         "steady response": (0.05, 0.5),
         "steady load": (0.01, 0.05),
         "shifting response": (0.07, 0.4),
