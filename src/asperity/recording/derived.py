@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import number, typed
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
@@ -57,6 +57,51 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         trace = _with_channel(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
+
+
+def stress_to_force(
+    trace: Trace, area: float | str, channels: Sequence[str] | None = None
+) -> Trace:
+    """Convert stresses to forces by the nominal contact area.
+
+    Parameters
+    ----------
+    trace : Trace
+        Any recording.
+    area : float or str
+        Nominal contact area (m^2, or a text such as ``"25 cm^2"``), the same for all channels.
+    channels : sequence of str, optional
+        Names or roles; all pressures by default.
+
+    Returns
+    -------
+    Trace
+        With these channels in newton under the same names, the area in its provenance.
+
+    Raises
+    ------
+    InputError
+        If the area is not positive, or a channel is no pressure.
+    """
+    size = number(area, "stress_to_force.area", "area", "positive")
+    wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
+    if channels is not None:
+        wanted = [_pressure(trace, name) for name in channels]
+    advice = "leave it out, or give the channel its unit"
+    require(wanted, "stress_to_force.area", "go with a stress", "a recording without", advice)
+    converted = {
+        name: replace(c, values=c.values * size, kind="force", unit="N") if name in wanted else c
+        for name, c in trace.channels.items()
+    }
+    note = {"area (m^2)": size, "stresses made forces": wanted}
+    return replace(trace, channels=converted, provenance={**trace.provenance, **note})
+
+
+def _pressure(trace: Trace, name: str) -> str:
+    channel = trace.channel(name)
+    rule, got = "be pressures", f"'{name}' in '{channel.unit}'"
+    require(channel.kind == "pressure", "stress_to_force.channels", rule, got, "leave it out")
+    return trace.name_of(channel)
 
 
 def _with_channel(
