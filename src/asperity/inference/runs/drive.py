@@ -1,7 +1,8 @@
 """Drive of a recording: pulling velocity and load over time.
 
-Both are piecewise linear. Derivatives with respect to the delays of changes are exact: a delay
-moves the pieces on both sides. The velocities are measured or given.
+The velocity is piecewise constant, the load piecewise linear. Derivatives with respect to the
+delays of changes are exact: a delay moves the pieces on both sides. The velocities are measured or
+given.
 """
 
 from __future__ import annotations
@@ -22,22 +23,20 @@ from asperity.measurement.sliding.signals import SlidingSignals
 
 
 class Drive(NamedTuple):
-    """Pulling velocity and load over time, linear in each piece.
+    """Pulling velocity, constant in each piece, and load, linear in each piece.
 
     Attributes
     ----------
     edges : array, shape (pieces + 1,)
         Times of the changes (s), the first 0.
-    pull, pull_slope : array, shape (pieces,)
-        Pulling velocity over that of the first piece at the beginning of each piece, and its
-        slope (1/s).
+    pull : array, shape (pieces,)
+        Pulling velocity over that of the first piece.
     load, load_slope : array, shape (pieces,)
         W/W0 at the beginning of each piece and its slope (1/s).
     """
 
     edges: Any
     pull: Any
-    pull_slope: Any
     load: Any
     load_slope: Any
 
@@ -59,17 +58,12 @@ def filled_up(drive: Drive) -> Drive:
     extra = size - pieces
     edges = np.concatenate([drive.edges, np.full(extra, drive.edges[-1])])
     # The empty pieces have the final values, because a sample may lie at the end.
-    last = float(drive.edges[-1] - drive.edges[-2])
-
-    def padded(values: Float, slopes: Float) -> tuple[Float, Float]:
-        end = values[-1] + slopes[-1] * last
-        return (
-            np.concatenate([values, np.full(extra, end)]),
-            np.concatenate([slopes, np.zeros(extra)]),
-        )
-
+    last = drive.load[-1] + drive.load_slope[-1] * float(drive.edges[-1] - drive.edges[-2])
     return Drive(
-        edges, *padded(drive.pull, drive.pull_slope), *padded(drive.load, drive.load_slope)
+        edges,
+        np.concatenate([drive.pull, np.full(extra, drive.pull[-1])]),
+        np.concatenate([drive.load, np.full(extra, last)]),
+        np.concatenate([drive.load_slope, np.zeros(extra)]),
     )
 
 
@@ -87,7 +81,7 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
     return Excitation(
         w=1 + ratio * (load - 1),
         w_slope=ratio * drive.load_slope[piece],
-        pull=drive.pull[piece] + drive.pull_slope[piece] * since,
+        pull=drive.pull[piece],
     )
 
 

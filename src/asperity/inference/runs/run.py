@@ -561,7 +561,7 @@ def _drive(
     at_edges = np.interp(edges, knots, load)
     slope = np.diff(at_edges) / np.diff(edges)
     cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
-    return Drive(edges, pull, np.zeros_like(pull), at_edges[:-1], slope), cuts
+    return Drive(edges, pull, at_edges[:-1], slope), cuts
 
 
 def run_of(data: Any) -> RecordedRun:
