@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from benchmarks.stick_slip_recordings import repeated, trace_of
 from scipy.stats import chi2
 
 import asperity as asp
@@ -15,7 +16,6 @@ from asperity.inference.fitting.fit import fit
 from asperity.inference.runs.run import RecordedRun
 from asperity.laws import RiceRuina
 from asperity.questions.fit import Fit
-from asperity.recording import Channel, Trace
 from asperity.transients.limit_cycle import limit_cycle
 
 W0, V, RATE, CYCLES = 1.0, 1e-4, 200.0, 40
@@ -34,13 +34,8 @@ def made():
 def recorded(seed, noise=0.02, spread=0.0, rate=RATE):
     """The cycle over and over, its level and size normal from slip to slip, with white noise."""
     cycle, rng = made(), np.random.default_rng(seed)
-    t = np.arange(0, CYCLES * cycle.period, 1 / rate)
-    place = t + rng.uniform() * cycle.period
-    force = cycle.force(place)
-    size = 1 + spread * rng.standard_normal(CYCLES + 2)
-    force = cycle.lowest + (force - cycle.lowest) * size[(place // cycle.period).astype(int)]
-    force = force + noise * cycle.drop * rng.standard_normal(t.size)
-    return Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+    t, force = repeated(cycle, CYCLES, 1 / rate, rng, spread)
+    return trace_of(t, force + noise * cycle.drop * rng.standard_normal(t.size))
 
 
 def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
