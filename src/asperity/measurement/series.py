@@ -19,14 +19,13 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 
-#: Cosine transforms from which the noise of a mean is estimated.
-_COSINES = 8
+#: Most blocks of a mean level.
 _MOST_BLOCKS = 512
 #: Two rates differ if noise alone has less than this probability of such a difference.
 _ACCIDENT = 3e-3
 
-#: Most bins of a segment, and cosines from which its slow noise is estimated.
-_BINS, _TREND_COSINES = 400, 8
+#: Most bins of a segment, and cosines from which slow noise is estimated.
+_BINS, _COSINES = 400, 8
 #: Scatter of the log of a squared projection, a chi-squared number of one degree of freedom.
 _LOG_SCATTER = 2.22
 
@@ -80,20 +79,15 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
 
     Notes
     -----
-    The variance of the mean is that of the first type-II cosine transforms of the series, because
-    they have the same slow noise as the mean (equal-weighted cosines: Mueller, J. Econometrics 141,
-    1331, 2007). A slow drift counts as noise.
+    The uncertainty is that of a level without trend, by `slow_variance`: a slow drift counts as
+    noise.
     """
-    means = block_means(values, _MOST_BLOCKS)
-    n = means.size
-    cosines = min(_COSINES, n - 1)
-    if cosines < 1:
-        return MeanLevel(float(values.mean()), np.inf, 1.0, float(time[0]), float(time[-1]))
-    at = (np.arange(n) + 0.5) * np.pi / n
-    waves = np.cos(np.arange(1, cosines + 1)[:, None] * at)
-    transform = waves @ (means - means.mean()) * np.sqrt(2.0) / n
-    spread = float(np.sqrt(np.mean(transform**2)))
-    return MeanLevel(float(values.mean()), spread, float(cosines), float(time[0]), float(time[-1]))
+    means, mean = block_means(values, _MOST_BLOCKS), float(values.mean())
+    span = float(time[0]), float(time[-1])
+    if means.size < 2:
+        return MeanLevel(mean, np.inf, 1.0, *span)
+    variance, dof = slow_variance(means - means.mean(), np.ones((means.size, 1)))
+    return MeanLevel(mean, float(np.sqrt(variance / means.size)), float(dof), *span)
 
 
 def neighbour_scatter(values: Float) -> float:
@@ -266,7 +260,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
         The fitted columns, which have absorbed part of the noise.
     """
     n, taken = matrix.shape
-    count = max(1, min(_TREND_COSINES, (n - taken) // 4))
+    count = max(1, min(_COSINES, (n - taken) // 4))
     most = min(n - 1, 3 * count + taken)
     if most <= taken:
         return float(np.mean(residual**2)), 1
