@@ -156,6 +156,8 @@ def steady_from(values: Float, degree: int) -> int:
     n = values.size
     if n < 8:
         return 0
+    # Not an exponential, as in `window.settled`: friction in a hold falls over decades of time, and
+    # what one exponential leaves moves the levels of holds by two to three uncertainties.
     errors = []
     for cut in range(n // 2 + 1):
         late = values[cut:]

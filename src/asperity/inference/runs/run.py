@@ -341,11 +341,8 @@ def recorded_load(
     InputError
         If the load is not positive.
     """
-    try:
-        channel = trace.channel(load)
-    except InputError:
-        if load != "W":
-            raise
+    channel = load_channel(trace, load)
+    if channel is None:
         return None
     good = np.isfinite(channel.values) & (trace.time >= time[0]) & (trace.time <= time[-1])
     t, W = trace.time[good], compressive(channel.values[good], channel.values[good])[0]
