@@ -62,7 +62,7 @@ def test_whole_periods_are_counted_in_samples(rate, frequency, expected) -> None
 
 @pytest.mark.parametrize(("correlation", "share"), [(0.95, 0.92), (0.9967, 0.84)])
 def test_a_mean_covers_its_truth_in_slow_noise(red_noise, correlation, share) -> None:
-    """Correlated over 20 samples, and over a tenth of the stretch, where eight cosines cover 0.79."""
+    """Correlated over 20 samples, and over a tenth of the stretch (by cosines alone 0.79)."""
     rng = np.random.default_rng(0)
     time = np.arange(3000) * 1e-3
     hits = 0

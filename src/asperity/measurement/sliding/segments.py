@@ -19,6 +19,7 @@ import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.measurement.series import slope_of
+from asperity.recording.defects.levels import recorder_step
 
 #: First sample of a piece, and the sample after its last.
 Piece = tuple[int, int]
@@ -29,6 +30,8 @@ _BLOCKS, _PARTS = 300, 12
 #: Fewest means from which noise is estimated; parts of a recording, of which the quietest quarter
 #: gives the noise.
 _MEANS, _QUIET_PARTS = 96, 16
+#: A recorder is coarse if this share of its samples repeats the one before.
+_COARSE = 0.2
 #: Multiple of the penalty of the Bayesian information criterion for a piece, as noise of a gauge is
 #: not white.
 _PENALTY = 2.0
@@ -210,8 +213,7 @@ def _motion(time: Float, displacement: Float) -> _Motion:
             noise, slow = max(noise, spread), max(slow, spread * np.sqrt(n))
         n *= 2
     # With a coarse recorder most differences are zero: its step is the noise.
-    moved = np.abs(np.diff(displacement))
-    step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
+    step = recorder_step(displacement, _COARSE)
     floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
     return _Motion(
         time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step
