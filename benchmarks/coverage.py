@@ -134,16 +134,17 @@ def integrated(
     return out
 
 
-def trace_of(time: np.ndarray, mu: np.ndarray, slip: np.ndarray, load: np.ndarray) -> Trace:
-    """A recording of friction, displacement (m) and normal stress (Pa)."""
-    return Trace(
-        time,
-        {
-            "friction": Channel(mu, "dimensionless", "", "friction", ""),
-            "displacement": Channel(slip, "length", "m", "displacement", "m"),
-            "normal_stress": Channel(load, "pressure", "Pa", "ns", "Pa"),
-        },
-    )
+def trace_of(
+    time: np.ndarray, mu: np.ndarray, slip: np.ndarray, load: np.ndarray | None = None
+) -> Trace:
+    """A recording of friction, displacement (m) and perhaps normal stress (Pa)."""
+    channels = {
+        "friction": Channel(mu, "dimensionless", "", "friction", ""),
+        "displacement": Channel(slip, "length", "m", "displacement", "m"),
+    }
+    if load is not None:
+        channels["normal_stress"] = Channel(load, "pressure", "Pa", "ns", "Pa")
+    return Trace(time, channels)
 
 
 def wander(white: np.ndarray, start: float, steps: float) -> np.ndarray:

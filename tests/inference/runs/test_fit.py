@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
+from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of, trace_of
 from scipy.signal import lfilter
 
 from asperity.errors import InputError
@@ -27,23 +27,12 @@ from asperity.inference.runs.noise import largest_departure
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response
-from asperity.recording import Channel, Trace
 from asperity.slider import Slider
 from benchmarks import coverage
 from references.populations import population
 
 CASE = CASES["steps"]
 FREE = ["A", "B", "D0"]
-
-
-def trace_of(time, values, displacement, load=None):
-    channels = {
-        "friction": Channel(values, "dimensionless", "", "friction", ""),
-        "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-    }
-    if load is not None:
-        channels["normal stress"] = Channel(load, "pressure", "Pa", "normal stress", "Pa")
-    return Trace(time, channels)
 
 
 @pytest.fixture(scope="module")
