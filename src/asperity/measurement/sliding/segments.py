@@ -18,6 +18,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from asperity.arrays import Float, Index
+from asperity.errors import InputError, require
 from asperity.measurement.series import slope_of
 from asperity.recording.defects.levels import recorder_step
 
@@ -140,6 +141,33 @@ def partition(time: Float, displacement: Float | None) -> Partition:
     means = [_mean_velocity(motion, *each) for each in zip(parts, between, strict=True)]
     speeds, holds, unsure = _speeds(motion, pieces, means)
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
+
+
+def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
+    """Refuse times of the user that do not cut a recording into segments.
+
+    Parameters
+    ----------
+    time : array, (n,)
+    cuts : sequence of float
+        Seconds.
+    label : str
+        Name of the argument.
+
+    Raises
+    ------
+    InputError
+        If one lies outside of the recording, or there are too few samples between two.
+    """
+    for at in cuts:
+        if not time[0] < at < time[-1]:
+            advice = f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+            raise InputError(label, "lie inside the recording", f"{at:.10g} s", advice)
+    samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
+    for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
+        rule = f"rise, with at least {_FEWEST} samples between them and the ends"
+        got = f"{max(b - a, 0)} before {at:.10g} s"
+        require(b - a >= _FEWEST, label, rule, got, "leave one out, or correct them")
 
 
 def partition_at(
