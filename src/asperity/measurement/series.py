@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
+from asperity.lock_in.noise import red_exponent
 
 #: Most blocks of a mean level.
 _MOST_BLOCKS = 512
@@ -136,6 +137,14 @@ def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
     beta = covariance @ (matrix.T @ (values / uncertainty))
     left, free = values / uncertainty - matrix @ beta, values.size - 2
     return WeightedLine(beta, covariance, float(left @ left) / free if free else 1.0)
+
+
+def weighted_mean(values: Float, uncertainty: Float) -> tuple[float, float]:
+    """Mean, and its uncertainty by those of the values or by their scatter, whichever is larger."""
+    weight = 1 / uncertainty**2
+    mean = float(weight @ values / weight.sum())
+    excess = float(weight @ (values - mean) ** 2) / max(values.size - 1, 1)
+    return mean, float(np.sqrt(max(excess, 1.0) / weight.sum()))
 
 
 def steady_from(values: Float, degree: int) -> int:
@@ -274,13 +283,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     gram[np.diag_indices_from(gram)] *= 1 + 1e-10
     projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
     power = projections[taken:] ** 2
-    slow = float(power[:count].mean())
     # The fitted columns have absorbed the strongest part of noise that grows towards zero.
-    away = np.log(np.arange(1, power.size + 1) + taken / 2)
-    centred = away - away.mean()
-    lever = float(centred @ centred)
-    exponent = -float(centred @ np.log(np.maximum(power, 1e-300))) / max(lever, 1e-300)
-    if exponent > 2.5 * _LOG_SCATTER / np.sqrt(max(lever, 1e-300)):
-        exponent = min(exponent, 1.0)
-        slow /= float(np.mean(np.exp(-exponent * away[:count])))
-    return slow, count
+    lines = np.arange(1, power.size + 1) + taken / 2
+    exponent = red_exponent(lines, power, _LOG_SCATTER)
+    return float(power[:count].mean() / np.mean(lines[:count] ** -exponent)), count
