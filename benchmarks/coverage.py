@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import time as clock
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -209,12 +209,7 @@ TRUE = CASES["steps"].true
 
 
 def covered(
-    case: Case,
-    sets: int,
-    options: RunOptions,
-    seed: int = 0,
-    noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
-    starts: int = 4,
+    runs: Iterable[RecordedRun], case: Case, options: RunOptions | None = None, starts: int = 4
 ) -> dict[str, Any]:
     """Shares of intervals that hold the truth, by parameter, with means of their widths."""
     true = case.true
@@ -223,7 +218,7 @@ def covered(
     off: dict[str, list[float]] = {n: [] for n in true}
     failed, noise_rejected, done = 0, 0, 0
     begun = clock.perf_counter()
-    for run in runs_of(case, sets, seed, noise):
+    for run in runs:
         found = fit(
             run,
             case.law,
@@ -263,6 +258,16 @@ def covered(
     }
 
 
+def print_shares(name: str, result: dict[str, Any]) -> None:
+    """A line for each parameter of a result of `covered`."""
+    for n, row in result["parameters"].items():
+        print(
+            f"{name} {n:3} 68 %: {100 * row['cover_68']:5.1f}  95 %: {100 * row['cover_95']:5.1f}  "
+            f"se {row['mean_se']:.3g} scatter {row['scatter']:.3g} bias {row['bias']:+.2g}",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Print the table of both kinds of intervals."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -281,15 +286,11 @@ def main() -> None:
         if arguments.coloured_only:
             ways.pop("white")
         for way, options in ways.items():
-            result = covered(CASES[name], arguments.sets, options, arguments.seed, noise)
+            case = CASES[name]
+            runs = runs_of(case, arguments.sets, arguments.seed, noise)
+            result = covered(runs, case, options)
             print(json.dumps({"case": name, "noise": way, **result}), flush=True)
-            for n, row in result["parameters"].items():
-                print(
-                    f"{name:6} {way:14} {n:3} 68 %: {100 * row['cover_68']:5.1f}  95 %: "
-                    f"{100 * row['cover_95']:5.1f}  se {row['mean_se']:.3g} scatter "
-                    f"{row['scatter']:.3g} bias {row['bias']:+.2g}",
-                    flush=True,
-                )
+            print_shares(f"{name:6} {way:14}", result)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,15 @@ from scipy.signal import lfilter
 from asperity import read
 from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
 from benchmarks.clock import pin_to_one_core
-from benchmarks.coverage import LOAD, Case, friction, trace_of, wander
+from benchmarks.coverage import (
+    LOAD,
+    Case,
+    covered,
+    friction,
+    print_shares,
+    trace_of,
+    wander,
+)
 
 FREE = ["A", "B", "D0", "alpha"]
 #: Standard deviations over friction: white, resonance, wandering over 0.5 and 8 s, mains.
@@ -93,23 +101,6 @@ def short_runs(case: Case, sets: int) -> Iterator[RecordedRun]:
         yield recorded_run(trace, name="run")
 
 
-def counted(sets: int) -> None:
-    """Print how many intervals hold the truth, standard errors and the scatter of estimates."""
-    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in SHORT.true}
-    for run in short_runs(SHORT, sets):
-        found = fit(run, SHORT.law, FREE[:3], start={n: SHORT.true[n] for n in FREE[:3]}, starts=1)
-        for name, truth in SHORT.true.items():
-            p = found.parameters[name]
-            held = [low <= truth <= high for low, high in (p.interval_68, p.interval_95)]
-            rows[name].append((*held, p.se / truth, p.value / truth - 1))
-    for name, values in rows.items():
-        held_68, held_95, error, off = np.array(values, float).T
-        print(
-            f"{name:3} 68 %: {100 * held_68.mean():.0f}  95 %: {100 * held_95.mean():.0f}  "
-            f"standard error {error.mean():.3g}  scatter {off.std():.3g}"
-        )
-
-
 def main() -> None:
     """Print times, memory and estimates."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -120,7 +111,7 @@ def main() -> None:
     parser.add_argument("--sets", type=int, help="count intervals of so many short recordings")
     arguments = parser.parse_args()
     if arguments.sets:
-        counted(arguments.sets)
+        print_shares("short", covered(short_runs(SHORT, arguments.sets), SHORT, starts=1))
         return
     case = programme(arguments.seconds, arguments.rate)
     with tempfile.TemporaryDirectory() as folder:

@@ -112,8 +112,8 @@ def test_exact_recordings_give_the_truth():
 def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
     sets = 8
     # One start besides the truth: the minimum is not what is in question.
-    white = covered(CASE, sets, RunOptions(order=0), starts=1)["parameters"]
-    right = covered(CASE, sets, RunOptions(), starts=1)["parameters"]
+    white = covered(runs_of(CASE, sets), CASE, RunOptions(order=0), starts=1)["parameters"]
+    right = covered(runs_of(CASE, sets), CASE, starts=1)["parameters"]
     inside = np.mean([right[n]["cover_95"] for n in TRUE])
     # Of 8 sets of 4 correlated parameters: a spread of some 8 %.
     assert inside > 0.8
