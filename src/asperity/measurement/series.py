@@ -282,7 +282,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     # Cosines nearly span a trend: the remainder of the last cosines must exceed rounding errors.
     gram[np.diag_indices_from(gram)] *= 1 + 1e-10
     projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
-    power = projections[taken:] ** 2
+    power = np.asarray(projections[taken:] ** 2, dtype=np.float64)
     # The fitted columns have absorbed the strongest part of noise that grows towards zero.
     lines = np.arange(1, power.size + 1) + taken / 2
     exponent = red_exponent(lines, power, _LOG_SCATTER)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -59,49 +59,39 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def stress_to_force(
-    trace: Trace, area: float | str, channels: Sequence[str] | None = None
-) -> Trace:
-    """Convert stresses to forces by the nominal contact area.
+def stress_to_force(trace: Trace, area: float | str) -> Trace:
+    """Convert all stresses to forces by the nominal contact area.
 
     Parameters
     ----------
     trace : Trace
         Any recording.
     area : float or str
-        Nominal contact area (m^2, or a text such as ``"25 cm^2"``), the same for all channels.
-    channels : sequence of str, optional
-        Names or roles; all pressures by default.
+        Nominal contact area (m^2, or a text such as ``"25 cm^2"``).
 
     Returns
     -------
     Trace
-        With these channels in newton under the same names, the area in its provenance.
+        With forces (N) under the names of the stresses, the area in its provenance.
 
     Raises
     ------
     InputError
-        If the area is not positive, or a channel is no pressure.
+        If the area is not positive, or no channel is a stress.
     """
     size = number(area, "stress_to_force.area", "area", "positive")
-    wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
-    if channels is not None:
-        wanted = [_pressure(trace, name) for name in channels]
+    stresses = [k for k, c in trace.channels.items() if c.kind == "pressure"]
     advice = "leave it out, or give the channel its unit"
-    require(wanted, "stress_to_force.area", "go with a stress", "a recording without", advice)
-    converted = {
-        name: replace(c, values=c.values * size, kind="force", unit="N") if name in wanted else c
-        for name, c in trace.channels.items()
+    require(stresses, "stress_to_force.area", "go with a stress", "a recording without", advice)
+    forces = {
+        k: replace(
+            trace.channels[k], values=trace.channels[k].values * size, kind="force", unit="N"
+        )
+        for k in stresses
     }
-    note = {"area (m^2)": size, "stresses made forces": wanted}
-    return replace(trace, channels=converted, provenance={**trace.provenance, **note})
-
-
-def _pressure(trace: Trace, name: str) -> str:
-    channel = trace.channel(name)
-    rule, got = "be pressures", f"'{name}' in '{channel.unit}'"
-    require(channel.kind == "pressure", "stress_to_force.channels", rule, got, "leave it out")
-    return trace.name_of(channel)
+    note = {"area (m^2)": size, "stresses made forces": stresses}
+    channels, provenance = {**trace.channels, **forces}, {**trace.provenance, **note}
+    return replace(trace, channels=channels, provenance=provenance)
 
 
 def _with_channel(

@@ -12,8 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.measurement.stick_slip.detection import Falls
-from asperity.measurement.stick_slip.lines import Sums
+from asperity.measurement.stick_slip.detection import Falls, Sums
 from asperity.recording.defects.autoregression import Autoregression, fitted
 from asperity.recording.defects.levels import recorder_step
 
