@@ -43,18 +43,24 @@ class Batch:
     def numbers(self) -> dict[str, np.ndarray]:
         """Dimensionless numbers of the equations in `benchmarks.equations`, each (points,)."""
         slider = self.slider()
-        law = slider.law
-        omega = 2 * np.pi * FREQUENCY
-        numbers = {
-            "mu": law.mu0 - (law.B - law.A) * np.log(self.velocity / law.V0),
-            "A": law.A,
-            "B": law.B,
-            "kappa": self.velocity * slider.K / (omega * slider.W0),
-            "ratio": law.elastic_length * slider.K / slider.W0,
-            "ageing": self.velocity / (omega * law.D0),
-            "epsilon": self.epsilon,
-        }
-        return {name: np.broadcast_to(value, len(self)) for name, value in numbers.items()}
+        return dimensionless(slider.law, slider.K / slider.W0, self.velocity, self.epsilon)
+
+
+def dimensionless(
+    law: asp.laws.Law, stiffness: float, velocity: np.ndarray, epsilon: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Numbers of the equations in `benchmarks.equations` for points (n,) and K/W0 (1/m)."""
+    omega = 2 * np.pi * FREQUENCY
+    numbers = {
+        "mu": law.mu0 - (law.B - law.A) * np.log(velocity / law.V0),
+        "A": law.A,
+        "B": law.B,
+        "kappa": velocity * stiffness / omega,
+        "ratio": law.elastic_length * stiffness,
+        "ageing": velocity / (omega * law.D0),
+        "epsilon": epsilon,
+    }
+    return {name: np.broadcast_to(value, len(velocity)) for name, value in numbers.items()}
 
 
 def batch(law: str, points: int) -> Batch:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -65,6 +65,12 @@ class Case:
         """W/W0, linear between the given times."""
         return np.interp(time, *np.array(self.loads).T)
 
+    def slip(self, time: np.ndarray) -> np.ndarray:
+        """Displacement of the drive (m)."""
+        edges = np.array([0.0, *self.changes, self.end])
+        moved = np.cumsum(np.array(self.velocities) * np.diff(edges))
+        return np.interp(time, edges, [0.0, *moved])
+
 
 CASES = {
     "steps": Case((3e-6, 1e-5, 3e-6), (40.0, 80.0), 140.0, 10.0),
@@ -82,45 +88,81 @@ CASES = {
 
 def friction(case: Case, time: np.ndarray) -> np.ndarray:
     """Friction of the ageing law at the samples, by SciPy."""
-    A, B, D0, V0, mu0 = (TRUTH[n] for n in ("A", "B", "D0", "V0", "mu0"))
-    share = TRUTH["alpha"] / B if len(case.loads) > 1 else 0.0
-
-    def rhs(t: float, y: np.ndarray, V: float) -> list[float]:
-        # y[1] + share ln w is the logarithm of the age, by Linker and Dieterich.
-        w = case.load(t)
-        log_age = y[1] - share * np.log(w)
-        v = V0 * np.exp((y[0] / w - mu0 - B * log_age) / A)
-        return [STIFFNESS * (V - v), (V0 * np.exp(-log_age) - v) / D0]
-
-    first = np.log(case.velocities[0] / V0)
-    y = np.array([mu0 + (A - B) * first, -first])
-    out = np.empty_like(time)
     changes = sorted({*case.changes, *(t for t, _ in case.loads if t > 0)})
     edges = [0.0, *changes, case.end]
-    for a, b in pairwise(edges):
-        V = case.velocities[np.searchsorted(case.changes, (a + b) / 2)]
-        here = (time >= a) & ((time < b) | (b == case.end))
+    velocities = [
+        case.velocities[np.searchsorted(case.changes, (a + b) / 2)] for a, b in pairwise(edges)
+    ]
+    share = TRUTH["alpha"] if len(case.loads) > 1 else 0.0
+    numbers = TRUTH | {"k": STIFFNESS, "alpha": share}
+    return integrated(numbers, edges, velocities, time, case.load)
+
+
+def integrated(
+    numbers: Mapping[str, float],
+    edges: Sequence[float],
+    velocities: Sequence[float],
+    time: np.ndarray,
+    load: Callable[[Any], Any] = np.ones_like,
+    tolerance: float = 1e-11,
+) -> np.ndarray:
+    """F/W of the ageing law at times, from steady sliding, by SciPy.
+
+    The numbers are mu0, A, B, D0, V0, alpha and k = K/W0. The velocity of the drive is constant
+    between the edges (s), and W/W0 is `load` of the time.
+    """
+    mu0, A, B, D0, V0, alpha, k = (numbers[n] for n in ("mu0", "A", "B", "D0", "V0", "alpha", "k"))
+
+    def rhs(t: float, y: np.ndarray, V: float) -> list[float]:
+        # y[1] + alpha/B ln w is the logarithm of the age, by Linker and Dieterich.
+        w = load(t)
+        log_age = y[1] - alpha / B * np.log(w)
+        v = V0 * np.exp((y[0] / w - mu0 - B * log_age) / A)
+        return [k * (V - v), (V0 * np.exp(-log_age) - v) / D0]
+
+    first = np.log(velocities[0] / V0)
+    y = np.array([mu0 + (A - B) * first, -first])
+    out = np.empty_like(time)
+    for V, (a, b) in zip(velocities, pairwise(edges), strict=True):
+        here = (time >= a) & ((time < b) | (b == edges[-1]))
         solution = solve_ivp(
-            rhs, (a, b), y, method="LSODA", rtol=1e-11, atol=1e-13, dense_output=True, args=(V,)
-        )
-        out[here] = solution.sol(time[here])[0] / case.load(time[here])
+            rhs, (a, b), y, method="LSODA", rtol=tolerance, atol=tolerance / 100,
+            dense_output=True, args=(V,),
+        )  # fmt: skip
+        out[here] = solution.sol(time[here])[0] / load(time[here])
         y = solution.y[:, -1]
     return out
+
+
+def trace_of(
+    time: np.ndarray, mu: np.ndarray, slip: np.ndarray, load: np.ndarray | None = None
+) -> Trace:
+    """A recording of friction, displacement (m) and perhaps normal stress (Pa)."""
+    channels = {
+        "friction": Channel(mu, "dimensionless", "", "friction", ""),
+        "displacement": Channel(slip, "length", "m", "displacement", "m"),
+    }
+    if load is not None:
+        channels["normal_stress"] = Channel(load, "pressure", "Pa", "ns", "Pa")
+    return Trace(time, channels)
+
+
+def wander(white: np.ndarray, start: float, steps: float) -> np.ndarray:
+    """Noise of unit variance with a correlation of so many steps, from white noise."""
+    a = np.exp(-1 / steps)
+    return np.asarray(lfilter([1.0], [1.0, -a], white * np.sqrt(1 - a * a), zi=[a * start])[0])
 
 
 def coloured(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
     """Noise with the correlation of real gauges: white, correlated over 1 s and 10 s, a line."""
     white = random.normal(size=n)
-    quick, slow = (np.exp(-1 / (rate * tau)) for tau in (0.5, 8.0))
-
-    def wander(a: float) -> np.ndarray:
-        start = random.normal()
-        steps = random.normal(size=n) * np.sqrt(1 - a * a)
-        return np.asarray(lfilter([1.0], [1.0, -a], steps, zi=[a * start])[0])
-
     t = np.arange(n) / rate
     line = np.sqrt(2) * np.cos(2 * np.pi * (1.37 * t + random.random()))
-    return NOISE * (0.7 * white + 0.5 * wander(quick) + 0.4 * wander(slow) + 0.2 * line)
+    quick, slow = (
+        wander(start=random.normal(), white=random.normal(size=n), steps=rate * tau)
+        for tau in (0.5, 8.0)
+    )
+    return NOISE * (0.7 * white + 0.5 * quick + 0.4 * slow + 0.2 * line)
 
 
 def resampled(path: Path) -> Callable[[np.random.Generator, int, float], np.ndarray]:
@@ -152,10 +194,7 @@ def runs_of(
     """Recordings of one truth with different noise."""
     time = np.arange(int(case.end * case.rate)) / case.rate
     clean = friction(case, time)
-    edges = np.array([0.0, *case.changes, case.end])
-    path = np.interp(
-        time, edges, np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
-    )
+    path = case.slip(time)
     for k in range(sets):
         random = np.random.default_rng([seed, k])
         noisy = clean + (noise or coloured)(random, time.size, case.rate)
@@ -163,27 +202,14 @@ def runs_of(
         load = LOAD * case.load(time)
         if len(case.loads) > 1:
             load += LOAD_NOISE * LOAD * random.normal(size=time.size)
-        trace = Trace(
-            time,
-            {
-                "friction": Channel(noisy, "dimensionless", "", "friction", ""),
-                "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-                "normal_stress": Channel(load, "pressure", "Pa", "ns", "Pa"),
-            },
-        )
-        yield recorded_run(trace, name="run")
+        yield recorded_run(trace_of(time, noisy, displacement, load), name="run")
 
 
 TRUE = CASES["steps"].true
 
 
 def covered(
-    case: Case,
-    sets: int,
-    options: RunOptions,
-    seed: int = 0,
-    noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
-    starts: int = 4,
+    runs: Iterable[RecordedRun], case: Case, options: RunOptions | None = None, starts: int = 4
 ) -> dict[str, Any]:
     """Shares of intervals that hold the truth, by parameter, with means of their widths."""
     true = case.true
@@ -192,7 +218,7 @@ def covered(
     off: dict[str, list[float]] = {n: [] for n in true}
     failed, noise_rejected, done = 0, 0, 0
     begun = clock.perf_counter()
-    for run in runs_of(case, sets, seed, noise):
+    for run in runs:
         found = fit(
             run,
             case.law,
@@ -232,6 +258,16 @@ def covered(
     }
 
 
+def print_shares(name: str, result: dict[str, Any]) -> None:
+    """A line for each parameter of a result of `covered`."""
+    for n, row in result["parameters"].items():
+        print(
+            f"{name} {n:3} 68 %: {100 * row['cover_68']:5.1f}  95 %: {100 * row['cover_95']:5.1f}  "
+            f"se {row['mean_se']:.3g} scatter {row['scatter']:.3g} bias {row['bias']:+.2g}",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Print the table of both kinds of intervals."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -250,15 +286,11 @@ def main() -> None:
         if arguments.coloured_only:
             ways.pop("white")
         for way, options in ways.items():
-            result = covered(CASES[name], arguments.sets, options, arguments.seed, noise)
+            case = CASES[name]
+            runs = runs_of(case, arguments.sets, arguments.seed, noise)
+            result = covered(runs, case, options)
             print(json.dumps({"case": name, "noise": way, **result}), flush=True)
-            for n, row in result["parameters"].items():
-                print(
-                    f"{name:6} {way:14} {n:3} 68 %: {100 * row['cover_68']:5.1f}  95 %: "
-                    f"{100 * row['cover_95']:5.1f}  se {row['mean_se']:.3g} scatter "
-                    f"{row['scatter']:.3g} bias {row['bias']:+.2g}",
-                    flush=True,
-                )
+            print_shares(f"{name:6} {way:14}", result)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from collections import deque
 import numpy as np
 
 from benchmarks.cases import Batch
-from benchmarks.equations import Answer, averaged_limit, force_rest, read
+from benchmarks.equations import Answer, averaged_limit, force_rest, rates, read
 from benchmarks.scipy_marching import LAST, SETTLED
 
 _SAMPLES = 32
@@ -49,17 +49,9 @@ def _period(state, numbers: dict, z0):
     import diffrax
     import jax.numpy as jnp
 
-    def rates(theta, state, _):
-        n = numbers
-        w = 1 + n["epsilon"] * jnp.cos(theta)
-        f = (z0 + n["kappa"] * state[0]) * w / (w + n["ratio"])
-        phi = state[1] + n["ageing"] / n["kappa"] * f
-        slip = jnp.exp((f / w - n["mu"] - n["B"] * phi) / n["A"])
-        return jnp.stack([1 - slip, n["ageing"] * (jnp.exp(-phi) - 1)])
-
     theta = jnp.linspace(0, 2 * np.pi, _SAMPLES + 1)
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates),
+        diffrax.ODETerm(lambda theta, y, _: jnp.stack(rates(theta, y, numbers, z0, jnp))),
         diffrax.Tsit5(),
         0.0,
         2 * np.pi,

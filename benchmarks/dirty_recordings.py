@@ -21,14 +21,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from asperity.errors import InputError
 from asperity.inference import fit, recorded_run
 from asperity.inference.fitting import fit as fitting
 from asperity.inference.runs import blocks, cleaning
-from asperity.recording import Channel, Trace
-from benchmarks.coverage import CASES, LOAD, LOAD_NOISE, NOISE, Case, coloured, friction
+from asperity.recording import Trace
+from benchmarks.coverage import (
+    CASES,
+    LOAD,
+    LOAD_NOISE,
+    NOISE,
+    Case,
+    coloured,
+    friction,
+    trace_of,
+    wander,
+)
 
 Float = np.ndarray
 #: Standard errors off the truth from which on an answer is wrong.
@@ -86,8 +95,9 @@ def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> F
 
 def slow(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
     """Noise of half its size besides, with a correlation of 10 to 300 samples."""
-    a = np.exp(-1 / np.exp(random.uniform(np.log(10), np.log(300))))
-    begun = lfilter([1.0], [1.0, -a], random.normal(size=x.size + 2000) * np.sqrt(1 - a * a))
+    steps = np.exp(random.uniform(np.log(10), np.log(300)))
+    # It has forgotten its start after 2,000 samples.
+    begun = wander(random.normal(size=x.size + 2000), 0.0, steps)
     return np.asarray(x + 0.5 * NOISE * begun[2000:])
 
 
@@ -135,26 +145,16 @@ KINDS: dict[str, Callable[[np.random.Generator, Case, Float, Float], Float]] = {
 }
 
 
-def trace_of(kind: str, case: Case, exact: Float, seed: int) -> Trace:
+def dirty_trace(kind: str, case: Case, exact: Float, seed: int) -> Trace:
     """A recording with a defect."""
     random = np.random.default_rng([seed, len(kind), ord(kind[-1])])
     time = np.arange(exact.size) / case.rate
     noisy = KINDS[kind](random, case, time, exact + coloured(random, time.size, case.rate))
-    edges = np.array([0.0, *case.changes, case.end])
-    moved = np.cumsum(np.array(case.velocities) * np.diff(edges))
-    path = np.interp(time, edges, np.concatenate([[0.0], moved]))
     load = LOAD * case.load(time)
     if len(case.loads) > 1:
         load += LOAD_NOISE * LOAD * random.normal(size=time.size)
-    moving = path + 2e-8 * random.normal(size=time.size)
-    return Trace(
-        time,
-        {
-            "friction": Channel(noisy, "dimensionless", "", "friction", ""),
-            "displacement": Channel(moving, "length", "m", "displacement", "m"),
-            "normal_stress": Channel(load, "pressure", "Pa", "ns", "Pa"),
-        },
-    )
+    moving = case.slip(time) + 2e-8 * random.normal(size=time.size)
+    return trace_of(time, noisy, moving, load)
 
 
 def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[str, Any]:
@@ -163,7 +163,7 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
     true = case.true
     begun = clock.process_time()
     try:
-        run = recorded_run(trace_of(kind, case, exact, seed), name="run")
+        run = recorded_run(dirty_trace(kind, case, exact, seed), name="run")
         free = [n for n in true if n != "K"]
         result = fit(run, case.law, free, start=true, starts=1)
     except InputError as error:

@@ -14,7 +14,7 @@ keep their relative accuracy when the response is small.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,16 @@ class Answer(NamedTuple):
 def force(numbers: dict, z: np.ndarray, w: np.ndarray) -> np.ndarray:
     """F/W0."""
     return z * w / (w + numbers["ratio"])
+
+
+def rates(theta, state, numbers: dict, z0, module: Any = np) -> list:
+    """Rates of y and chi by theta, of NumPy or of JAX numbers."""
+    n = numbers
+    w = 1 + n["epsilon"] * module.cos(theta)
+    f = force(n, z0 + n["kappa"] * state[0], w)
+    phi = state[1] + n["ageing"] / n["kappa"] * f
+    slip = module.exp((f / w - n["mu"] - n["B"] * phi) / n["A"])
+    return [1 - slip, n["ageing"] * (module.exp(-phi) - 1)]
 
 
 def averaged_limit(numbers: dict, nodes: int = 24, steps: int = 6) -> tuple[np.ndarray, np.ndarray]:

@@ -32,7 +32,7 @@ from scipy.optimize import least_squares
 import asperity as asp
 from asperity.inference import Fit, Prior, fit, sample_posterior, table_of
 from benchmarks import scipy_shooting
-from benchmarks.cases import FREQUENCY
+from benchmarks.cases import FREQUENCY, dimensionless
 
 PAPER = asp.materials.load("bureau2000")
 LAW = "elasto-plastic"
@@ -57,17 +57,10 @@ class Points:
     def numbers(self) -> dict[str, np.ndarray]:
         """As `benchmarks.cases.Batch.numbers`."""
         p = FIXED | self._free
-        V, omega = self._inputs["V"], 2 * np.pi * FREQUENCY
-        numbers = {
-            "mu": p["mu0"] - (p["B"] - p["A"]) * np.log(V / p["V0"]),
-            "A": p["A"],
-            "B": p["B"],
-            "kappa": V * p["K"] / (omega * p["W0"]),
-            "ratio": p["lambda"] * p["K"] / p["W0"],
-            "ageing": V / (omega * p["D0"]),
-            "epsilon": p["eps_ratio"] * self._inputs["epsilon"],
-        }
-        return {name: np.broadcast_to(value, len(self)) for name, value in numbers.items()}
+        names = {"mu0": "mu0", "A": "A", "B": "B", "D0": "D0", "V0": "V0", "lambda": "lambda_"}
+        law = asp.laws.ElastoPlastic(**{field: p[name] for name, field in names.items()})
+        epsilon = p["eps_ratio"] * self._inputs["epsilon"]
+        return dimensionless(law, p["K"] / p["W0"], self._inputs["V"], epsilon)
 
 
 def integrated(inputs: dict[str, np.ndarray], free: dict[str, float]) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 import asperity as asp
 from asperity.orbit.methods.shooting import averaged_start
 from asperity.slider.problem import checked_problem, flatten
+from benchmarks import ours
 from benchmarks.cases import FREQUENCY, Batch, batch
 from benchmarks.clock import pin_to_one_core, timed
 
@@ -27,15 +28,7 @@ _CLOSED, _NEWTON_STEPS, _LARGEST_CHANGE = 1e-8, 20, 3.0
 
 def respond(points: Batch) -> asp.orbit.PeriodicResponse:
     """Periodic response with inertia."""
-    return asp.periodic_response(
-        points.slider(),
-        velocity=points.velocity,
-        epsilon=points.epsilon,
-        frequency=FREQUENCY,
-        inertia=True,
-        harmonics=2,
-        workers=1,
-    )
+    return ours.respond(points, inertia=True, harmonics=2, workers=1)
 
 
 def numbers_of(points: Batch) -> dict[str, np.ndarray]:
@@ -162,15 +155,15 @@ def _averaged(points: Batch) -> np.ndarray:
 
 def _compare(law: str, count: int, peer_count: int, peers: dict[str, tuple]) -> None:
     points = batch(law, count)
-    seconds, ours = timed(lambda: respond(points), 3 if count > 200 else 1)
-    assert ours.converged.all()
+    seconds, found = timed(lambda: respond(points), 3 if count > 200 else 1)
+    assert found.converged.all()
     few = points.part(slice(peer_count))
-    mine = np.stack([ours.mean_friction, ours.mu1, ours.mu2])[:, :peer_count]
+    mine = np.stack([found.mean_friction, found.mu1, found.mu2])[:, :peer_count]
     each = seconds / count * 1e6
     for peer, (solve, start_of, warm_up) in peers.items():
-        start = start_of(ours, few)
-        peer_seconds, found = timed(lambda: solve(few, start), 1, warm_up=warm_up)  # noqa: B023
-        error, theirs = np.abs(found / mine - 1).max(), peer_seconds / peer_count * 1e6
+        start = start_of(found, few)
+        peer_seconds, answer = timed(lambda: solve(few, start), 1, warm_up=warm_up)  # noqa: B023
+        error, theirs = np.abs(answer / mine - 1).max(), peer_seconds / peer_count * 1e6
         print(
             f"| {law} | {each:,.0f} | {peer} | {theirs:,.0f} | {theirs / each:.3g} | {error:.0e} |"
         )

@@ -23,9 +23,16 @@ from scipy.signal import lfilter
 
 from asperity import read
 from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
-from asperity.recording import Channel, Trace
 from benchmarks.clock import pin_to_one_core
-from benchmarks.coverage import LOAD, Case, friction
+from benchmarks.coverage import (
+    LOAD,
+    Case,
+    covered,
+    friction,
+    print_shares,
+    trace_of,
+    wander,
+)
 
 FREE = ["A", "B", "D0", "alpha"]
 #: Standard deviations over friction: white, resonance, wandering over 0.5 and 8 s, mains.
@@ -47,36 +54,25 @@ def noise(random: np.random.Generator, time: np.ndarray) -> np.ndarray:
     radius, turn = np.exp(-2 * np.pi * 20 * step), np.cos(2 * np.pi * 300 * step)
     ringing = lfilter([1.0], [1.0, -2 * radius * turn, radius**2], random.normal(size=n))
 
-    def wandering(tau: float) -> np.ndarray:
-        a = np.exp(-step / tau)
-        steps = random.normal(size=n) * np.sqrt(1 - a * a)
-        return np.asarray(lfilter([1.0], [1.0, -a], steps, zi=[a * random.normal()])[0])
-
     phase = 2 * np.pi * (50.01 * time + 0.2 * np.sin(2 * np.pi * time / 97.0))
     mains = np.sqrt(2) * (np.cos(phase) + 0.3 * np.cos(3 * phase + 1.0))
-    return np.asarray(
-        WHITE * random.normal(size=n)
-        + RESONANCE * ringing / ringing.std()
-        + QUICK * wandering(0.5)
-        + SLOW * wandering(8.0)
-        + MAINS * mains
-    )
+    result = WHITE * random.normal(size=n) + RESONANCE * ringing / ringing.std() + MAINS * mains
+    for size, tau in ((QUICK, 0.5), (SLOW, 8.0)):
+        result += size * wander(random.normal(size=n), random.normal(), tau / step)
+    return result
 
 
 def columns(case: Case, seed: int = 0) -> dict[str, np.ndarray]:
     """Time (s), normal stress (MPa), shear stress (MPa) and displacement (um) of a recording."""
     random = np.random.default_rng(seed)
     time = np.arange(round(case.end * case.rate)) / case.rate
-    edges = np.array([0.0, *case.changes, case.end])
-    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
     mu = friction(case, time) + noise(random, time)
     load = 1e-6 * LOAD * case.load(time)
     return {
         "time_s": time,
         "normal_stress_MPa": load * (1 + 2e-4 * random.normal(size=time.size)),
         "friction": mu,
-        "displacement_um": 1e6 * np.interp(time, edges, slip)
-        + 0.02 * random.normal(size=time.size),
+        "displacement_um": 1e6 * case.slip(time) + 0.02 * random.normal(size=time.size),
     }
 
 
@@ -97,36 +93,12 @@ def short_runs(case: Case, sets: int) -> Iterator[RecordedRun]:
     """Recordings of one motion with different noise."""
     time = np.arange(round(case.end * case.rate)) / case.rate
     clean = friction(case, time)
-    edges = np.array([0.0, *case.changes, case.end])
-    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
     for seed in range(sets):
         random = np.random.default_rng([7, seed])
         mu = clean + 0.3 * noise(random, time)
-        displacement = np.interp(time, edges, slip) + 2e-8 * random.normal(size=time.size)
-        load = np.full(time.size, LOAD)
-        channels = {
-            "friction": Channel(mu, "dimensionless", "", "friction", ""),
-            "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-            "normal_stress": Channel(load, "pressure", "Pa", "normal stress", "Pa"),
-        }
-        yield recorded_run(Trace(time, channels), name="run")
-
-
-def counted(sets: int) -> None:
-    """Print how many intervals hold the truth, standard errors and the scatter of estimates."""
-    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in SHORT.true}
-    for run in short_runs(SHORT, sets):
-        found = fit(run, SHORT.law, FREE[:3], start={n: SHORT.true[n] for n in FREE[:3]}, starts=1)
-        for name, truth in SHORT.true.items():
-            p = found.parameters[name]
-            held = [low <= truth <= high for low, high in (p.interval_68, p.interval_95)]
-            rows[name].append((*held, p.se / truth, p.value / truth - 1))
-    for name, values in rows.items():
-        held_68, held_95, error, off = np.array(values, float).T
-        print(
-            f"{name:3} 68 %: {100 * held_68.mean():.0f}  95 %: {100 * held_95.mean():.0f}  "
-            f"standard error {error.mean():.3g}  scatter {off.std():.3g}"
-        )
+        displacement = case.slip(time) + 2e-8 * random.normal(size=time.size)
+        trace = trace_of(time, mu, displacement, np.full(time.size, LOAD))
+        yield recorded_run(trace, name="run")
 
 
 def main() -> None:
@@ -139,7 +111,7 @@ def main() -> None:
     parser.add_argument("--sets", type=int, help="count intervals of so many short recordings")
     arguments = parser.parse_args()
     if arguments.sets:
-        counted(arguments.sets)
+        print_shares("short", covered(short_runs(SHORT, arguments.sets), SHORT, starts=1))
         return
     case = programme(arguments.seconds, arguments.rate)
     with tempfile.TemporaryDirectory() as folder:

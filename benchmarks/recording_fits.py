@@ -18,47 +18,30 @@ from __future__ import annotations
 import argparse
 import importlib
 from dataclasses import replace
-from itertools import pairwise
 
 import jax
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from asperity.inference import Fit, compare, fit, sample_posterior
 from asperity.inference.posterior.density import Whitened
-from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, runs_of
+from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, integrated, runs_of
 from benchmarks.fits import off, print_samplers, timed
 
 FREE = ("A", "B", "D0", "K")
 LAWS = ("rice-ruina", "ruina-slip", "perrin-rice-zheng", "nagata")
 
 
-def integrated(found: Fit, values: dict[str, float]) -> np.ndarray:
-    """Friction of the ageing law at the samples, by SciPy."""
+def recorded(found: Fit, values: dict[str, float]) -> np.ndarray:
+    """Friction of the ageing law at the samples of a fit, by SciPy."""
     (term,) = found.objective.terms
-    run, (A, B, D0) = term.run, (values[n] for n in ("A", "B", "D0"))
-    V0, mu0 = term.fixed["V0"], term.fixed["mu0"]
+    run = term.run
+    numbers = {**term.fixed, **values, "alpha": 0.0, "k": values["K"] / run.W0}
     changes = [
         run.drive.edges[edge] + values[f"step_time_{k}"] for k, edge in enumerate(run.cuts, 1)
     ]
-
-    def rhs(_: float, y: np.ndarray, V: float) -> list[float]:
-        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
-        return [values["K"] / run.W0 * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
-
-    first = np.log(run.velocities[0] / V0)
-    y = np.array([mu0 + (A - B) * first, -first])
-    out = np.empty_like(run.time)
     edges = [0.0, *changes, run.time[-1]]
-    for V, (a, b) in zip(run.velocities, pairwise(edges), strict=True):
-        here = (run.time >= a) & (run.time <= b)
-        solution = solve_ivp(
-            rhs, (a, b), y, method="LSODA", rtol=1e-10, atol=1e-12, dense_output=True, args=(V,)
-        )
-        out[here] = solution.sol(run.time[here])[0]
-        y = solution.y[:, -1]
-    return out
+    return integrated(numbers, edges, run.velocities, run.time, tolerance=1e-10)
 
 
 def scipy_fit(found: Fit) -> dict[str, float]:
@@ -75,7 +58,7 @@ def scipy_fit(found: Fit) -> dict[str, float]:
 
     def residuals(u: np.ndarray) -> np.ndarray:
         values = named(u)
-        white = model.whiten((integrated(found, values) - term.run.friction)[:, None])[:, 0]
+        white = model.whiten((recorded(found, values) - term.run.friction)[:, None])[:, 0]
         white -= term.basis @ (term.basis.T @ white)
         priors = [(values[n] - unknowns[n].prior.mean) / unknowns[n].prior.sd for n in times]
         return np.concatenate([white, priors])

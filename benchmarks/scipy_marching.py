@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.cases import Batch
-from benchmarks.equations import Answer, averaged_limit, force_rest, read
+from benchmarks.equations import Answer, averaged_limit, force_rest, rates, read
 
 _SAMPLES = 32
 #: Change of the states over a period that ends the march, if none of the last was larger. The
@@ -37,7 +37,7 @@ def _march(numbers: dict, z0: float, chi0: float) -> Answer:
     changes = deque([np.inf], LAST)
     for _ in range(_MOST_PERIODS):
         run = solve_ivp(
-            _rates,
+            rates,
             (0.0, 2 * np.pi),
             state,
             "LSODA",
@@ -53,12 +53,3 @@ def _march(numbers: dict, z0: float, chi0: float) -> Answer:
     w = 1 + numbers["epsilon"] * np.cos(theta[:-1, None])
     rest = force_rest(numbers, z0, run.y[0, :-1, None], w)
     return read(np.array([z0 / (1 + numbers["ratio"])]), rest, None)
-
-
-def _rates(theta: float, state: np.ndarray, numbers: dict, z0: float) -> list[float]:
-    n = numbers
-    w = 1 + n["epsilon"] * np.cos(theta)
-    f = (z0 + n["kappa"] * state[0]) * w / (w + n["ratio"])
-    phi = state[1] + n["ageing"] / n["kappa"] * f
-    slip = np.exp((f / w - n["mu"] - n["B"] * phi) / n["A"])
-    return [1 - slip, n["ageing"] * (np.exp(-phi) - 1)]

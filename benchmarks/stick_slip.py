@@ -29,7 +29,14 @@ from asperity.measurement.stick_slip.threshold import thresholds
 from asperity.questions.recording import Measurement
 from asperity.transients import transient
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
-from benchmarks.stick_slip_recordings import judged, random_saw, saw, tables, trace_of
+from benchmarks.stick_slip_recordings import (
+    judged,
+    random_saw,
+    repeated,
+    saw,
+    tables,
+    trace_of,
+)
 
 
 def campaign_numbers(seed):
@@ -87,11 +94,9 @@ def healing_interval(seed):
         cycle = limit_cycle(Slider(law, spring=K, load=W0, mass=M), float(v))
         if cycle.end is not CycleEnd.REPEATS:
             continue
-        t = np.arange(0, 30 * cycle.period, max(cycle.slip_duration / 10, cycle.period / 5000))
-        place = t + rng.uniform() * cycle.period
-        size = 1 + spread * rng.standard_normal(32)
-        force = (cycle.force(place) - cycle.lowest) * size[(place // cycle.period).astype(int)]
-        force = force + cycle.lowest + noise * cycle.drop * rng.standard_normal(t.size)
+        step = max(cycle.slip_duration / 10, cycle.period / 5000)
+        t, force = repeated(cycle, 30, step, rng, spread)
+        force = force + noise * cycle.drop * rng.standard_normal(t.size)
         trace = trace_of(t, force)
         machine = Measurement(stiffness=float(K), velocity=float(v), mass=float(M), normal_load=W0)
         rows.append(stick_slip_row(Path("made"), measure_stick_slip(trace, machine)))

@@ -20,8 +20,8 @@ from asperity.inference import averaged_cycle, fit
 from asperity.laws import RiceRuina
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.questions.recording import Measurement
-from asperity.recording import Channel, Trace
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
+from benchmarks.stick_slip_recordings import repeated, trace_of
 
 W0, CYCLES = 1.0, 40
 
@@ -44,14 +44,9 @@ def averaged(truth, V, V0, rng, spread=0.0):
     if cycle.end is not CycleEnd.REPEATS:
         return None
     step = cycle.slip_duration / rng.uniform(10, 40)
-    t = np.arange(0, CYCLES * cycle.period, step)
-    place = t + rng.uniform() * cycle.period
-    size = 1 + spread * rng.standard_normal(CYCLES + 2)
-    force = cycle.force(place) - cycle.lowest
-    force = cycle.lowest + force * size[(place // cycle.period).astype(int)]
+    t, force = repeated(cycle, CYCLES, step, rng, spread)
     noise = 10 ** rng.uniform(-2, -1) * cycle.drop
-    force = force + noise * rng.standard_normal(t.size)
-    trace = Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+    trace = trace_of(t, force + noise * rng.standard_normal(t.size))
     return averaged_cycle(
         measure_stick_slip(trace, Measurement(velocity=V, normal_load=W0)), f"{V:.3g} m/s"
     )

@@ -75,6 +75,18 @@ def trace_of(time, friction):
     return Trace(time, {"mu": Channel(friction, "dimensionless", "", "mu", "1")})
 
 
+def repeated(cycle, cycles, step, rng, spread=0.0):
+    """Times and F/W of a limit cycle over and over, from a random instant of it.
+
+    The height of a cycle varies by the relative standard deviation `spread`.
+    """
+    time = np.arange(0, cycles * cycle.period, step)
+    place = time + rng.uniform() * cycle.period
+    size = 1 + spread * rng.standard_normal(cycles + 2)
+    height = cycle.force(place) - cycle.lowest
+    return time, cycle.lowest + height * size[(place // cycle.period).astype(int)]
+
+
 def free(u, loaded):
     """A free slider at constant friction, where the drive loads this share of the drop meanwhile.
 

@@ -184,9 +184,9 @@ def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--steps", "40,40"], "--steps must rise, with 3 samples or more between them"),
-        (["--steps", "40,40.1"], "got 2 between 40 and 40.1 s"),
-        (["--steps", "40,500"], "--steps must rise"),
+        (["--steps", "40,40"], "--steps must rise, with at least 4 samples between them"),
+        (["--steps", "40,40.1"], "got 1 before 40.1 s"),
+        (["--steps", "40,500"], "--steps must lie inside the recording, got 500 s"),
         (["--posterior", "--chains", "1000000"], "must be 4000000 at most"),
         (["--posterior", "--draws", "100000000"], "must be 4000000 at most"),
         (["--posterior", "--chains", "1"], "chains must be at least 2"),

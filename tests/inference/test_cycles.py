@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from benchmarks.stick_slip_recordings import repeated, trace_of
 from scipy.stats import chi2
 
 import asperity as asp
@@ -14,8 +15,9 @@ from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.inference.runs.run import RecordedRun
 from asperity.laws import RiceRuina
+from asperity.measurement.from_file import reads_cycles
 from asperity.questions.fit import Fit
-from asperity.recording import Channel, Trace
+from asperity.questions.recording import Measurement as Question
 from asperity.transients.limit_cycle import limit_cycle
 
 W0, V, RATE, CYCLES = 1.0, 1e-4, 200.0, 40
@@ -34,13 +36,8 @@ def made():
 def recorded(seed, noise=0.02, spread=0.0, rate=RATE):
     """The cycle over and over, its level and size normal from slip to slip, with white noise."""
     cycle, rng = made(), np.random.default_rng(seed)
-    t = np.arange(0, CYCLES * cycle.period, 1 / rate)
-    place = t + rng.uniform() * cycle.period
-    force = cycle.force(place)
-    size = 1 + spread * rng.standard_normal(CYCLES + 2)
-    force = cycle.lowest + (force - cycle.lowest) * size[(place // cycle.period).astype(int)]
-    force = force + noise * cycle.drop * rng.standard_normal(t.size)
-    return Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+    t, force = repeated(cycle, CYCLES, 1 / rate, rng, spread)
+    return trace_of(t, force + noise * cycle.drop * rng.standard_normal(t.size))
 
 
 def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
@@ -76,6 +73,14 @@ def test_a_recording_in_memory_is_fitted_as_its_file_is():
     assert fitted.value == pytest.approx(MACHINE["K"], abs=4 * fitted.se)
     with pytest.raises(InputError, match="a load that is modulated at 120 Hz"):
         asp.fit(asp.samples.modulated())
+
+
+def test_a_force_alone_is_measured_once(monkeypatch):
+    """It has no velocity steps that could be read in place of its slips."""
+    monkeypatch.setattr("asperity.measurement.from_file.measure_sliding", None)
+    trace = recorded(1)
+    question = Question(velocity=V, normal_load=W0)
+    assert reads_cycles(trace, question, measured(1))
 
 
 def test_files_with_the_drive_bring_their_velocities(tmp_path):

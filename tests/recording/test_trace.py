@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.recording import Channel, Finding, Trace, check
-from asperity.recording.conversions import (
-    friction_to_force,
-    stiffness_from_friction,
-    stress_to_force,
-)
+from asperity.recording import Channel, Finding, Trace, check, derive, stress_to_force
 
 N = 2000
 
@@ -293,28 +288,13 @@ def test_stresses_become_forces_only_with_an_area(rock):
     assert np.allclose(forces.channel("W").to("kN"), 50, rtol=1e-15)
     assert forces.provenance["area (m^2)"] == pytest.approx(25e-4)
     assert forces.channel("Displ") is rock.channel("Displ")
-    assert stress_to_force(rock, 25e-4, ["W"]).channel("W").unit == "N"
-    with pytest.raises(InputError, match="must be pressures, got 'Friction'"):
-        stress_to_force(rock, 1.0, ["Friction"])
+    with pytest.raises(InputError, match="go with a stress, got a recording without"):
+        stress_to_force(forces, 1.0)
     with pytest.raises(InputError, match="area must be positive"):
         stress_to_force(rock, 0.0)
 
 
 def test_friction_times_load_is_a_force(rock):
-    made = friction_to_force(rock)
+    made = derive(rock, {"force": "friction * load"})
     assert np.allclose(made.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
-    assert "Friction x Normal_stress" in made.provenance["shear from friction"]
-    with pytest.raises(InputError, match="must be free, got 'F'"):
-        friction_to_force(made)
-
-
-@pytest.mark.parametrize("text", ["1e-3 /um", "1e-3 1/um", "1e-3 friction/um", "1 /mm", 1000.0])
-def test_stiffness_in_friction_per_length(text):
-    assert stiffness_from_friction(text, "7 N") == pytest.approx(7000, rel=1e-15)
-    assert stiffness_from_friction(text, "20 MPa") == pytest.approx(20e9, rel=1e-15)
-
-
-@pytest.mark.parametrize(("k", "load"), [("1 N/um", "7 N"), ("1e-3 um", 7.0), ("-1 /um", 7.0)])
-def test_what_is_no_friction_per_length_is_refused(k, load):
-    with pytest.raises(InputError, match="stiffness_from_friction"):
-        stiffness_from_friction(k, load)
+    assert made.provenance["derived channels"] == {"force": "friction * load"}

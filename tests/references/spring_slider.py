@@ -1,7 +1,7 @@
 """A quasi-static slider with the ageing law by SciPy, pulled at one velocity after another."""
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from benchmarks.coverage import integrated
 
 
 def pulled_in_parts(velocities, lengths, rates):
@@ -21,18 +21,5 @@ def pulled_in_parts(velocities, lengths, rates):
 def spring_slider(velocities, bounds, times, *, A, B, D0, k, mu0=0.6, V0=1e-6, rtol=1e-8):
     """Friction at `times` between the bounds; the stiffness `k` is in friction per metre."""
 
-    def rates(_, y, pull):
-        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
-        return [k * (pull - v), (V0 * np.exp(-y[1]) - v) / D0]
-
-    first = np.log(velocities[0] / V0)
-    state, friction = [mu0 + (A - B) * first, -first], np.empty(times.size)
-    for pull, start, end in zip(velocities, bounds[:-1], bounds[1:], strict=True):
-        found = solve_ivp(
-            rates, (start, end), state, "LSODA", dense_output=True, args=(pull,), rtol=rtol,
-            atol=rtol / 100,
-        )  # fmt: skip
-        here = (times >= start) & (times <= end)
-        friction[here] = found.sol(times[here])[0]
-        state = found.y[:, -1]
-    return friction
+    numbers = {"A": A, "B": B, "D0": D0, "k": k, "mu0": mu0, "V0": V0, "alpha": 0.0}
+    return integrated(numbers, bounds, velocities, times, tolerance=rtol)

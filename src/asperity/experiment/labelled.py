@@ -65,14 +65,10 @@ class Labelled(Displayed):
         lines = [number_line(n, getattr(self, n), self.meanings[n][1]) for n in self.shown]
         return f"{type(self).__name__}, {self.slider.law.name}, {self.outcomes()}", lines
 
-    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+    def to_dataset(self) -> xarray.Dataset:
         """Arrays, drive, slider and law with units and meanings.
 
-        Parameters
-        ----------
-        dims : tuple of str, optional
-            Names of the axes. By default an axis has the name of the only quantity that varies
-            along it.
+        An axis has the name of the only quantity that varies along it, where there is one.
         """
         import xarray
 
@@ -89,7 +85,7 @@ class Labelled(Displayed):
             padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
             values[name] = padded, known[name].attributes
         varying = {name: _varying(value) for name, (value, _) in values.items()}
-        names = dimension_names(shape, varying, dims)
+        names = dimension_names(shape, varying)
         data = {
             name: (names, getattr(self, name), {"units": unit, "long_name": meaning})
             for name, (unit, meaning) in self.meanings.items()

@@ -145,15 +145,33 @@ def _growth_below_lowest_line(lines: Float, turned: Complex) -> Float:
     1/f noise is stronger below the lowest line than at that line. Its power law is extrapolated
     down to a third of a line, as if the noise had started three windows ago.
     """
-    away = np.log(lines) - np.log(lines).mean()
-    lever = max(float(away @ away), 1e-300)
-    exponent = -(away @ np.log(np.maximum(np.abs(turned) ** 2, 1e-300))) / lever
     # The logarithm of a periodogram has standard deviation 1.28; half of the lines are independent.
-    scatter = 1.28 * np.sqrt(2.0 / lever)
-    # The exponent is 0 for white noise, apart from scatter; steeper than 1/f is drift.
-    exponent = np.where(exponent > 2.5 * scatter, np.minimum(exponent, 1.0), 0.0)
+    exponent = red_exponent(lines, np.abs(turned) ** 2, 1.28 * np.sqrt(2.0))
     lowest = lines[: 2 * _NEXT_TO_ZERO, None]
     return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
+
+
+def red_exponent(lines: Float, power: Float, scatter: float) -> Float:
+    """Exponent e of noise whose power falls as lines^-e; 0 of white noise, apart from scatter.
+
+    Parameters
+    ----------
+    lines : array, (n,)
+        Frequencies, in any unit.
+    power : array, (n, ...)
+    scatter : float
+        Standard deviation of the logarithm of the power of a line, as if all were independent.
+
+    Returns
+    -------
+    array, (...)
+        At most 1: what is steeper than 1/f is drift.
+    """
+    away = np.log(lines) - np.log(lines).mean()
+    lever = max(float(away @ away), 1e-300)
+    exponent = -(away @ np.log(np.maximum(power, 1e-300))) / lever
+    seen = exponent > 2.5 * scatter / np.sqrt(lever)
+    return np.where(seen, np.minimum(exponent, 1.0), 0.0)
 
 
 def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:

@@ -208,6 +208,9 @@ def reads_cycles(trace: Trace, question: Question, events: StickSlipMeasurement)
     """
     if not events.clear:
         return False
+    # Velocity steps and holds show in the displacement of the drive alone.
+    if not events.slip_share <= SLIDER:
+        return True
     try:
         sliding = measure_sliding(trace, question)
     except InputError:

@@ -18,15 +18,15 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
+from asperity.lock_in.noise import red_exponent
 
-#: Cosine transforms from which the noise of a mean is estimated.
-_COSINES = 8
+#: Most blocks of a mean level.
 _MOST_BLOCKS = 512
 #: Two rates differ if noise alone has less than this probability of such a difference.
 _ACCIDENT = 3e-3
 
-#: Most bins of a segment, and cosines from which its slow noise is estimated.
-_BINS, _TREND_COSINES = 400, 8
+#: Most bins of a segment, and cosines from which slow noise is estimated.
+_BINS, _COSINES = 400, 8
 #: Scatter of the log of a squared projection, a chi-squared number of one degree of freedom.
 _LOG_SCATTER = 2.22
 
@@ -80,20 +80,15 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
 
     Notes
     -----
-    The variance of the mean is that of the first type-II cosine transforms of the series, because
-    they have the same slow noise as the mean (equal-weighted cosines: Mueller, J. Econometrics 141,
-    1331, 2007). A slow drift counts as noise.
+    The uncertainty is that of a level without trend, by `slow_variance`: a slow drift counts as
+    noise.
     """
-    means = block_means(values, _MOST_BLOCKS)
-    n = means.size
-    cosines = min(_COSINES, n - 1)
-    if cosines < 1:
-        return MeanLevel(float(values.mean()), np.inf, 1.0, float(time[0]), float(time[-1]))
-    at = (np.arange(n) + 0.5) * np.pi / n
-    waves = np.cos(np.arange(1, cosines + 1)[:, None] * at)
-    transform = waves @ (means - means.mean()) * np.sqrt(2.0) / n
-    spread = float(np.sqrt(np.mean(transform**2)))
-    return MeanLevel(float(values.mean()), spread, float(cosines), float(time[0]), float(time[-1]))
+    means, mean = block_means(values, _MOST_BLOCKS), float(values.mean())
+    span = float(time[0]), float(time[-1])
+    if means.size < 2:
+        return MeanLevel(mean, np.inf, 1.0, *span)
+    variance, dof = slow_variance(means - means.mean(), np.ones((means.size, 1)))
+    return MeanLevel(mean, float(np.sqrt(variance / means.size)), float(dof), *span)
 
 
 def neighbour_scatter(values: Float) -> float:
@@ -144,6 +139,14 @@ def weighted_line(at: Float, values: Float, uncertainty: Float) -> WeightedLine:
     return WeightedLine(beta, covariance, float(left @ left) / free if free else 1.0)
 
 
+def weighted_mean(values: Float, uncertainty: Float) -> tuple[float, float]:
+    """Mean, and its uncertainty by those of the values or by their scatter, whichever is larger."""
+    weight = 1 / uncertainty**2
+    mean = float(weight @ values / weight.sum())
+    excess = float(weight @ (values - mean) ** 2) / max(values.size - 1, 1)
+    return mean, float(np.sqrt(max(excess, 1.0) / weight.sum()))
+
+
 def steady_from(values: Float, degree: int) -> int:
     """Index of the first value after the initial transient of a series.
 
@@ -162,6 +165,8 @@ def steady_from(values: Float, degree: int) -> int:
     n = values.size
     if n < 8:
         return 0
+    # Not an exponential, as in `window.settled`: friction in a hold falls over decades of time, and
+    # what one exponential leaves moves the levels of holds by two to three uncertainties.
     errors = []
     for cut in range(n // 2 + 1):
         late = values[cut:]
@@ -266,7 +271,7 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
         The fitted columns, which have absorbed part of the noise.
     """
     n, taken = matrix.shape
-    count = max(1, min(_TREND_COSINES, (n - taken) // 4))
+    count = max(1, min(_COSINES, (n - taken) // 4))
     most = min(n - 1, 3 * count + taken)
     if most <= taken:
         return float(np.mean(residual**2)), 1
@@ -277,14 +282,8 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     # Cosines nearly span a trend: the remainder of the last cosines must exceed rounding errors.
     gram[np.diag_indices_from(gram)] *= 1 + 1e-10
     projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
-    power = projections[taken:] ** 2
-    slow = float(power[:count].mean())
+    power = np.asarray(projections[taken:] ** 2, dtype=np.float64)
     # The fitted columns have absorbed the strongest part of noise that grows towards zero.
-    away = np.log(np.arange(1, power.size + 1) + taken / 2)
-    centred = away - away.mean()
-    lever = float(centred @ centred)
-    exponent = -float(centred @ np.log(np.maximum(power, 1e-300))) / max(lever, 1e-300)
-    if exponent > 2.5 * _LOG_SCATTER / np.sqrt(max(lever, 1e-300)):
-        exponent = min(exponent, 1.0)
-        slow /= float(np.mean(np.exp(-exponent * away[:count])))
-    return slow, count
+    lines = np.arange(1, power.size + 1) + taken / 2
+    exponent = red_exponent(lines, power, _LOG_SCATTER)
+    return float(power[:count].mean() / np.mean(lines[:count] ** -exponent)), count

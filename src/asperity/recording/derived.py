@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import number, typed
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
@@ -57,6 +57,41 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
         trace = _with_channel(trace, target, quantity, sources, field, text)
     made = {**trace.provenance.get("derived channels", {}), **channels}
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
+
+
+def stress_to_force(trace: Trace, area: float | str) -> Trace:
+    """Convert all stresses to forces by the nominal contact area.
+
+    Parameters
+    ----------
+    trace : Trace
+        Any recording.
+    area : float or str
+        Nominal contact area (m^2, or a text such as ``"25 cm^2"``).
+
+    Returns
+    -------
+    Trace
+        With forces (N) under the names of the stresses, the area in its provenance.
+
+    Raises
+    ------
+    InputError
+        If the area is not positive, or no channel is a stress.
+    """
+    size = number(area, "stress_to_force.area", "area", "positive")
+    stresses = [k for k, c in trace.channels.items() if c.kind == "pressure"]
+    advice = "leave it out, or give the channel its unit"
+    require(stresses, "stress_to_force.area", "go with a stress", "a recording without", advice)
+    forces = {
+        k: replace(
+            trace.channels[k], values=trace.channels[k].values * size, kind="force", unit="N"
+        )
+        for k in stresses
+    }
+    note = {"area (m^2)": size, "stresses made forces": stresses}
+    channels, provenance = {**trace.channels, **forces}, {**trace.provenance, **note}
+    return replace(trace, channels=channels, provenance=provenance)
 
 
 def _with_channel(

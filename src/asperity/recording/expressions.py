@@ -20,7 +20,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, closest
-from asperity.recording.roles import role_of
+from asperity.recording.roles import recorded_as, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
@@ -293,16 +293,10 @@ def _described(value: Quantity) -> str:
 
 
 def _key_of(trace: Trace, name: str) -> str | None:
-    """The channel of a name, heading or role; blanks, dots at the ends and case may differ."""
-    if name in trace.channels:
-        return name
-    headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
-    if len(headings) == 1:
-        return headings[0]
-    for bare in (_bare, lambda text: _bare(text).casefold()):
-        similar = [key for key in trace.channels if bare(key) == bare(name)]
-        if len(similar) == 1:
-            return similar[0]
+    """The channel of a name, heading or role."""
+    key = recorded_as(name, {key: c.recorded_name for key, c in trace.channels.items()})
+    if key is not None:
+        return key
     role = role_of(name)
     if role is None or role == "time":
         return None
@@ -314,11 +308,6 @@ def _key_of(trace: Trace, name: str) -> str | None:
             return None
         raise
     return trace.name_of(channel)
-
-
-def _bare(name: str) -> str:
-    """A name without blanks, and without dots and underscores at its ends."""
-    return name.replace(" ", "").strip("._")
 
 
 def _quantity(channel: Channel, key: str, field: Argument) -> Quantity:

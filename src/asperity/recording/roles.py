@@ -166,17 +166,44 @@ def _says(name: str, spec: Role) -> bool:
     return whole or any(w in spec.words for w in spoken)
 
 
-def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str, str]) -> str:
-    """Name of the one channel that `name`, a recorded name or a role, can mean.
+def recorded_as(name: str, headings: Mapping[str, str]) -> str | None:
+    """Name of the one channel of a name or heading; blanks, dots at the ends and case may differ.
+
+    None where there is no such channel, or several. The headings are by the names of the channels.
+    """
+    if name in headings:
+        return name
+    same = [key for key, heading in headings.items() if heading == name]
+    for alike in (_bare, lambda text: _bare(text).casefold()):
+        if len(same) == 1:
+            break
+        same = [key for key in headings if alike(key) == alike(name)]
+    return same[0] if len(same) == 1 else None
+
+
+def _bare(name: str) -> str:
+    """A name without blanks, and without dots and underscores at its ends."""
+    return name.replace(" ", "").strip("._")
+
+
+def find_channel(
+    name: str,
+    kinds: Mapping[str, str | None],
+    chosen: Mapping[str, str],
+    headings: Mapping[str, str],
+) -> str:
+    """Name of the one channel that `name` can mean.
 
     Parameters
     ----------
     name : str
-        Recorded name, in any case, or role.
+        Recorded name or heading, as of `recorded_as`, or role.
     kinds : mapping
         Kind of each channel, None where the unit is unknown.
     chosen : mapping
         Channels whose role the user has chosen.
+    headings : mapping
+        Heading of each channel.
 
     Raises
     ------
@@ -188,10 +215,10 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
     role = role_of(name)
     if role is not None and role in chosen:
         return chosen[role]
-    same = [k for k in kinds if k.lower() == name.lower() and _may_be(role, kinds[k])]
-    if name in same:
-        return name
-    fitting = same or (candidates(role, kinds) if role else [])
+    same = recorded_as(name, headings)
+    if same is not None and _may_be(role, kinds[same]):
+        return same
+    fitting = candidates(role, kinds) if role else []
     if len(fitting) == 1:
         return fitting[0]
     field = Argument("Trace.channel", role or name)

@@ -120,12 +120,10 @@ class Trace(Displayed):
             If no channel, or more than one, can be meant; the message names them, and says what is
             wrong with the columns of the file.
         """
-        recorded = [c for c in self.channels.values() if c.recorded_name == name]
-        if len(recorded) == 1 and name not in self.channels:
-            return recorded[0]
         kinds = {key: c.kind for key, c in self.channels.items()}
+        headings = {key: c.recorded_name for key, c in self.channels.items()}
         try:
-            return self.channels[find_channel(name, kinds, self.roles)]
+            return self.channels[find_channel(name, kinds, self.roles, headings)]
         except InputError as error:
             raise with_cause(error, self.findings) from None
 

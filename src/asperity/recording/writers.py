@@ -114,12 +114,9 @@ def _write_hdf5(trace: Trace, columns: _Columns, path: Path) -> None:
 
 def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
     """One group of waveforms of one clock; an uneven clock is a further channel."""
-    try:
-        import nptdms
-    except ImportError:
-        rule = "be in a format that can be written here"
-        advice = "install npTDMS, as 'pip install asperity[lab]' does"
-        raise InputError("write.path", rule, f"'{path.name}', which is TDMS", advice) from None
+    from asperity.recording.readers.tdms import library
+
+    nptdms = library("write.path", "be in a format that can be written here", path)
     rate = trace.sample_rate
     clock: dict[str, Any] = {}
     if rate is not None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.coverage import CASES, TRUE, runs_of
+from benchmarks.coverage import CASES, TRUE, runs_of, trace_of
 
 from asperity.errors import InputError
 from asperity.inference import WindowEstimate, fit, fit_windows
@@ -12,7 +12,6 @@ from asperity.inference.fitting.windows import disagreeing
 from asperity.inference.unknowns import unknown_of
 from asperity.laws import RiceRuina
 from asperity.parameters import law_parameters
-from asperity.recording import Channel, Trace
 
 pytestmark = pytest.mark.slow
 
@@ -21,15 +20,8 @@ FREE = ["A", "B", "D0"]
 WINDOWS = [(0.0, 140.0), (13.0, 140.0), (0.0, 120.0)]
 
 
-def trace_of(run, friction):
-    channels = {
-        "friction": Channel(friction, "dimensionless", "", "friction", ""),
-        "displacement": Channel(run.slip, "length", "m", "displacement", "m"),
-        "normal stress": Channel(
-            np.full(run.time.size, run.W0), "pressure", "Pa", "normal stress", "Pa"
-        ),
-    }
-    return Trace(run.time, channels)
+def traced(run, friction):
+    return trace_of(run.time, friction, run.slip, np.full(run.time.size, run.W0))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +32,7 @@ def run():
 def over(run, friction):
     # Where the search begins is no question here.
     windows = WINDOWS[::2]
-    return fit_windows(trace_of(run, friction), "rice-ruina", FREE, windows, start=TRUE, starts=1)
+    return fit_windows(traced(run, friction), "rice-ruina", FREE, windows, start=TRUE, starts=1)
 
 
 def test_a_disturbance_outside_some_windows_is_their_spread(run):
@@ -70,7 +62,7 @@ def test_a_warning_of_the_first_window_is_not_new_in_another(run, monkeypatch):
 
 def test_windows_that_are_not_several_are_refused(run):
     with pytest.raises(InputError, match="windows must be two or more"):
-        fit_windows(trace_of(run, run.friction), "rice-ruina", FREE, [(0, 100)])
+        fit_windows(traced(run, run.friction), "rice-ruina", FREE, [(0, 100)])
 
 
 def test_a_window_that_is_far_off_is_named():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.coverage import LOAD, TRUE, TRUTH, Case, friction
+from benchmarks.coverage import LOAD, TRUE, TRUTH, Case, friction, trace_of
 from scipy.signal import lfilter, lsim
 
 from asperity.errors import InputError
@@ -13,7 +13,7 @@ from asperity.inference.runs.blocks import averaged, reduced
 from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import get_law
-from asperity.recording import Channel, Trace
+from asperity.recording import Trace
 
 #: Ten seconds at 2.4 kHz: D0/V is 65 ms after the step up, and the spring takes 23 ms.
 CASE = Case((3e-5, 1e-4, 0.0), (2.5, 5.0), 10.0, 2400.0)
@@ -21,17 +21,9 @@ FREE = ["A", "B", "D0"]
 NOISE = 3e-4
 
 
-def trace_of(values, case=CASE):
-    time = np.arange(values.size) / case.rate
-    edges = np.array([0.0, *case.changes, case.end])
-    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
-    displacement = np.interp(time, edges, slip)
-    channels = {
-        "friction": Channel(values, "dimensionless", "", "friction", ""),
-        "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-        "normal stress": Channel(np.full(values.size, LOAD), "pressure", "Pa", "stress", "Pa"),
-    }
-    return Trace(time, channels)
+def traced(values):
+    time = np.arange(values.size) / CASE.rate
+    return trace_of(time, values, CASE.slip(time), np.full(values.size, LOAD))
 
 
 def mains(time):
@@ -53,9 +45,7 @@ def ringing():
 
 
 def recorded(values):
-    return recorded_run(
-        trace_of(values), name="run", steps=CASE.changes, velocities=CASE.velocities
-    )
+    return recorded_run(traced(values), name="run", steps=CASE.changes, velocities=CASE.velocities)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +112,7 @@ def test_motion_is_averaged_exactly(clean):
 
 
 def test_blocks_over_a_gap_are_left_out(clean):
-    whole = trace_of(clean)
+    whole = traced(clean)
     kept = np.ones(24_000, bool)
     kept[6_000:6_500] = False
     channels = {n: replace(c, values=c.values[kept]) for n, c in whole.channels.items()}

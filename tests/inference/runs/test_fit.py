@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
+from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of, trace_of
 from scipy.signal import lfilter
 
 from asperity.errors import InputError
@@ -27,23 +27,12 @@ from asperity.inference.runs.noise import largest_departure
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response
-from asperity.recording import Channel, Trace
 from asperity.slider import Slider
 from benchmarks import coverage
 from references.populations import population
 
 CASE = CASES["steps"]
 FREE = ["A", "B", "D0"]
-
-
-def trace_of(time, values, displacement, load=None):
-    channels = {
-        "friction": Channel(values, "dimensionless", "", "friction", ""),
-        "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-    }
-    if load is not None:
-        channels["normal stress"] = Channel(load, "pressure", "Pa", "normal stress", "Pa")
-    return Trace(time, channels)
 
 
 @pytest.fixture(scope="module")
@@ -123,8 +112,8 @@ def test_exact_recordings_give_the_truth():
 def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
     sets = 8
     # One start besides the truth: the minimum is not what is in question.
-    white = covered(CASE, sets, RunOptions(order=0), starts=1)["parameters"]
-    right = covered(CASE, sets, RunOptions(), starts=1)["parameters"]
+    white = covered(runs_of(CASE, sets), CASE, RunOptions(order=0), starts=1)["parameters"]
+    right = covered(runs_of(CASE, sets), CASE, starts=1)["parameters"]
     inside = np.mean([right[n]["cover_95"] for n in TRUE])
     # Of 8 sets of 4 correlated parameters: a spread of some 8 %.
     assert inside > 0.8

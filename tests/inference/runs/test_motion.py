@@ -58,7 +58,7 @@ def by_scipy(values, TIMES=TIMES):
 
 @pytest.fixture(scope="module", params=[AT, STIFF], ids=["soft", "stiff"])
 def computed(request):
-    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
+    drive = Drive(EDGES, PULL, np.ones(4), LOAD_SLOPE)
     computed = recorded_friction(MOTION, request.param, FREE, drive, reading_at(TIMES))
     return request.param, *computed
 
@@ -82,7 +82,7 @@ def test_derivatives_are_those_of_an_independent_integration(computed, name):
 
 
 def test_means_over_blocks_are_those_of_an_independent_integration():
-    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
+    drive = Drive(EDGES, PULL, np.ones(4), LOAD_SLOPE)
     # Blocks of 0.6 s, each change of the drive within one, and a gap.
     edges = np.linspace(0.0, 69.0, 116)
     blocks = np.stack([edges[:-1], edges[1:]], axis=1)[np.arange(115) != 60]
@@ -163,8 +163,7 @@ def test_a_load_of_hundreds_of_lines_has_room():
     edges = np.linspace(0.0, 300.0, pieces + 1)
     load = 1 + 0.01 * np.random.default_rng(1).normal(size=pieces + 1)
     load[0] = 1.0
-    one, nothing = np.ones(pieces), np.zeros(pieces)
-    drive = Drive(edges, one, nothing, load[:-1], np.diff(load) / np.diff(edges))
+    drive = Drive(edges, np.ones(pieces), load[:-1], np.diff(load) / np.diff(edges))
     times = np.linspace(0.0, 300.0, 900)
     values = {**VALUES, "alpha": 0.2, "K": 1e5}
     friction, _ = recorded_friction(MOTION, values, (), drive, reading_at(times))
@@ -189,7 +188,7 @@ def test_a_load_of_hundreds_of_lines_has_room():
 
 
 def test_a_motion_that_runs_away_is_no_motion():
-    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4))
+    drive = Drive(EDGES, PULL, np.ones(4), np.zeros(4))
     # A twentieth of the critical stiffness (B - A)/D0.
     assert recorded_friction(MOTION, {**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
 
@@ -197,7 +196,7 @@ def test_a_motion_that_runs_away_is_no_motion():
 def test_a_free_radiation_damping_counts():
     """What it adds to steady friction is eta V/W, and the derivative is that of differences."""
     motion = run_equations(get_law("rice-ruina"), 3e-6, radiation_damping=True)
-    drive, reading = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4)), reading_at(TIMES)
+    drive, reading = Drive(EDGES, PULL, np.ones(4), np.zeros(4)), reading_at(TIMES)
     one, more, less = (
         recorded_friction(motion, {**VALUES, "eta": eta}, ("eta",), drive, reading)
         for eta in (2e3, 2.002e3, 1.998e3)
@@ -219,9 +218,8 @@ def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
         values |= {"K": random.uniform(2e3, 2e4), "W0": 1.0}
         # In units of A W / (K V), after which a slider on a spring has forgotten.
         length = random.uniform(50, 400) * A / (values["K"] * V)
-        nothing, load = np.zeros(2), np.ones(2)
         edges = length * np.array([0.0, 1.0, 1.2])
-        drive = Drive(edges, np.array([1.0, 3.0]), nothing, load, nothing)
+        drive = Drive(edges, np.array([1.0, 3.0]), np.ones(2), np.zeros(2))
         times = np.linspace(0, edges[-1], 300)
         motion = run_equations(get_law(name), V)
         free = ("A", "B", "D0", "K")

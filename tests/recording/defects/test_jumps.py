@@ -14,7 +14,7 @@ from asperity.recording.defects.autoregression import (
 )
 from asperity.recording.defects.check import rows_to_avoid, usable_rows
 from asperity.recording.defects.jumps import _impulses, find_jumps
-from asperity.recording.defects.levels import coarsely_rounded, saturated
+from asperity.recording.defects.levels import coarsely_rounded, recorder_step, saturated
 from asperity.recording.defects.sampling import rate_stretches
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
@@ -227,3 +227,13 @@ def test_stretches_of_one_rate_are_told_apart():
     steps[250] = 3.0
     time = np.concatenate([[0.0], np.cumsum(steps)])
     assert rate_stretches(time) == ((0, 500), (500, 800), (800, 1001))
+
+
+@pytest.mark.parametrize("slow", [0.02, 0.3])
+def test_the_step_of_a_recorder_is_that_of_slow_samples(slow) -> None:
+    """However far it moves between two samples most of the time; and a fine recorder has none."""
+    rng = np.random.default_rng(0)
+    moved = np.cumsum(np.repeat([slow, 20.0], [9000, 1000]) * rng.uniform(0.9, 1.1, 10_000))
+    assert recorder_step(0.37 * np.round(moved)) == pytest.approx(0.37, rel=1e-9)
+    assert recorder_step(moved + rng.standard_normal(moved.size)) == 0.0
+    assert recorder_step(np.ones(40)) == 0.0

@@ -245,7 +245,7 @@ def _python(name: str, source: Source, question: questions.Measurement, *, modul
     """The same measurement as Python."""
     lines = ["import asperity as asp", "", _read_python(name, source.model_dump())]
     if source.area:
-        lines.insert(1, "from asperity.recording.conversions import stress_to_force")
+        lines.insert(1, "from asperity.recording import stress_to_force")
         lines.append(f"trace = stress_to_force(trace, {source.area!r})")
     fields = question.model_dump(exclude={"modulated", "exact_frequency"}, exclude_defaults=True)
     words = {"whole_periods": "only_whole_periods"}

@@ -1,13 +1,13 @@
 """Drive of a recording: pulling velocity and load over time.
 
-Both are piecewise linear. Derivatives with respect to the delays of changes are exact: a delay
-moves the pieces on both sides. The velocities are measured or given.
+The velocity is piecewise constant, the load piecewise linear. Derivatives with respect to the
+delays of changes are exact: a delay moves the pieces on both sides. The velocities are measured or
+given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -17,27 +17,31 @@ from jax import Array
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.loads import Excitation
-from asperity.measurement.sliding.segments import Cut, Partition, partition, partition_at
+from asperity.measurement.sliding.segments import (
+    Cut,
+    Partition,
+    partition,
+    partition_at,
+    require_cuts,
+)
 from asperity.measurement.sliding.signals import SlidingSignals
 
 
 class Drive(NamedTuple):
-    """Pulling velocity and load over time, linear in each piece.
+    """Pulling velocity, constant in each piece, and load, linear in each piece.
 
     Attributes
     ----------
     edges : array, shape (pieces + 1,)
         Times of the changes (s), the first 0.
-    pull, pull_slope : array, shape (pieces,)
-        Pulling velocity over that of the first piece at the beginning of each piece, and its
-        slope (1/s).
+    pull : array, shape (pieces,)
+        Pulling velocity over that of the first piece.
     load, load_slope : array, shape (pieces,)
         W/W0 at the beginning of each piece and its slope (1/s).
     """
 
     edges: Any
     pull: Any
-    pull_slope: Any
     load: Any
     load_slope: Any
 
@@ -59,17 +63,12 @@ def filled_up(drive: Drive) -> Drive:
     extra = size - pieces
     edges = np.concatenate([drive.edges, np.full(extra, drive.edges[-1])])
     # The empty pieces have the final values, because a sample may lie at the end.
-    last = float(drive.edges[-1] - drive.edges[-2])
-
-    def padded(values: Float, slopes: Float) -> tuple[Float, Float]:
-        end = values[-1] + slopes[-1] * last
-        return (
-            np.concatenate([values, np.full(extra, end)]),
-            np.concatenate([slopes, np.zeros(extra)]),
-        )
-
+    last = drive.load[-1] + drive.load_slope[-1] * float(drive.edges[-1] - drive.edges[-2])
     return Drive(
-        edges, *padded(drive.pull, drive.pull_slope), *padded(drive.load, drive.load_slope)
+        edges,
+        np.concatenate([drive.pull, np.full(extra, drive.pull[-1])]),
+        np.concatenate([drive.load, np.full(extra, last)]),
+        np.concatenate([drive.load_slope, np.zeros(extra)]),
     )
 
 
@@ -87,12 +86,8 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
     return Excitation(
         w=1 + ratio * (load - 1),
         w_slope=ratio * drive.load_slope[piece],
-        pull=drive.pull[piece] + drive.pull_slope[piece] * since,
+        pull=drive.pull[piece],
     )
-
-
-#: Smallest number of samples of a segment, for its velocity.
-_SAMPLES = 3
 
 
 class ConstantVelocities(NamedTuple):
@@ -127,9 +122,10 @@ def constant_velocities(
         If the numbers of velocities and segments differ, if the motion of the drive is neither
         recorded nor given, if the recording begins with a hold, or if the direction reverses.
     """
-    result, speeds, holds = _given_or_measured(signals, name, steps, velocities)
-    moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
-    if not moving or holds[0]:
+    result = _given_or_measured(signals, name, steps, velocities)
+    both = list(zip(result.velocities, result.holds, strict=True))
+    moving = [v for v, hold in both if not hold]
+    if not moving or result.holds[0]:
         raise InputError(
             f"{name} must begin with sliding at a constant velocity, got "
             f"{'no sliding' if not moving else 'a hold'}; give a window that does"
@@ -141,7 +137,7 @@ def constant_velocities(
         raise InputError(
             f"{name} must slide in one direction, got a reversal; give a window without"
         )
-    speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
+    speeds = [0.0 if hold else sign * float(v) for v, hold in both]
     # Two neighbouring holds are joined.
     kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
     return ConstantVelocities(
@@ -156,47 +152,20 @@ def _given_or_measured(
     name: str,
     steps: Sequence[float] | None,
     velocities: Sequence[float] | None,
-) -> tuple[Partition, list[float], list[bool]]:
-    """The cuts, the signed velocities between them, and which segments are holds."""
+) -> Partition:
+    """The segments, with signed velocities."""
     time, displacement = signals.time, signals.displacement
-    if steps is not None:
-        _require_segments(time, steps, name)
-    if velocities is not None:
-        if steps is None or len(velocities) != len(steps) + 1:
-            got = f"{len(velocities)} for {len(steps or ())}"
-            raise InputError("velocities", "be one more than the steps", got, "give both")
-        speeds = [float(v) for v in velocities]
-        result = partition_at(time, displacement, np.array(steps), speeds)
-        return result, list(result.velocities), list(result.holds)
-    if displacement is None:
+    if velocities is not None and (steps is None or len(velocities) != len(steps) + 1):
+        got = f"{len(velocities)} for {len(steps or ())}"
+        raise InputError("velocities", "be one more than the steps", got, "give both")
+    if displacement is None and velocities is None:
         raise InputError(
             f"{name} must have the displacement or velocity of the drive, got none: "
             f"{signals.no_motion}; name a channel, like "
             f"{Argument('columns', 'displacement', 'x')}, or give {Argument('steps')} and "
             f"{Argument('velocities')}"
         )
-    result = (
-        partition(time, displacement)
-        if steps is None
-        else partition_at(time, displacement, np.array(steps))
-    )
-    return result, list(result.velocities), list(result.holds)
-
-
-def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:
-    """Refuse steps that leave no samples between them.
-
-    Raises
-    ------
-    InputError
-    """
-    edges = [float(time[0]), *map(float, steps), float(time[-1])]
-    for begin, end in pairwise(edges):
-        count = int(np.sum((time >= begin) & (time <= end))) if end > begin else 0
-        if count < _SAMPLES:
-            rule = (
-                f"rise, with {_SAMPLES} samples or more between them and the ends of {name} "
-                f"({edges[0]:.6g} to {edges[-1]:.6g} s)"
-            )
-            got = f"{count} between {begin:.6g} and {end:.6g} s"
-            raise InputError("steps", rule, got, "correct them, or the window")
+    if steps is None:
+        return partition(time, displacement)
+    require_cuts(time, steps, "steps")
+    return partition_at(time, displacement, np.array(steps), velocities)

@@ -7,7 +7,6 @@ Reports show both; no test decides between them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import InputError
+from asperity.measurement.series import weighted_mean
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Channel, Trace
@@ -44,10 +44,7 @@ def level_change(rates: Sequence[LevelRate]) -> LevelChange | None:
     if not rates:
         return None
     values, errors = np.array(rates).T
-    weights = 1 / errors**2
-    mean = float(np.average(values, weights=weights))
-    scatter = float(weights @ (values - mean) ** 2) / max(values.size - 1, 1)
-    return LevelChange(mean, math.sqrt(max(scatter, 1.0) / weights.sum()), values.size)
+    return LevelChange(*weighted_mean(values, errors), values.size)
 
 
 def level_rates(

@@ -341,11 +341,8 @@ def recorded_load(
     InputError
         If the load is not positive.
     """
-    try:
-        channel = trace.channel(load)
-    except InputError:
-        if load != "W":
-            raise
+    channel = load_channel(trace, load)
+    if channel is None:
         return None
     good = np.isfinite(channel.values) & (trace.time >= time[0]) & (trace.time <= time[-1])
     t, W = trace.time[good], compressive(channel.values[good], channel.values[good])[0]
@@ -561,7 +558,7 @@ def _drive(
     at_edges = np.interp(edges, knots, load)
     slope = np.diff(at_edges) / np.diff(edges)
     cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
-    return Drive(edges, pull, np.zeros_like(pull), at_edges[:-1], slope), cuts
+    return Drive(edges, pull, at_edges[:-1], slope), cuts
 
 
 def run_of(data: Any) -> RecordedRun:

@@ -198,9 +198,7 @@ class RunTerm(DataTerm):
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
         )
 
-    def chi2_of_many(
-        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
-    ) -> Float:
+    def chi2_of_many(self, values: Sequence[Mapping[str, float]], *, near: bool = False) -> Float:
         """Sums of the squared innovations; see `DataTerm`.
 
         Near an estimate, an integral needs hundreds of sums: they come from a program without

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument
 from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
 from asperity.measurement.series import (
@@ -21,7 +21,12 @@ from asperity.measurement.series import (
     steady_from,
 )
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
-from asperity.measurement.sliding.segments import Partition, partition, partition_at
+from asperity.measurement.sliding.segments import (
+    Partition,
+    partition,
+    partition_at,
+    require_cuts,
+)
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
@@ -209,23 +214,7 @@ def _given_cuts(
     if steps is None and holds is None:
         return None
     cuts = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
-    for at in cuts:
-        if not time[0] < at < time[-1]:
-            raise InputError(
-                f"measure.{'steps' if steps else 'holds'}",
-                "lie inside the recording",
-                f"{at:.10g} s",
-                f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s",
-            )
-    samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
-    for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
-        if b - a < 4:
-            raise InputError(
-                f"measure.{'steps' if steps else 'holds'}",
-                "have at least 4 samples between them",
-                f"{b - a} before {at:.10g} s",
-                "leave one out",
-            )
+    require_cuts(time, cuts, f"measure.{'steps' if steps else 'holds'}")
     return cuts
 
 

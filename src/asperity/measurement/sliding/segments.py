@@ -18,7 +18,9 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from asperity.arrays import Float, Index
+from asperity.errors import InputError, require
 from asperity.measurement.series import slope_of
+from asperity.recording.defects.levels import recorder_step
 
 #: First sample of a piece, and the sample after its last.
 Piece = tuple[int, int]
@@ -29,6 +31,8 @@ _BLOCKS, _PARTS = 300, 12
 #: Fewest means from which noise is estimated; parts of a recording, of which the quietest quarter
 #: gives the noise.
 _MEANS, _QUIET_PARTS = 96, 16
+#: A recorder is coarse if this share of its samples repeats the one before.
+_COARSE = 0.2
 #: Multiple of the penalty of the Bayesian information criterion for a piece, as noise of a gauge is
 #: not white.
 _PENALTY = 2.0
@@ -139,6 +143,33 @@ def partition(time: Float, displacement: Float | None) -> Partition:
     return Partition(cuts, speeds, holds, (*doubts, *unsure))
 
 
+def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
+    """Refuse times of the user that do not cut a recording into segments.
+
+    Parameters
+    ----------
+    time : array, (n,)
+    cuts : sequence of float
+        Seconds.
+    label : str
+        Name of the argument.
+
+    Raises
+    ------
+    InputError
+        If one lies outside of the recording, or there are too few samples between two.
+    """
+    for at in cuts:
+        if not time[0] < at < time[-1]:
+            advice = f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+            raise InputError(label, "lie inside the recording", f"{at:.10g} s", advice)
+    samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
+    for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
+        rule = f"rise, with at least {_FEWEST} samples between them and the ends"
+        got = f"{max(b - a, 0)} before {at:.10g} s"
+        require(b - a >= _FEWEST, label, rule, got, "leave one out, or correct them")
+
+
 def partition_at(
     time: Float,
     displacement: Float | None,
@@ -210,8 +241,7 @@ def _motion(time: Float, displacement: Float) -> _Motion:
             noise, slow = max(noise, spread), max(slow, spread * np.sqrt(n))
         n *= 2
     # With a coarse recorder most differences are zero: its step is the noise.
-    moved = np.abs(np.diff(displacement))
-    step = float(moved[moved > 0].min()) if moved.any() and np.mean(moved == 0) > 0.2 else 0.0
+    step = recorder_step(displacement, _COARSE)
     floor = 1e-9 * float(np.ptp(displacement)) + 1e-100
     return _Motion(
         time, displacement, max(noise, step / np.sqrt(12), floor), max(slow, floor), step

@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.measurement.stick_slip.detection import Falls
-from asperity.measurement.stick_slip.lines import Sums
-from asperity.measurement.stick_slip.noise import resolution
+from asperity.measurement.stick_slip.detection import Falls, Sums
 from asperity.recording.defects.autoregression import Autoregression, fitted
+from asperity.recording.defects.levels import recorder_step
 
 #: For each event: peak, trough, and first and last sample of the part that is fitted.
 Bounds = tuple[Index, ...]
@@ -450,7 +449,7 @@ def _events_from_fits(
     before_error = slow * 2 * _scatter_of_mean(scatter, until - first)
     of_noise = np.hypot(before_error, slow * 2 * _scatter_of_mean(scatter, stop - since))
     # The level of a line may lie anywhere within a step of the recorder.
-    rounding = resolution(force) / np.sqrt(6.0)
+    rounding = recorder_step(force) / np.sqrt(6.0)
     of_noise = np.hypot(of_noise, rounding)
     creeps = (level(until - (until - first) // 2, until, onset)[0] - high).sum()
     rings = (level(since, since + (stop - since) // 2, end)[0] - low).sum()

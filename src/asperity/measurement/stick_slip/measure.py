@@ -17,14 +17,14 @@ from asperity.measurement.sliding.signals import (
 )
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
-from asperity.measurement.stick_slip.noise import estimate, resolution, without_impulses
+from asperity.measurement.stick_slip.noise import estimate, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import STICK_SLIP, Check, Judged, percent
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.defects.check import even_rate, saturation
-from asperity.recording.defects.levels import CROWDED, coarsely_rounded
+from asperity.recording.defects.levels import CROWDED, coarsely_rounded, recorder_step
 from asperity.recording.trace import Channel
 
 if TYPE_CHECKING:
@@ -418,7 +418,7 @@ def _undetected_share(result: StickSlipMeasurement, after: Index) -> tuple[float
     lack = 1 - rise.sum() / load.sum()
     off = rise - (1 - lack) * load
     best = float(lack), float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
-    rounding = resolution(force) / np.sqrt(12.0)
+    rounding = recorder_step(force) / np.sqrt(12.0)
     for share in (8, 16, 32):
         width = int(np.median(stop - first)) // share
         if not width:

@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtri
 
 from asperity.arrays import Float, Index
+from asperity.recording.defects.levels import recorder_step
 
 #: Width of a median filter whose output two neighbouring impulses do not change.
 _FILTER = 5
@@ -170,7 +171,7 @@ def without_impulses(force: Float) -> tuple[Float, Index]:
     away = force - middle
     scatter = float(np.quantile(np.abs(np.diff(force, 2)), 0.5)) / (0.6745 * np.sqrt(6.0))
     # Steps of the recorder: rounding noise has no quantile of zero.
-    scatter = max(scatter, resolution(force) / np.sqrt(12.0))
+    scatter = max(scatter, recorder_step(force) / np.sqrt(12.0))
     limit = _IMPULSE * scatter
     at = np.flatnonzero(np.abs(away) > limit)
     for step in (-3, 3):
@@ -182,13 +183,3 @@ def without_impulses(force: Float) -> tuple[Float, Index]:
     clean = force.copy()
     clean[at] = middle[at]
     return clean, at
-
-
-def resolution(force: Float) -> float:
-    """Smallest usual step between neighbouring samples that differ; zero for a fine recorder."""
-    steps = np.abs(np.diff(force[: 1 << 16]))
-    moving = steps[steps > 0]
-    # A recorder whose steps are seen stands still in many samples.
-    if moving.size > 0.95 * steps.size or not moving.size:
-        return 0.0
-    return float(np.quantile(moving, 0.05))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.measurement.series import weighted_line
+from asperity.measurement.series import weighted_line, weighted_mean
 from asperity.measurement.stick_slip.events import SlipEvents
 
 #: Growing or dying cycles are fitted together if their periods exceed those of the smallest cycles
@@ -219,10 +219,7 @@ def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, fl
             periods.append(row["recurrence"] * root)
             errors.append(row["recurrence_uncertainty"])
     if values:
-        weight = 1 / np.array(uncertainties) ** 2
-        mean = float(weight @ np.array(values) / weight.sum())
-        scatter = float(weight @ (np.array(values) - mean) ** 2) / max(len(values) - 1, 1)
-        return mean, float(np.sqrt(max(scatter, 1.0) / weight.sum()))
+        return weighted_mean(np.array(values), np.array(uncertainties))
     if len(squares) < 2:
         return np.nan, np.nan
     period, uncertainty = _without_drop(*(np.array(a) for a in (squares, periods, errors)))

@@ -185,6 +185,7 @@ def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
     heights = (reading.epsilon, reading.phasor(1).amplitude)
     answers = []
     for c, (name, values) in enumerate((("load", load), ("force", force))):
+        # A fast modulation repeats no sample, by which `recorder_step` goes.
         steps = np.diff(np.unique(values[: 1 << 14]))
         step = float(steps.min()) if steps.size else 0.0
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Float, Index
+from asperity.arrays import Bool, Float, Index
 
 #: Number of levels next to the extreme that show the usual number of samples at a level.
 _LEVELS = 3
@@ -19,6 +19,9 @@ _IN_A_ROW = 3
 #: Rounding is coarse where this share of neighbours is equal and the other differences are whole
 #: multiples of one step, to this share of it.
 _MOSTLY_EQUAL, _WHOLE = 0.5, 0.02
+#: Quantile of the differences next to equal samples that is the step: few are smaller by chance, as
+#: where the load in F/W changes by a step of its own.
+_LEAST = 0.05
 #: A sample-and-hold channel repeats at least a tenth of its samples, and has several quantisation
 #: steps between them.
 _REPEATED, _STEPS = 0.1, 4.0
@@ -91,8 +94,34 @@ def _most_at_a_level(values: Float, extreme: float, side: str) -> int | None:
     return most
 
 
+def recorder_step(values: Float, repeated: float = 0.05) -> float:
+    """Step of the recorder, in the unit of the values; 0 of a fine recorder.
+
+    A recorder whose steps are seen repeats samples. Next to a repeated sample the signal changes by
+    one step, while elsewhere it may pass many.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    repeated : float
+        Share of repeated samples from which on the recorder is coarse.
+    """
+    steps, equal = _steps(values)
+    if np.count_nonzero(equal) <= repeated * equal.size or equal.all():
+        return 0.0
+    beside = ~equal
+    beside[1:-1] &= equal[:-2] | equal[2:]
+    return float(np.quantile(steps[beside], _LEAST))
+
+
+def _steps(values: Float) -> tuple[Float, Bool]:
+    """Sizes of the differences between neighbours, and which of them are equal."""
+    steps = np.abs(np.diff(values))
+    return steps, steps <= 1e-9 * float(np.median(np.abs(values)))
+
+
 def coarsely_rounded(values: Float) -> tuple[float, float] | None:
-    """Share of values equal to the value before, and the usual step of the other values.
+    """Share of values equal to the value before, and the step of the others.
 
     None where values were not rounded, or no more coarsely than their noise.
 
@@ -105,14 +134,14 @@ def coarsely_rounded(values: Float) -> tuple[float, float] | None:
     Rounding acts like white noise if the signal has noise of that size (Widrow, 1956). If most
     neighbours are equal there is no such noise, and the rounding error follows the signal.
     """
-    steps = np.abs(np.diff(values))
-    moved = steps[steps > 1e-9 * max(float(np.median(np.abs(values))), 1e-300)]
-    if not moved.size or moved.size >= (1 - _MOSTLY_EQUAL) * steps.size:
+    step = recorder_step(values, _MOSTLY_EQUAL)
+    if not step:
         return None
-    digits = moved / moved.min()
+    steps, equal = _steps(values)
+    digits = steps[~equal] / step
     if float(np.abs(digits - np.round(digits)).max()) >= _WHOLE:
         return None
-    return 1 - moved.size / steps.size, float(np.median(moved))
+    return float(equal.mean()), step
 
 
 def held_length(values: Float) -> float | None:

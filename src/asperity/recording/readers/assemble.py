@@ -23,7 +23,15 @@ from asperity.recording.readers.units import (
     split_labels,
     understood,
 )
-from asperity.recording.roles import ROLES, candidates, find_channel, kinds_of, nouns, role_of
+from asperity.recording.roles import (
+    ROLES,
+    candidates,
+    find_channel,
+    kinds_of,
+    nouns,
+    recorded_as,
+    role_of,
+)
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
@@ -49,10 +57,10 @@ def assemble(
     # Names of a damaged file may hold anything.
     names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
     texts = dict(zip(names, map(_unit_text, recorded.columns, split), strict=True))
-    labels = {c.label: name for c, name in zip(recorded.columns, names, strict=True)}
+    headings = {name: c.label for name, c in zip(names, recorded.columns, strict=True)}
     try:
-        roles = _chosen_roles(columns or {}, names, labels)
-        stated = _by_name(units or {}, names, labels, roles)
+        roles = _chosen_roles(columns or {}, headings)
+        stated = _by_name(units or {}, headings, roles)
     except InputError as error:
         raise with_cause(error, findings) from None
     known = _known_units(texts, stated, findings)
@@ -124,15 +132,13 @@ def _unique(names: list[str], findings: list[Finding]) -> list[str]:
     return list(unique)
 
 
-def _chosen_roles(
-    columns: Mapping[str, str | int], names: list[str], labels: Mapping[str, str]
-) -> dict[str, str]:
+def _chosen_roles(columns: Mapping[str, str | int], headings: Mapping[str, str]) -> dict[str, str]:
     roles = {}
     for key, wanted in columns.items():
         role = role_of(key)
         if role is None:
             raise InputError("columns", "name roles", f"'{key}'", closest(key, ROLES))
-        roles[role] = _name_of(wanted, names, labels, Argument("columns", key))
+        roles[role] = _name_of(wanted, headings, Argument("columns", key))
     return roles
 
 
@@ -150,36 +156,27 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
             )
 
 
-def _name_of(
-    wanted: str | int, names: list[str], labels: Mapping[str, str], field: Argument
-) -> str:
+def _name_of(wanted: str | int, headings: Mapping[str, str], field: Argument) -> str:
     if isinstance(wanted, int):
+        names = list(headings)
         if not -len(names) <= wanted < len(names):
             rule = f"the file has columns 0 to {len(names) - 1}"
             raise InputError(field, "be a column", shown(wanted), rule)
         return names[wanted]
-    if wanted in names:
-        return wanted
-    if wanted in labels:
-        return labels[wanted]
-    same = [n for n in names if n.lower() == wanted.lower()]
-    if len(same) == 1:
-        return same[0]
-    raise InputError(field, "be a column", f"'{wanted}'", closest(wanted, names))
+    name = recorded_as(wanted, headings)
+    if name is None:
+        raise InputError(field, "be a column", f"'{wanted}'", closest(wanted, headings))
+    return name
 
 
 def _by_name(
-    units: Mapping[str, str],
-    names: list[str],
-    labels: Mapping[str, str],
-    roles: Mapping[str, str],
+    units: Mapping[str, str], headings: Mapping[str, str], roles: Mapping[str, str]
 ) -> dict[str, str]:
     """Units by the name of the column; the user may have used its heading or role."""
-    by_name = {}
+    by_name, kinds = {}, dict.fromkeys(headings)
     for key, text in units.items():
         try:
-            heading = key if key in names else labels.get(key)
-            name = heading or find_channel(key, dict.fromkeys(names), roles)
+            name = key if key in headings else find_channel(key, kinds, roles, headings)
         except InputError as error:
             raise error.about(Argument("units")) from None
         by_name[name] = text

@@ -28,7 +28,7 @@ import numpy as np
 from asperity.errors import Argument, InputError, closest, printable, require
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import ReadingRecipe, Source
-from asperity.recording.derived import derive
+from asperity.recording.derived import derive, stress_to_force
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
 from asperity.recording.readers.raw import RawRecording
@@ -284,8 +284,6 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
     InputError
         As in `read`; or if the area makes no force of a stress.
     """
-    from asperity.recording.conversions import stress_to_force
-
     trace = read(path, **source.arguments)
     return trace if source.area is None else stress_to_force(trace, source.area)
 

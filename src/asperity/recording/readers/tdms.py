@@ -40,12 +40,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     group : str or None
         The group to read, where they differ in length.
     """
-    try:
-        import nptdms
-    except ImportError:
-        rule = "be in a format that can be read here"
-        advice = "install npTDMS, as 'pip install asperity[lab]' does"
-        raise InputError("recording.path", rule, f"'{path.name}', which is TDMS", advice) from None
+    nptdms = library("recording.path", "be in a format that can be read here", path)
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
         channels = {g.name: g.channels() for g in file.groups()}
@@ -65,6 +60,16 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
         "title": str(file.properties.get("name", "")),
     }
     return RawRecording(columns, findings + left_out, provenance, start, step)
+
+
+def library(name: str, rule: str, path: Path) -> Any:
+    """npTDMS; `InputError` about a file, its argument and rule, where it is not installed."""
+    try:
+        import nptdms
+    except ImportError:
+        advice = "install npTDMS, as 'pip install asperity[lab]' does"
+        raise InputError(name, rule, f"'{path.name}', which is TDMS", advice) from None
+    return nptdms
 
 
 @contextmanager
