@@ -99,8 +99,8 @@ class Recording:
     def arrays(self) -> tuple[Float, Float, Float]:
         """Time (s), load and force (N), with the faults."""
         r, u, (mu1, mu2) = self.random, self.share, self.harmonics
-        for name in self.faults:
-            if name in MOTIONS:
+        for name in MOTIONS:
+            if name in self.faults:
                 MOTIONS[name](self)
         phi = 2 * np.pi * self.frequency * self.time + r.uniform(0, 6.28) + self.turn
         wave = np.cos(phi) + r.uniform(0, 2e-3) * np.cos(2 * phi + r.uniform(0, 6.28))
@@ -112,8 +112,8 @@ class Recording:
         self.force += level + self.swell * self.change * own.real
         self.load += self.noise[0] * r.normal(size=u.size)
         self.force += self.noise[1] * r.normal(size=u.size)
-        for name in self.faults:
-            if name in RECORDERS:
+        for name in RECORDERS:
+            if name in self.faults:
                 RECORDERS[name](self)
         kept = self.kept
         start = float(self.time[0])
@@ -237,6 +237,12 @@ def _held(x: Recording) -> None:
     values[:] = np.repeat(values[::count], count)[: values.size]
 
 
+def _coarse(x: Recording) -> None:
+    for values in (x.load, x.force):
+        step = 2.0 ** -x.random.integers(8, 15)
+        values[:] = step * np.round(values / step)
+
+
 def _load_noise(x: Recording) -> None:
     x.load += lfilter([np.sqrt(1 - 0.99**2)], [1, -0.99], x.noise_of(1e-3, 3e-2))
 
@@ -255,7 +261,7 @@ def _missing(x: Recording) -> None:
     x.force[x.some(0.001, 0.1)] = np.nan
 
 
-#: Faults of the motion, and of what records it.
+#: Faults of the motion, and of what records it, in the order in which they act.
 MOTIONS: dict[str, Callable[[Recording], None]] = {
     "mains": _mains,
     "drift": _drift,
@@ -270,16 +276,17 @@ MOTIONS: dict[str, Callable[[Recording], None]] = {
     "slow settling": _settles,
 }
 RECORDERS: dict[str, Callable[[Recording], None]] = {
-    "jitter": _jitter,
-    "rounded times": _rounded,
-    "lost samples": _lost,
-    "spikes": _spikes,
-    "clipped": _clipped,
-    "held samples": _held,
     "load noise": _load_noise,
     "common noise": _common,
     "burst": _burst,
+    "jitter": _jitter,
+    "rounded times": _rounded,
+    "spikes": _spikes,
+    "clipped": _clipped,
+    "held samples": _held,
+    "coarse steps": _coarse,
     "missing values": _missing,
+    "lost samples": _lost,
 }
 FAULTS = ("no pauses", *MOTIONS, *RECORDERS)
 
@@ -323,7 +330,8 @@ def judged(seed: int) -> dict:
         if name in ("mu1", "mu2"):
             phasor = reading.phasor(int(name[2]))
             off[name] = (phasor.amplitude - abs(value)) / phasor.amplitude_uncertainty
-            if phasor.excludes(0, 0.9999):
+            # The phase of a small amplitude has no normal error.
+            if phasor.amplitude > 6 * phasor.amplitude_uncertainty:
                 turned = np.angle(phasor.value / value)
                 off[f"phase{name[2]}"] = turned / phasor.phase_uncertainty
         elif name == "delta_mu":

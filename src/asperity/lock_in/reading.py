@@ -10,9 +10,11 @@ import numpy as np
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, closest, require
 from asperity.lock_in.noise import LocalNoise
-from asperity.lock_in.normal_equations import BlockSums
+from asperity.lock_in.normal_equations import BlockSums, inverted
 from asperity.lock_in.settling import Settling
 
+#: Samples of a piece of a window in which fast oscillations are searched.
+PIECE = 1 << 16
 #: Standard deviation (rad) of an angle that is uniform over the circle, pi/sqrt(3).
 _UNKNOWN_PHASE = math.pi / math.sqrt(3)
 
@@ -163,6 +165,20 @@ class LockInReading:
         """Phase of the load at times (s) of the window, over 2 pi; arrays (n,)."""
         middle = (self.start + self.end) / 2
         return self.frequency * (time - middle) + self.phase / (2 * np.pi)
+
+    def residual_of_piece(self, time: Float, values: Float) -> tuple[slice, Float]:
+        """The middle of a window, `PIECE` samples at most, and the residual of a fit to it alone.
+
+        Parameters
+        ----------
+        time, values : array, (n,)
+            Times and channel of the window.
+        """
+        at = max(0, (time.size - PIECE) // 2)
+        piece = slice(at, at + PIECE)
+        basis, part = self.blocks.basis, values[piece]
+        columns = basis.columns(time[piece])[: basis.linear]
+        return piece, part - inverted(columns @ columns.T) @ (columns @ part) @ columns
 
     def observables(self) -> dict[str, float]:
         """W0, epsilon, frequency, mean_force, mean_friction, then mu1, phase1, ... by name."""

@@ -14,6 +14,7 @@ from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
+from asperity.lock_in.rounding import rounding_variance, step_of, with_rounding
 from asperity.measurement.samples import Samples, about_window, usable
 from asperity.measurement.series import (
     MeanLevel,
@@ -238,8 +239,10 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         refine=not question.exact_frequency,
         settles=True,
     )
+    reading = with_rounding(reading, time, samples.load[cut], force_values)
     chosen_by = "program" if window is None else "user"
-    before, after = _around(samples, parts, chosen, reading.W0)
+    steps = step_of(force_values), step_of(samples.load[cut])
+    before, after = _around(samples, parts, chosen, reading.W0, steps)
     rates = _rates(samples, (before, after))
     if after and before and rates[0] and rates[1]:
         # If a pause drifts while the pause before the modulation does not, it still recovers.
@@ -324,6 +327,8 @@ class _Pause(NamedTuple):
     force: MeanLevel
     load: MeanLevel
     friction: MeanLevel
+    #: Standard error of the friction by the steps of the recorder, the same in all pauses.
+    rounding: float
 
 
 def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None]) -> list[Check]:
@@ -368,9 +373,13 @@ def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
 
 
 def _around(
-    samples: Samples, parts: list[LoadInterval], chosen: LoadInterval, mean_load: float
+    samples: Samples,
+    parts: list[LoadInterval],
+    chosen: LoadInterval,
+    mean_load: float,
+    steps: tuple[float, float],
 ) -> tuple[_Pause | None, _Pause | None]:
-    """The pauses before and after the stretch that is read."""
+    """The pauses before and after the stretch that is read; `steps` of force and load."""
     at, most = parts.index(chosen), chosen.stop - chosen.first
     sides: list[_Pause | None] = []
     for step in (-1, 1):
@@ -395,7 +404,7 @@ def _around(
             continue
         cut = slice(first, stop)
         values = samples.time[cut], samples.force[cut], samples.load[cut]
-        sides.append(_pause(*values, recovers=recovers))
+        sides.append(_pause(*values, steps, recovers=recovers))
     return sides[0], sides[1]
 
 
@@ -404,7 +413,9 @@ def _no_modulation(time: Float) -> float:
     return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
-def _pause(time: Float, force: Float, load: Float, *, recovers: bool) -> _Pause | None:
+def _pause(
+    time: Float, force: Float, load: Float, steps: tuple[float, float], *, recovers: bool
+) -> _Pause | None:
     """Levels of a pause; of a force that recovers, the level to which it settles.
 
     None if that level is not determined.
@@ -420,14 +431,18 @@ def _pause(time: Float, force: Float, load: Float, *, recovers: bool) -> _Pause 
         limit = LOCK_IN["transient"][0]
         if abs(settling.amplitude) > limit * abs(level.value):
             return None
-    level = level._replace(
-        value=level.value + shift, uncertainty=float(np.hypot(level.uncertainty, np.sqrt(variance)))
-    )
+    of_steps = [
+        float(rounding_variance(step, float(np.std(values)))[0])
+        for step, values in zip(steps, (force, load), strict=True)
+    ]
+    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[0])
+    level = level._replace(value=level.value + shift, uncertainty=float(np.linalg.norm(doubts)))
     # The ratio has the noise of both channels, less what they share.
     ratio = level.value / of_load.value
     noise = mean_level(time, force - ratio * load)
     doubt = float(np.hypot(noise.uncertainty, np.sqrt(variance))) / abs(of_load.value)
-    return _Pause(level, of_load, noise._replace(value=ratio, uncertainty=doubt))
+    rounding = float(np.sqrt(of_steps[0] + ratio**2 * of_steps[1])) / abs(of_load.value)
+    return _Pause(level, of_load, noise._replace(value=ratio, uncertainty=doubt), rounding)
 
 
 def _rates(samples: Samples, sides: tuple[_Pause | None, ...]) -> list[Rate | None]:
@@ -460,7 +475,7 @@ def _static_friction(
     drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
     if len(sides) == 1:
         # F(0) at the other end was not recorded, but the force drifts in the window or the pause.
-        level, load, _ = sides[0]
+        level, load = sides[0].force, sides[0].load
         rates = list(pauses)
         if reading.drift.shape[1]:
             rates.append(drift_rate(reading))
@@ -474,4 +489,5 @@ def _static_friction(
             (float(drifted), 30.0),
         ]
     )
-    return float(np.mean(ratios)), float(np.hypot(np.linalg.norm(doubts), drifted)), dof
+    whole = np.linalg.norm([*doubts, drifted, max(side.rounding for side in sides)])
+    return float(np.mean(ratios)), float(whole), dof

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from asperity.arrays import Bool, Float
-from asperity.measurement.verdicts.steadiness import left_of_piece
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -247,7 +246,7 @@ def residual_spectrum(measurement: Measurement) -> tuple[Float, Float]:
     """
     reading, cut = measurement.reading, slice(*measurement.window)
     time, force = measurement.samples.time[cut], measurement.samples.force[cut]
-    piece, left = left_of_piece(reading, time, force)
+    piece, left = reading.residual_of_piece(time, force)
     grid = np.linspace(time[piece][0], time[piece][-1], left.size)
     hann = np.cos(np.linspace(-np.pi / 2, np.pi / 2, grid.size)) ** 2
     level = hann * np.interp(grid, time[piece], left) / reading.W0

@@ -10,6 +10,7 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
+from asperity.lock_in.rounding import step_of
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import other_line
 from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
@@ -185,9 +186,7 @@ def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
     heights = (reading.epsilon, reading.phasor(1).amplitude)
     answers = []
     for c, (name, values) in enumerate((("load", load), ("force", force))):
-        # A fast modulation repeats no sample, by which `recorder_step` goes.
-        steps = np.diff(np.unique(values[: 1 << 14]))
-        step = float(steps.min()) if steps.size else 0.0
+        step = step_of(values)
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
         answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))

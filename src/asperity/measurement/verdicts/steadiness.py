@@ -9,22 +9,23 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import fdtri
 
 from asperity.arrays import Float
-from asperity.lock_in.normal_equations import inverted
-from asperity.lock_in.reading import LockInReading
+from asperity.lock_in.reading import PIECE, LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check, percent
 
-#: Samples of the piece in the middle of a window in which fast oscillations are searched.
-_PIECE = 1 << 16
 #: Stick-slip of laboratory sliders is slower than this (Hz).
 _STICK_SLIP = 20.0
 
 
 #: Spectral lines on each side of the modulation that count as its sidebands.
 _SIDEBANDS = 16
+#: Sidebands are no noise if noise is as strong next to the line with a lower probability, and
+#: lines that the noise at a harmonic is the mean of.
+_CHANCE, _LINES = 1e-4, 20
 #: Slow motion counts above this multiple of the variance that noise gives it.
 _EXCESS = 3.0
 
@@ -50,14 +51,14 @@ def other_line(
         0 for the load, 1 for the force.
     """
     f = reading.frequency
-    piece, left = left_of_piece(reading, time, values)
+    piece, left = reading.residual_of_piece(time, values)
     span = float(time[piece][-1] - time[piece][0])
     # Stick-slip may be faster than a slow modulation.
     highest = max(0.9 * f, _STICK_SLIP) if channel else left.size / span / 2
     # Means over a third of a period keep what is slower.
     blocks = int(min(left.size, max(64, 3.3 * highest * span)))
     candidates = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
-    if time.size > _PIECE:
+    if time.size > PIECE:
         count = reading.blocks.count
         slow = reading.residual[:-1, 0, channel].real / count[:-1]
         candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
@@ -76,15 +77,6 @@ def other_line(
     return max(lines, key=lambda line: line.amplitude / max(line.background, 1e-300), default=None)
 
 
-def left_of_piece(reading: LockInReading, time: Float, values: Float) -> tuple[slice, Float]:
-    """The middle piece of a window, and the residual of a separate fit to it."""
-    at = max(0, (time.size - _PIECE) // 2)
-    piece = slice(at, at + _PIECE)
-    basis, part = reading.blocks.basis, values[piece]
-    columns = basis.columns(time[piece])[: basis.linear]
-    return piece, part - inverted(columns @ columns.T) @ (columns @ part) @ columns
-
-
 def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
     """The strongest line between drift and a frequency; None where there is no room for one."""
     if time.size < 32 or (time[-1] - time[0]) * highest < 3 or not values.any():
@@ -100,7 +92,7 @@ def leakage(reading: LockInReading) -> Check:
     if near.size and not far.size:
         # The sidebands of few periods reach to the next harmonic. Noise is that at the last one.
         noise = float(reading.noise.spectra[-1, 0, 0].real)
-        far = np.array([2 * noise * reading.samples / carrier**2])
+        far = np.full(_LINES, 2 * noise * reading.samples / carrier**2)
     number = float(np.sqrt(near.sum()))
     return LOCK_IN.check(
         "leakage",
@@ -160,7 +152,11 @@ def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[Fl
 
 def _stands_out(near: Float, far: Float) -> bool:
     """Whether the power near a line exceeds that farther off, which is noise."""
-    return bool(near.size and far.size and near.mean() > 3.0 * max(far.mean(), 1e-300))
+    if not near.size or not far.size:
+        return False
+    # Either side of a line has a real and an imaginary part.
+    chance = float(fdtri(4 * near.size, 4 * far.size, 1 - _CHANCE))
+    return bool(near.mean() > max(3.0, chance) * max(far.mean(), 1e-300))
 
 
 def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bool]:
@@ -169,7 +165,7 @@ def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bo
     count, sums = reading.blocks.count, reading.residual[:, 0, 0].real
     # Blocks are weighted by their samples: a short block at the end has little weight.
     series = [(sums / count, count)]
-    at, left = left_of_piece(reading, time, load)
+    at, left = reading.residual_of_piece(time, load)
     # Means over half a period keep slower motion; the modulation is not in the residual.
     span = float(time[at][-1] - time[at][0])
     blocks = int(min(left.size, max(8, 2 * reading.frequency * span)))
