@@ -21,6 +21,7 @@ from asperity.figures.style import (
     STATED_FILL,
     letter_panels,
     new_figure,
+    three_panels,
 )
 from asperity.measurement.record import mean_cycle, residual_spectrum
 from asperity.recording.extremes import extremes
@@ -43,13 +44,7 @@ def draw_modulated(measurement: Measurement) -> Figure:
     ----------
     measurement : Measurement
     """
-    figure = new_figure(5.0, 7.2)
-    whole, cycle, left = figure.subplots(3, 1)
-    _draw_recording(whole, measurement)
-    _draw_cycle(cycle, measurement)
-    _draw_residual(left, measurement)
-    letter_panels((whole, cycle, left))
-    return figure
+    return three_panels((_draw_recording, _draw_cycle, _draw_residual), measurement)
 
 
 def draw_amplitudes(rows: Sequence[Mapping[str, Any]]) -> Figure:
@@ -132,7 +127,7 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
             color=_FITTED,
             label="peak after a hold",
         )
-    axis.set(xlabel=_since(start), ylabel="friction $F/W$")
+    axis.set(xlabel=since(start), ylabel="friction $F/W$")
     axis.legend(loc="upper right", ncols=2, handlelength=1.4)
     return figure
 
@@ -153,7 +148,7 @@ def _draw_recording(axis: Axes, measurement: Measurement) -> None:
     top = max(1.0 + abs(reading.epsilon), float(samples.load.max() / reading.W0))
     bottom = min(0.0, float(samples.force.min() / reading.W0))
     axis.set_ylim(bottom, top + 0.3 * (top - bottom))
-    axis.set(xlabel=_since(start), ylabel="$W/W_0$,  $F/W_0$")
+    axis.set(xlabel=since(start), ylabel="$W/W_0$,  $F/W_0$")
     keys = [
         Patch(color=_LOAD, label="load"),
         Patch(color=_FITTED, label="force"),
@@ -208,7 +203,8 @@ def _draw_residual(axis: Axes, measurement: Measurement) -> None:
     axis.legend(loc="upper right", ncols=2)
 
 
-def _since(start: float) -> str:
+def since(start: float) -> str:
+    """Label of an axis of times after the start of a recording (s)."""
     return f"time $-$ {start:.10g} s (s)" if start else "time (s)"
 
 
