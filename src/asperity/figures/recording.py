@@ -24,6 +24,7 @@ from asperity.figures.style import (
     three_panels,
 )
 from asperity.measurement.record import mean_cycle, residual_spectrum
+from asperity.recording.defects.sampling import gap_rows
 from asperity.recording.extremes import extremes
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 #: Number of blocks of a long curve, about the number of pixels.
 _COLUMNS = 1200
 _POINTS = 20_000
+#: Share of a curve's length that a gap must have to be seen.
+_SEEN = 0.003
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
 
 
@@ -213,8 +216,9 @@ def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> 
 
     Nothing is drawn between samples that are far apart.
     """
-    breaks = [] if lines else _gaps(x)
-    for first, stop in pairwise([0, *breaks, x.size]):
+    breaks = gap_rows(x) if not lines and x.size > 3 else np.empty(0, dtype=np.intp)
+    wide = np.diff(x)[breaks - 1] > _SEEN * (x[-1] - x[0])
+    for first, stop in pairwise([0, *breaks[wide][:_COLUMNS].tolist(), x.size]):
         part_x, part_y = x[first:stop], y[first:stop]
         if y.size > _POINTS:
             kept = extremes(part_y, max(_COLUMNS * part_y.size // y.size, 1))
@@ -223,15 +227,3 @@ def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> 
         axis.plot(part_x, part_y, color=color, linewidth=0.6, marker=marker, markersize=1)
     formatter = ScalarFormatter(useOffset=False)
     axis.yaxis.set_major_formatter(formatter)
-
-
-def _gaps(time: Float) -> list[int]:
-    """Samples that follow a visible gap, a step far longer than the steps around it."""
-    steps = np.diff(time)
-    if steps.size < 3:
-        return []
-    before = np.concatenate([[np.inf], steps[:-1]])
-    after = np.concatenate([steps[1:], [np.inf]])
-    far = (steps > 5 * np.minimum(before, after)) & (steps > 3 * np.median(steps))
-    seen = steps > 0.003 * (time[-1] - time[0])
-    return [int(at) for at in np.flatnonzero(far & seen) + 1][:_COLUMNS]

@@ -56,10 +56,7 @@ class Drive(NamedTuple):
 def filled_up(drive: Drive) -> Drive:
     """The drive padded with empty pieces at its end, to one of a few lengths."""
     pieces = len(drive.pull)
-    size = 8
-    while size < pieces:
-        size *= 2
-    extra = size - pieces
+    extra = max(8, 1 << (pieces - 1).bit_length()) - pieces
     edges = np.concatenate([drive.edges, np.full(extra, drive.edges[-1])])
     # The empty pieces have the final values, because a sample may lie at the end.
     last = drive.load[-1] + drive.load_slope[-1] * float(drive.edges[-1] - drive.edges[-2])
