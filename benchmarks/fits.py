@@ -31,8 +31,8 @@ from scipy.optimize import least_squares
 
 import asperity as asp
 from asperity.inference import Fit, Prior, fit, sample_posterior, table_of
-from benchmarks import scipy_shooting
 from benchmarks.cases import FREQUENCY, dimensionless
+from benchmarks.scipy_shooting import solve_numbers
 
 PAPER = asp.materials.load("bureau2000")
 LAW = "elasto-plastic"
@@ -45,27 +45,13 @@ PRIOR = {"D0": Prior(mean=4e-7, sd=2e-7, source="benchmark")}
 COLUMNS = ("mean_friction", "mu1", "mu2")
 
 
-class Points:
-    """The rows of a table as the integration takes them."""
-
-    def __init__(self, inputs: dict[str, np.ndarray], free: dict[str, float]) -> None:
-        self._inputs, self._free = inputs, free
-
-    def __len__(self) -> int:
-        return len(self._inputs["V"])
-
-    def numbers(self) -> dict[str, np.ndarray]:
-        """As `benchmarks.cases.Batch.numbers`."""
-        p = FIXED | self._free
-        names = {"mu0": "mu0", "A": "A", "B": "B", "D0": "D0", "V0": "V0", "lambda": "lambda_"}
-        law = asp.laws.ElastoPlastic(**{field: p[name] for name, field in names.items()})
-        epsilon = p["eps_ratio"] * self._inputs["epsilon"]
-        return dimensionless(law, p["K"] / p["W0"], self._inputs["V"], epsilon)
-
-
 def integrated(inputs: dict[str, np.ndarray], free: dict[str, float]) -> np.ndarray:
     """Mean, mu1 and mu2 by integration, shape (3, rows)."""
-    answer = scipy_shooting.solve(Points(inputs, free), tolerance=1e-9)
+    p = FIXED | free
+    numbers = {n: p[n] for n in ("mu0", "A", "B", "D0", "V0")}
+    law = asp.laws.ElastoPlastic(**numbers, lambda_=p["lambda"])
+    epsilon = p["eps_ratio"] * inputs["epsilon"]
+    answer = solve_numbers(dimensionless(law, p["K"] / p["W0"], inputs["V"], epsilon), 1e-9)
     return np.stack([answer.mean, answer.mu1, answer.mu2])
 
 

@@ -14,11 +14,15 @@ REFERENCE = 1e-13
 
 def solve(batch: Batch, tolerance: float = 1e-10) -> Answer:
     """Solve the points one after the other."""
-    numbers = batch.numbers()
+    return solve_numbers(batch.numbers(), tolerance)
+
+
+def solve_numbers(numbers: dict[str, np.ndarray], tolerance: float) -> Answer:
+    """Solve points by their dimensionless numbers, each (points,)."""
     z0, chi0 = averaged_limit(numbers)
     answers = [
         _solve_point({k: v[i] for k, v in numbers.items()}, z0[i], chi0[i], tolerance)
-        for i in range(len(batch))
+        for i in range(z0.size)
     ]
     return Answer(*(np.stack(values, axis=-1) for values in zip(*answers, strict=True)))
 

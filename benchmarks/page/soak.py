@@ -18,22 +18,17 @@ from benchmarks.page.serving import chromium, load, serving
 SLIDERS = ("relative amplitude", "pulling velocity", "stiffness of the pulling")
 
 
-def resident(process: int) -> float:
-    """Resident memory (MB) of a process and all that it started."""
-    total = 0.0
-    for line in Path(f"/proc/{process}/status").read_text().splitlines():
-        if line.startswith("VmRSS"):
-            total += int(line.split()[1]) / 1024
-    for task in Path(f"/proc/{process}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            total += resident(int(child))
-    return total
-
-
 def own(process: int) -> float:
-    """Resident memory (MB) of the process alone."""
+    """Resident memory (MB) of a process alone."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return next(int(x.split()[1]) / 1024 for x in lines if x.startswith("VmRSS"))
+
+
+def resident(process: int) -> float:
+    """Resident memory (MB) of a process and all that it started."""
+    tasks = Path(f"/proc/{process}/task").iterdir()
+    started = [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    return own(process) + sum(map(resident, started))
 
 
 def counted(session: Any) -> dict[str, float]:

@@ -6,6 +6,7 @@ from scipy.stats import binom
 
 from asperity.lock_in.demodulation import lock_in
 from asperity.lock_in.reading import Phasor
+from references.planted_recordings import covered
 from references.populations import draws, population
 
 SEEDS = 200
@@ -28,33 +29,15 @@ CASES = {
 def test_intervals_contain_the_truth_as_often_as_they_state(truth, red_noise, case) -> None:
     n, dt, frequency, rho, of_load, of_force, shared = CASES[case]
     truth = truth.but(frequency=frequency, drift=1e-3)
-    time = np.arange(n) * dt
-    load, force = truth.load(time), truth.force(time)
     rng = np.random.default_rng(20)
-    hits = dict.fromkeys(NAMES, 0)
-    for _ in range(SEEDS):
-        own, other = red_noise(rng, rho, 2, n)
-        reading = lock_in(
-            time,
-            load + of_load * own,
-            force + of_force * other + shared * of_load * own,
-            harmonics=2,
-        )
-        for name in NAMES:
-            value, true = _value(reading, name), _value(truth, name)
-            hits[name] += abs(value - true) < reading.half_width(name)
-    covered = np.array([hits[name] for name in NAMES]) / SEEDS
+    pairs = (red_noise(rng, rho, 2, n) for _ in range(SEEDS))
+    noises = [(of_load * own, of_force * other + shared * of_load * own) for own, other in pairs]
+    hits = covered(truth, noises, 1 / dt, NAMES)
+    shares = np.array(list(hits.values()))
     # All together as required; each within what 200 seeds can tell, at 1e-3, of 92 to 98 %.
-    assert 0.92 < covered.mean() < 0.98, hits
-    assert covered.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
-    assert covered.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
-
-
-def _value(source, name):
-    if name[-1] in "12":
-        c = source.harmonics[int(name[-1]) - 1]
-        return abs(c) if name.startswith("mu") else np.angle(c)
-    return getattr(source, name)
+    assert 0.92 < shares.mean() < 0.98, hits
+    assert shares.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
+    assert shares.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
 
 
 def test_white_noise_has_the_textbook_s_variances(truth) -> None:

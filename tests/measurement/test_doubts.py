@@ -12,6 +12,7 @@ import asperity as asp
 from asperity.lock_in.demodulation import lock_in
 from asperity.measurement.record import modulated_record
 from asperity.recording import check
+from references.planted_recordings import covered
 from references.populations import draws
 
 measure = partial(asp.measure, modulated=True)
@@ -217,23 +218,6 @@ def test_a_jittering_clock_has_no_gaps(made, trace) -> None:
     assert gap.number == pytest.approx(0.01, rel=0.1)
 
 
-def _covered(truth, noises, names):
-    """Share of 95 % intervals that hold the truth, over pairs of noise of load and force."""
-    hits = dict.fromkeys(names, 0)
-    for of_load, of_force in noises:
-        time = np.arange(of_load.size) / RATE
-        load, force = truth.load(time) + of_load, truth.force(time) + of_force
-        reading = lock_in(time, load, force, harmonics=2)
-        for name in names:
-            kind, n = name.rstrip("12"), int(name[-1]) if name[-1] in "12" else 0
-            c = truth.harmonics[n - 1]
-            true = {"mu": abs(c), "phase": np.angle(c)}.get(kind, getattr(truth, kind, 0.0))
-            value = getattr(reading.phasor(n), {"mu": "amplitude"}.get(kind, kind)) if n else None
-            value = getattr(reading, name) if value is None else value
-            hits[name] += abs(value - true) < reading.half_width(name)
-    return {name: count / len(noises) for name, count in hits.items()}
-
-
 @pytest.mark.long
 def test_noise_that_grows_towards_zero_is_followed_there(truth) -> None:
     rng = np.random.default_rng(5)
@@ -245,11 +229,10 @@ def test_noise_that_grows_towards_zero_is_followed_there(truth) -> None:
         shape = np.concatenate([[0.0], line[1:] ** -0.5])
         return 1e-3 * np.fft.irfft(shape * np.fft.rfft(rng.standard_normal(4 * n)))[:n]
 
-    covered = _covered(
-        truth, [(flicker(), flicker()) for _ in range(60)], ("mean_friction", "mu1", "phase1")
-    )
+    noises = [(flicker(), flicker()) for _ in range(60)]
+    shares = covered(truth, noises, RATE, ("mean_friction", "mu1", "phase1"))
     # Binomial scatter of 60 seeds is 3 %; following a spectrum down is no better than it is steep.
-    assert min(covered.values()) > 0.82, covered
+    assert min(shares.values()) > 0.82, shares
 
 
 @draws(8, 60)
@@ -261,8 +244,8 @@ def test_hum_far_from_the_harmonics_is_in_their_uncertainties(truth, draws) -> N
         # Whole periods in the window: no line of the window's spectrum sees them but one.
         wave = [np.cos(2 * np.pi * 50 * time + rng.uniform(0, 7)) for _ in range(2)]
         noises.append([0.01 * w + 1e-4 * rng.standard_normal(time.size) for w in wave])
-    covered = _covered(truth, noises, ("mean_friction", "mu1", "phase1", "mu2"))
-    assert min(covered.values()) > (0.9 if draws == 60 else 0.7), covered
+    shares = covered(truth, noises, RATE, ("mean_friction", "mu1", "phase1", "mu2"))
+    assert min(shares.values()) > (0.9 if draws == 60 else 0.7), shares
 
 
 def test_a_phase_of_nothing_is_unknown(truth) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from asperity.lock_in.demodulation import lock_in
 from asperity.recording import Channel, Trace, check
 
 
@@ -41,6 +42,25 @@ class Truth:
 
     def but(self, **changes):
         return replace(self, **changes)
+
+    def value(self, name):
+        if name[-1] not in "12":
+            return getattr(self, name)
+        c = self.harmonics[int(name[-1]) - 1]
+        return abs(c) if name.startswith("mu") else np.angle(c)
+
+
+def covered(truth, noises, rate, names):
+    """Share of 95 % intervals that hold the truth, over pairs of noise of load and force."""
+    hits = dict.fromkeys(names, 0)
+    for of_load, of_force in noises:
+        time = np.arange(of_load.size) / rate
+        load, force = truth.load(time) + of_load, truth.force(time) + of_force
+        reading = lock_in(time, load, force, harmonics=2)
+        for name, value in reading.observables().items():
+            if name in hits:
+                hits[name] += abs(value - truth.value(name)) < reading.half_width(name)
+    return {name: count / len(noises) for name, count in hits.items()}
 
 
 @pytest.fixture

@@ -222,17 +222,16 @@ def hold_response(
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
     (flat, V, time), shape = flatten((slider, V, time), "hold_response")
 
-    def run(slider: Slider, V: jax.Array, time: jax.Array, runaway: jax.Array) -> tuple:
+    def run(slider: Slider, V: jax.Array, time: jax.Array) -> tuple:
         response, extremum = hold(slider, V, time)
-        after = settle(slider, V, extremum, runaway) if settling else None
+        after = _settled(slider, V, extremum) if settling else None
         # The derivative by differences of order 4 in ln(hold time).
         moved = (hold(slider, V, time * np.exp(n * _STEP))[0] for n in (-2, -1, 1, 2))
         others = [np.asarray(there.maximum) for there in moved]
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
         return response, after, np.log(10) * slope
 
-    runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
-    response, after, rate = _in_shapes(run, flat, V, time, runaway)
+    response, after, rate = _in_shapes(run, flat, V, time)
     assert isinstance(response, HoldResponse)
     crossing = response.end == End.CROSSING
     names = ("level", "minimum", "maximum", "hold_slip", "states", "states_at_maximum")
@@ -285,12 +284,11 @@ def step_response(
         got, advice = f"{V[first == V][0]:g} m/s for both", "leave such points out"
         raise InputError("step_response.velocity", "differ from the one before", got, advice)
 
-    def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
+    def run(slider: Slider, V: jax.Array, first: jax.Array) -> tuple:
         response, extremum = step(slider, first, V)
-        return response, settle(slider, V, extremum, runaway) if settling else None
+        return response, _settled(slider, V, extremum) if settling else None
 
-    runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
-    response, after = _in_shapes(run, flat, V, first, runaway)
+    response, after = _in_shapes(run, flat, V, first)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
     columns = {
@@ -322,14 +320,19 @@ def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
     return slider
 
 
-def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float) -> Any:
+def _settled(slider: Slider, V: jax.Array, extremum: Any) -> SettlingDistance:
+    runaway = jnp.log(jnp.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
+    return settle(slider, V, extremum, runaway)
+
+
+def _in_shapes(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
     """Run many points in calls of a few fixed shapes, padded by repetition."""
     require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
     size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
     parts = []
     for i in range(0, max(len(V), 1), size):
         at = np.minimum(np.arange(i, i + size), len(V) - 1)
-        arguments = jax.tree.map(lambda a, at=at: jnp.asarray(a[at]), (slider, V, other, runaway))
+        arguments = jax.tree.map(lambda a, at=at: jnp.asarray(a[at]), (slider, V, *other))
         kept = min(len(V) - i, size)
         parts.append(jax.tree.map(lambda a, n=kept: np.asarray(a)[:n], run(*arguments)))
     return jax.tree.map(lambda *a: np.concatenate(a), *parts)
@@ -339,8 +342,8 @@ def _common(
     response: Any, after: SettlingDistance | None, slider: Slider, V: Float
 ) -> dict[str, Any]:
     """Columns of both tests: the way to the extremum, stability, and what follows."""
-    run = lambda slider, V, *_: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
-    stable = np.asarray(_in_shapes(run, slider, V, V, V) < 0)
+    run = lambda slider, V: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
+    stable = np.asarray(_in_shapes(run, slider, V) < 0)
     none = np.full(len(V), np.nan)
     crossing = response.end == End.CROSSING
     ends = response.end if after is None else after.end

@@ -21,8 +21,10 @@ from asperity.figures.style import (
     STATED_FILL,
     letter_panels,
     new_figure,
+    three_panels,
 )
 from asperity.measurement.record import mean_cycle, residual_spectrum
+from asperity.recording.defects.sampling import gap_rows
 from asperity.recording.extremes import extremes
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 #: Number of blocks of a long curve, about the number of pixels.
 _COLUMNS = 1200
 _POINTS = 20_000
+#: Share of a curve's length that a gap must have to be seen.
+_SEEN = 0.003
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
 
 
@@ -43,13 +47,7 @@ def draw_modulated(measurement: Measurement) -> Figure:
     ----------
     measurement : Measurement
     """
-    figure = new_figure(5.0, 7.2)
-    whole, cycle, left = figure.subplots(3, 1)
-    _draw_recording(whole, measurement)
-    _draw_cycle(cycle, measurement)
-    _draw_residual(left, measurement)
-    letter_panels((whole, cycle, left))
-    return figure
+    return three_panels((_draw_recording, _draw_cycle, _draw_residual), measurement)
 
 
 def draw_amplitudes(rows: Sequence[Mapping[str, Any]]) -> Figure:
@@ -132,7 +130,7 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
             color=_FITTED,
             label="peak after a hold",
         )
-    axis.set(xlabel=_since(start), ylabel="friction $F/W$")
+    axis.set(xlabel=since(start), ylabel="friction $F/W$")
     axis.legend(loc="upper right", ncols=2, handlelength=1.4)
     return figure
 
@@ -153,7 +151,7 @@ def _draw_recording(axis: Axes, measurement: Measurement) -> None:
     top = max(1.0 + abs(reading.epsilon), float(samples.load.max() / reading.W0))
     bottom = min(0.0, float(samples.force.min() / reading.W0))
     axis.set_ylim(bottom, top + 0.3 * (top - bottom))
-    axis.set(xlabel=_since(start), ylabel="$W/W_0$,  $F/W_0$")
+    axis.set(xlabel=since(start), ylabel="$W/W_0$,  $F/W_0$")
     keys = [
         Patch(color=_LOAD, label="load"),
         Patch(color=_FITTED, label="force"),
@@ -208,7 +206,8 @@ def _draw_residual(axis: Axes, measurement: Measurement) -> None:
     axis.legend(loc="upper right", ncols=2)
 
 
-def _since(start: float) -> str:
+def since(start: float) -> str:
+    """Label of an axis of times after the start of a recording (s)."""
     return f"time $-$ {start:.10g} s (s)" if start else "time (s)"
 
 
@@ -217,8 +216,9 @@ def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> 
 
     Nothing is drawn between samples that are far apart.
     """
-    breaks = [] if lines else _gaps(x)
-    for first, stop in pairwise([0, *breaks, x.size]):
+    breaks = gap_rows(x) if not lines and x.size > 3 else np.empty(0, dtype=np.intp)
+    wide = np.diff(x)[breaks - 1] > _SEEN * (x[-1] - x[0])
+    for first, stop in pairwise([0, *breaks[wide][:_COLUMNS].tolist(), x.size]):
         part_x, part_y = x[first:stop], y[first:stop]
         if y.size > _POINTS:
             kept = extremes(part_y, max(_COLUMNS * part_y.size // y.size, 1))
@@ -227,15 +227,3 @@ def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> 
         axis.plot(part_x, part_y, color=color, linewidth=0.6, marker=marker, markersize=1)
     formatter = ScalarFormatter(useOffset=False)
     axis.yaxis.set_major_formatter(formatter)
-
-
-def _gaps(time: Float) -> list[int]:
-    """Samples that follow a visible gap, a step far longer than the steps around it."""
-    steps = np.diff(time)
-    if steps.size < 3:
-        return []
-    before = np.concatenate([[np.inf], steps[:-1]])
-    after = np.concatenate([steps[1:], [np.inf]])
-    far = (steps > 5 * np.minimum(before, after)) & (steps > 3 * np.median(steps))
-    seen = steps > 0.003 * (time[-1] - time[0])
-    return [int(at) for at in np.flatnonzero(far & seen) + 1][:_COLUMNS]

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity.figures.plot import NORMAL
-from asperity.figures.recording import band
-from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, letter_panels, new_figure
+from asperity.figures.recording import band, since
+from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure, three_panels
 from asperity.measurement.record import middle_events
 from asperity.measurement.stick_slip.regimes import REPEATED
 
@@ -30,13 +30,7 @@ def draw_stick_slip(measurement: StickSlipMeasurement) -> Figure:
     ----------
     measurement : StickSlipMeasurement
     """
-    figure = new_figure(5.0, 7.2)
-    whole, close, drops = figure.subplots(3, 1)
-    _draw_whole(whole, measurement)
-    _draw_close(close, measurement)
-    _draw_drops(drops, measurement)
-    letter_panels((whole, close, drops))
-    return figure
+    return three_panels((_draw_whole, _draw_close, _draw_drops), measurement)
 
 
 def _draw_whole(axis: Axes, measurement: StickSlipMeasurement) -> None:
@@ -83,7 +77,7 @@ def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
 
 def _label(axis: Axes, start: float) -> None:
     """Labels of friction over the time after `start`, with room for the letter of the panel."""
-    axis.set(xlabel=f"time after {start:.6g} s (s)" if start else "time (s)", ylabel="$F/W$")
+    axis.set(xlabel=since(start), ylabel="$F/W$")
     axis.margins(x=0)
     low, high = axis.get_ylim()
     axis.set_ylim(low, high + 0.15 * (high - low))

@@ -9,12 +9,13 @@ Figures and their numbers are the same bytes on disk whenever the same numbers a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from io import BytesIO
 from pathlib import Path
 from string import ascii_lowercase
+from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -131,3 +132,13 @@ def letter_panels(axes: Sequence[Axes]) -> None:
     """Write (a), (b), ... into the upper left corners of the panels."""
     for axis, letter in zip(axes, ascii_lowercase, strict=False):
         axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
+
+
+def three_panels(draw: Sequence[Callable[[Axes, Any], None]], measurement: Any) -> Figure:
+    """A figure of three panels with letters, one above the other, each with its function."""
+    figure = new_figure(5.0, 7.2)
+    panels = figure.subplots(3, 1)
+    for panel, drawn in zip(panels, draw, strict=True):
+        drawn(panel, measurement)
+    letter_panels(panels)
+    return figure

@@ -24,11 +24,11 @@ from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.inference.unknowns import Prior
 from asperity.laws import Law, get_law, known_law, registered
+from asperity.measurement.campaign import MACHINE_FIELDS
 from asperity.measurement.from_file import reads_cycles
 from asperity.measurement.measure import modulation_of
 from asperity.measurement.stick_slip.measure import measure_stick_slip
 from asperity.outputs.targets import require_rereadable
-from asperity.parameters import DRIVE, MACHINE
 from asperity.parameters.arguments import FilePath, of_type, shown, typed
 from asperity.parameters.columns import marked_encoding
 from asperity.questions import fit as questions
@@ -189,29 +189,21 @@ def _stick_slip(
             "read its harmonics first, as asperity measure FILE --out readings.csv does, and fit "
             "that table",
         )
-    over_load = False
+    machine = {field: fixed[n] for n, field in MACHINE_FIELDS.items() if n in fixed}
     try:
-        given = {n: MACHINE[n].check(fixed[n]) for n in ("M", "W0") if n in fixed}
-        V = float(DRIVE["V"].check(fixed["V"])) if "V" in fixed else None
         try:
-            K = MACHINE["K"].check(fixed["K"]) if "K" in fixed else None
+            question = Measured(window=window, **machine)
         except InputError:
             # The reader of runs takes K over the load.
-            K, over_load = None, True
-        question = Measured(
-            window=window,
-            stiffness=K,
-            velocity=V,
-            mass=given.get("M"),
-            normal_load=given.get("W0"),
-        )
+            machine.pop("stiffness", None)
+            question = Measured(window=window, **machine)
         measurement = measure_stick_slip(trace, question)
     except InputError:
         # The reader of runs checks the numbers again.
         return None
     if not reads_cycles(trace, question, measurement):
         return None
-    if over_load:
+    if "K" in fixed and question.stiffness is None:
         raise InputError(
             f"K must be in N/m for a fit of the cycles of {name}, got '{fixed['K']}'; multiply it "
             f"by the load, as {Argument('fixed', 'K', '300 N/m')}, with "

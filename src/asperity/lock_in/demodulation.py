@@ -222,11 +222,10 @@ def _check(time: Float, load: Float, force: Float, harmonics: int, degree: int) 
     require(holds, "lock_in.time", rule, time.size, "give a longer window or fewer harmonics")
 
 
-def _check_finite(blocks: BlockSums) -> BlockSums:
+def _check_finite(blocks: BlockSums, field: str = "lock_in.load and force") -> BlockSums:
     """Refuse samples that are not finite, which show in their sums."""
-    got = "values that are not"
-    advice = "leave out their samples, as asperity.measure does"
-    require(np.isfinite(blocks.moments).all(), "lock_in.load and force", "be finite", got, advice)
+    got, advice = "values that are not", "leave out their samples, as asperity.measure does"
+    require(np.isfinite(blocks.moments).all(), field, "be finite", got, advice)
     return blocks
 
 
@@ -305,9 +304,7 @@ class LockInStream:
         step = even_step(time, basis.omega * basis.harmonics)
         blocks = max(1, round(BLOCKS * share))
         part = merged(sums(basis, time, [load, force], blocks=blocks, step=step), blocks)
-        rule, got, advice = "get finite values", "some that are not", "leave their samples out"
-        require(np.isfinite(part.moments).all(), "LockInStream.add", rule, got, advice)
-        self._parts.append(part)
+        self._parts.append(_check_finite(part, "LockInStream.add"))
 
     def read(self) -> LockInReading:
         """The reading of all samples added so far.

@@ -8,10 +8,10 @@ times as long each, up to the whole recording.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.fft import prev_fast_len
 
 from asperity.arrays import Float
 from asperity.errors import Argument, ConstantLoadError, InputError, require
@@ -229,7 +229,7 @@ def _evenly(time: Float, values: Float, most: int) -> tuple[float, Float]:
 def _spectrum(step: float, values: Float) -> tuple[Float, Float]:
     """Frequencies and amplitudes of lines, without mean and slope, in a Hann window."""
     # Lengths with large prime factors cost many times as much.
-    values = values[: _smooth(values.size)]
+    values = values[: prev_fast_len(values.size, real=True)]
     u = np.linspace(-1, 1, values.size)
     level = values - values.mean()
     level = level - u * (3 * np.mean(u * level))
@@ -258,15 +258,3 @@ def _top(
     return SpectralLine(
         float(frequency[1] * (at + offset)), float(amplitude[at]), float(np.median(around))
     )
-
-
-def _smooth(size: int) -> int:
-    """The largest length up to `size` without prime factors above 5."""
-    best = 1
-    for fives in range(12):
-        for threes in range(18):
-            odd = 5**fives * 3**threes
-            if odd > size:
-                break
-            best = max(best, odd << int(math.log2(size // odd)))
-    return best

@@ -53,7 +53,8 @@ class Quantity(NamedTuple):
     dimension: Dimension
 
 
-def _trapezoids(values: Float, time: Float) -> Float:
+def trapezoids(values: Float, time: Float) -> Float:
+    """Integral of values over time, from the first sample on; arrays (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2)])
 
 
@@ -63,7 +64,7 @@ _FUNCTIONS: dict[str, tuple[Callable[[Any, Float], Any], float, float]] = {
     "abs": (lambda x, t: np.abs(x), 1, 0),
     "sqrt": (lambda x, t: np.sqrt(x), 0.5, 0),
     "cumulative": (lambda x, t: np.cumsum(np.broadcast_to(x, t.shape)), 1, 0),
-    "integral": (lambda x, t: _trapezoids(np.broadcast_to(x, t.shape), t), 1, 1),
+    "integral": (lambda x, t: trapezoids(np.broadcast_to(x, t.shape), t), 1, 1),
     "derivative": (lambda x, t: np.gradient(np.broadcast_to(x, t.shape), t), 1, -1),
 }
 #: Functions of the values in a stretch of time, or in all of it.

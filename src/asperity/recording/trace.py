@@ -13,7 +13,8 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, listed, require
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
-from asperity.recording.defects.check import CHECKED, check, even_rate
+from asperity.recording.defects.check import CHECKED, check
+from asperity.recording.defects.sampling import even_rate
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel
 from asperity.units import from_si, to_si

@@ -18,7 +18,6 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.loads import Excitation
 from asperity.measurement.sliding.segments import (
-    Cut,
     Partition,
     partition,
     partition_at,
@@ -57,10 +56,7 @@ class Drive(NamedTuple):
 def filled_up(drive: Drive) -> Drive:
     """The drive padded with empty pieces at its end, to one of a few lengths."""
     pieces = len(drive.pull)
-    size = 8
-    while size < pieces:
-        size *= 2
-    extra = size - pieces
+    extra = max(8, 1 << (pieces - 1).bit_length()) - pieces
     edges = np.concatenate([drive.edges, np.full(extra, drive.edges[-1])])
     # The empty pieces have the final values, because a sample may lie at the end.
     last = drive.load[-1] + drive.load_slope[-1] * float(drive.edges[-1] - drive.edges[-2])
@@ -90,31 +86,15 @@ def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array
     )
 
 
-class ConstantVelocities(NamedTuple):
-    """Segments of a recording in which the drive has a constant velocity or rests.
-
-    Attributes
-    ----------
-    cuts : list of Cut
-        Times between the segments.
-    speeds : list of float
-        m/s, positive, 0 in a hold; one more than cuts.
-    doubts : list of str
-        Sentences on other possible segments, or on velocities that the recording contradicts.
-    """
-
-    cuts: list[Cut]
-    speeds: list[float]
-    doubts: list[str]
-
-
 def constant_velocities(
     signals: SlidingSignals,
     name: str,
     steps: Sequence[float] | None,
     velocities: Sequence[float] | None,
-) -> ConstantVelocities:
-    """Segments of a recording; parameters as in `recorded_run`.
+) -> Partition:
+    """Segments in which the drive has a constant velocity, positive, or rests.
+
+    Parameters as in `recorded_run`.
 
     Raises
     ------
@@ -140,10 +120,12 @@ def constant_velocities(
     speeds = [0.0 if hold else sign * float(v) for v, hold in both]
     # Two neighbouring holds are joined.
     kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
-    return ConstantVelocities(
-        [result.cuts[k] for k in kept],
-        [speeds[0], *(speeds[k + 1] for k in kept)],
-        list(result.doubts),
+    speeds = [speeds[0], *(speeds[k + 1] for k in kept)]
+    return Partition(
+        tuple(result.cuts[k] for k in kept),
+        tuple(speeds),
+        tuple(v == 0 for v in speeds),
+        result.doubts,
     )
 
 

@@ -213,9 +213,10 @@ def recorded_run(
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
-    cuts_found, speeds, doubts = constant_velocities(signals, shown, steps, velocities)
+    segments = constant_velocities(signals, shown, steps, velocities)
+    speeds, doubts = segments.velocities, list(segments.doubts)
     origin = float(time[0])
-    cut_times = [cut.time - origin for cut in cuts_found]
+    cut_times = [cut.time - origin for cut in segments.cuts]
     times = time - origin
     W, unit, varies, knots, load_values = _load(trace, load, shown, time, signals.load_unit)
     cut_times = _with_corners(times, cut_times, knots - origin)
@@ -247,9 +248,9 @@ def recorded_run(
         slip=slip,
         drive=drive,
         cuts=tuple(cuts),
-        cut_uncertainty=_cut_uncertainty(time, cuts_found),
+        cut_uncertainty=_cut_uncertainty(time, segments.cuts),
         velocity=speeds[0],
-        velocities=tuple(speeds),
+        velocities=speeds,
         origin=origin,
         W0=W,
         load_unit=unit,

@@ -22,6 +22,7 @@ from asperity.measurement.samples import (
 from asperity.parameters.arguments import rising
 from asperity.recording.defects.check import usable_rows
 from asperity.recording.defects.sampling import even_times
+from asperity.recording.expressions import trapezoids
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
@@ -127,8 +128,7 @@ def sliding_signals(
     if motion is not None:
         slip = motion[use]
         if is_velocity:
-            mean = (slip[1:] + slip[:-1]) / 2
-            slip = np.concatenate([[0.0], np.cumsum(mean * np.diff(time))])
+            slip = trapezoids(slip, time)
     if weight is not None:
         weight = weight[use & np.isfinite(weight)]
         weight = weight if weight.size else None

@@ -12,15 +12,13 @@ import numpy as np
 
 from asperity.arrays import Bool, Float, Index
 from asperity.recording.defects.levels import CROWDED, saturated
-from asperity.recording.defects.sampling import check_sampling, even_rate, gap_rows
+from asperity.recording.defects.sampling import check_sampling, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
-
-__all__ = ["CHECKED", "check", "even_rate", "rows_to_avoid", "saturation", "usable_rows"]
 
 #: Names of the findings of `check`; a reader has further ones.
 CHECKED = frozenset(
