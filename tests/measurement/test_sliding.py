@@ -231,6 +231,72 @@ def test_holds_of_the_user_need_no_displacement(held, sliding_trace) -> None:
         assert np.isnan(hold.reload_slope)
 
 
+def faulty(friction, fault, seed):
+    rng = np.random.default_rng(seed)
+    if fault == "spikes":
+        friction = friction.copy()
+        friction[rng.integers(0, friction.size, 12)] += 0.2
+    if fault == "coarse":
+        friction = 2e-3 * np.round(friction / 2e-3)
+    if fault == "line":
+        friction = friction + 1e-3 * np.sin(0.3 * np.arange(friction.size) + rng.uniform(0, 6))
+    return friction
+
+
+@pytest.mark.parametrize("fault", ["spikes", "coarse", "line"])
+def test_intervals_of_holds_cover_faults_of_the_recorder(pulled, sliding_trace, fault) -> None:
+    off = []
+    for seed in range(3):
+        made = pulled(
+            (V, 0.0, V, 0.0, V), (400e-6, 20.0 + seed, 400e-6, 200.0, 400e-6), (50,) * 5,
+            noise=1e-4, seed=seed, resolution=2e-8,
+        )  # fmt: skip
+        time, slip, clean, friction, bounds = made
+        found = measure_sliding(sliding_trace(time, faulty(friction, fault, seed), slip))
+        for hold, start, end in zip(found.holds, bounds[1:-1:2], bounds[2::2], strict=True):
+            level, rested = clean[time < start][-1], clean[time < end][-1]
+            peak = clean[(time > end) & (time < end + 30)].max()
+            off.append((hold.healing - (peak - level)) / hold.interval_95)
+            off.append((hold.relaxation - (level - rested)) / 2 / hold.relaxation_uncertainty)
+            assert hold.interval_95 < 0.006
+    assert np.abs(off).max() < 1.5
+
+
+def test_the_relaxation_is_that_at_the_end_of_a_hold(pulled, sliding_trace) -> None:
+    """Friction still falls over the samples that are read."""
+    time, slip, clean, friction, bounds = pulled(
+        (V, 0.0, V), (400e-6, 20.0, 400e-6), (200,) * 3, noise=1e-6, resolution=1e-9
+    )
+    (hold,) = measure_sliding(sliding_trace(time, friction, slip)).holds
+    relaxation = clean[time < bounds[1]][-1] - clean[time < bounds[2]][-1]
+    # The mean of the last fiftieth of the hold is higher by 1e-5.
+    assert hold.relaxation == pytest.approx(relaxation, abs=3e-6)
+
+
+def test_a_peak_in_the_noise_has_its_uncertainty(pulled, sliding_trace) -> None:
+    time, slip, clean, friction, bounds = pulled(
+        (V, 0.0, V), (8e-3, 3.0, 8e-3), (10,) * 3, noise=8e-3, resolution=2e-8
+    )
+    (hold,) = measure_sliding(sliding_trace(time, friction, slip)).holds
+    healing = clean[time > bounds[2]].max() - clean[time < bounds[1]][-1]
+    assert abs(hold.healing - healing) < hold.interval_95 < 0.03
+
+
+def test_the_loading_before_the_first_hold_is_left_out(pulled, sliding_trace) -> None:
+    time, slip, clean, friction, bounds = pulled(
+        (V, 0.0, V), (400e-6, 20.0, 400e-6), (100,) * 3, noise=1e-4, resolution=2e-8
+    )
+    loading = np.arange(0, 15, 0.01)
+    made = sliding_trace(
+        np.concatenate([loading, time + 15]),
+        np.concatenate([clean[0] * loading / 15, friction]),
+        np.concatenate([V * loading, slip + 15 * V]),
+    )
+    (hold,) = measure_sliding(made).holds
+    healing = clean[time > bounds[2]].max() - clean[time < bounds[1]][-1]
+    assert abs(hold.healing - healing) < hold.interval_95 < 2e-3
+
+
 @draws(4, 20)
 def test_noise_makes_no_healing(sliding_trace, draws) -> None:
     """The largest of many noisy samples is no peak."""

@@ -19,6 +19,7 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 from asperity.lock_in.noise import red_exponent
+from asperity.lock_in.rounding import rounding_variance
 
 #: Most blocks of a mean level.
 _MOST_BLOCKS = 512
@@ -71,12 +72,14 @@ def block_means(values: Float, blocks: int) -> Float:
     return values[: whole * length].reshape(whole, length).mean(1)
 
 
-def mean_level(time: Float, values: Float) -> MeanLevel:
-    """Mean of a stretch of time, with the uncertainty due to correlated noise.
+def mean_level(time: Float, values: Float, step: float = 0.0) -> MeanLevel:
+    """Mean of a stretch of time, with the uncertainty due to correlated noise and to rounding.
 
     Parameters
     ----------
     time, values : array, (n,)
+    step : float
+        Step of the recorder.
 
     Notes
     -----
@@ -88,7 +91,8 @@ def mean_level(time: Float, values: Float) -> MeanLevel:
     if means.size < 2:
         return MeanLevel(mean, np.inf, 1.0, *span)
     variance, dof = slow_variance(means - means.mean(), np.ones((means.size, 1)))
-    return MeanLevel(mean, float(np.sqrt(variance / means.size)), float(dof), *span)
+    variance = variance / means.size + rounding_variance(step, float(np.std(values)))[0]
+    return MeanLevel(mean, float(np.sqrt(variance)), float(dof), *span)
 
 
 def neighbour_scatter(values: Float) -> float:

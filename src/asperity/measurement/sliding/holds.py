@@ -13,17 +13,21 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
+from asperity.lock_in.rounding import rounding_variance
 from asperity.measurement.series import (
     bin_means,
     columns,
     fit_trend,
     moving_mean,
     neighbour_scatter,
+    slope_of,
     weighted_line,
 )
 
-#: Share of the sliding before a hold that is left out, as it may settle from the hold before it.
-_SETTLING = 0.3
+#: Fewest samples at the end of a hold whose line gives the relaxation.
+_RESTED = 6
+#: Samples of the shortest peak that noise may hide.
+_HIDDEN = 5
 #: Friction between these shares of the rise on sliding again gives the stiffness.
 _RISE = (0.1, 0.5)
 #: The top of a peak: where smoothed friction is within this share of the peak's height.
@@ -111,7 +115,9 @@ def read_hold(
     velocity: float,
     *,
     degree: int,
-    settling: bool,
+    begin: int,
+    unsure: float = 0.0,
+    recorded: float = 0.0,
 ) -> HoldReading:
     """Read one hold.
 
@@ -127,20 +133,32 @@ def read_hold(
         Velocity of the sliding after the hold (m/s).
     degree : int
         Degree of the trend before the hold: 0 or 1.
-    settling : bool
-        Whether the sliding before begins with the transient of something earlier.
+    begin : int
+        Sample from which on the sliding before the hold is steady.
+    unsure : float
+        Uncertainty of the end of the hold (s).
+    recorded : float
+        Step in which the recorder has the friction.
     """
-    first, hold, again, stop = bounds
-    begin = first + int(_SETTLING * (hold - first)) * settling
+
+    def rounding(values: Float) -> float:
+        return float(rounding_variance(recorded, float(np.std(values)))[0])
+
+    _, hold, again, stop = bounds
     slid, mu = bin_means(time[begin:hold] - edges[0], friction[begin:hold])
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])
-    doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0]))
+    doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0] + rounding(friction[begin:hold])))
     quick = neighbour_scatter(friction[begin:hold])
-    rested = friction[max(hold, again - max(3, (again - hold) // 50)) : again]
-    low = float(rested.mean()) if rested.size else np.nan
-    low_doubt = quick / np.sqrt(max(rested.size, 1))
+    # Noise slower than a bin is the same in all samples of the short ends of a hold and of a peak.
+    left = mu - columns(slid, min(degree, 1)) @ fit.beta
+    slow = max(float(np.var(left)) - quick**2 * mu.size / (hold - begin), 0.0)
+    # The time of its end may be off by what the cut says.
+    ends = max(hold + 1, int(np.searchsorted(time, edges[1] - unsure)))
+    low, low_doubt = _rested(time[hold:ends] - edges[1], friction[hold:ends], quick)
+    low_doubt = np.sqrt(low_doubt**2 + slow + rounding(friction[hold:ends][-_RESTED:]))
     peak, peak_doubt, at = _peak(time, friction, again, stop, level, quick)
+    peak_doubt = float(np.sqrt(peak_doubt**2 + slow + rounding(np.array([peak]))))
     half = float(stdtrit(fit.dof, 0.975))
     healing_doubt = float(np.hypot(doubt, peak_doubt))
     slope, slope_doubt = _reload(time, friction, displacement, again, at, edges[1], low, peak)
@@ -162,6 +180,22 @@ def read_hold(
         reload_slope=slope,
         reload_uncertainty=slope_doubt,
     )
+
+
+def _rested(since: Float, friction: Float, quick: float) -> tuple[float, float]:
+    """Friction at the end of a hold, and its uncertainty by noise.
+
+    It falls with the logarithm of time: a line through the last part of the hold is extrapolated to
+    its end. Its last sample may hold the beginning of the loading.
+    """
+    if friction.size > _RESTED:
+        first = max(0, friction.size - 1 - max(_RESTED, friction.size // 20))
+        since, friction = since[first:-1], friction[first:-1]
+    away = since - since.mean()
+    power = float(away @ away)
+    slope, lever = slope_of(since, friction), (since.mean() ** 2 / power if power else 0.0)
+    end = float(friction.mean() - slope * since.mean())
+    return end, quick * float(np.sqrt(1 / friction.size + lever))
 
 
 def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
@@ -205,11 +239,10 @@ def _peak(
     values = values[: max(8, values.size // 2)]
     rise = float(values.max()) - float(values[0])
     wide = 1
-    while wide < values.size // 8:
-        smooth = _smoothed(values, wide)
-        if float(smooth.max()) - level > 10 * quick / np.sqrt(wide) or quick < 0.02 * rise:
-            break
-        wide = 2 * wide + 1
+    seen = quick < 0.02 * rise
+    while not seen and wide < values.size // 8:
+        seen = float(_smoothed(values, wide).max()) - level > 10 * quick / np.sqrt(wide)
+        wide = wide if seen else 2 * wide + 1
     smooth = _smoothed(values, wide)
     top = int(np.argmax(smooth))
     height = max(
@@ -225,7 +258,7 @@ def _peak(
     tops = values[left : right + 1]
     if tops.size < 6:
         near = values[max(top - wide // 2, 0) : top + wide // 2 + 1]
-        return float(near.mean()), quick / np.sqrt(near.size), again + top
+        return float(near.mean()), float(quick / np.sqrt(near.size)), again + top
     scale = max(float(at[-1] - at[0]) / 2, 1e-300)
     u = (at - at.mean()) / scale
     matrix = np.stack([np.ones_like(u), u, u**2], axis=1)
@@ -241,8 +274,12 @@ def _peak(
     spread = float(np.sum(residual**2)) / max(tops.size - 3, 1)
     # Noise that neighbours have in common does not average out.
     doubt = float(np.sqrt(spread * (row @ inverse @ row) * _inflation(residual)))
+    height = float(row @ beta)
+    if not seen:
+        # A short peak may be hidden by the noise of as few samples.
+        doubt = float(np.hypot(doubt, (float(_smoothed(values, _HIDDEN).max()) - height) / 2))
     return (
-        float(row @ beta),
+        height,
         doubt,
         again + int(np.clip(left + round((where + 1) / 2 * (right - left)), 0, values.size - 1)),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,8 @@ from asperity.measurement.verdicts.checks import findings, friction
 from asperity.measurement.verdicts.verdict import SLIDING, Check, Judged
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
+from asperity.recording.defects.levels import recorder_step
+from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
 _DEFAULTS = Question()
 #: Samples on each side that a step needs, and in a hold's surroundings.
 _FEWEST = 16
+#: Share of the sliding before a hold that is left out, as it may settle from the hold before it.
+_SETTLING = 0.3
 
 
 @dataclass(frozen=True)
@@ -173,12 +177,17 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
         cut = partition_at(time, signals.displacement, np.array(times), question.velocities)
         cut = _with_holds(cut, time, holds)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
+    # Spikes are named by a check; a peak of friction where the drive changes is none.
+    wrong = away_from_changes(friction, spikes(friction), bounds[1:-1])
+    friction = without(friction, wrong)
+    signals = replace(signals, friction=friction)
+    recorded = recorder_step(friction)
     segments = tuple(
-        _segment(time[a:b], friction[a:b], v, hold)
+        _segment(time[a:b], friction[a:b], v, hold, recorded)
         for (a, b), v, hold in zip(pairwise(bounds), cut.velocities, cut.holds, strict=True)
     )
-    read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend])
-    read_holds = _holds(signals, cut, bounds, DRIFTS[detrend])
+    read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
+    read_holds = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
     doubts = [*cut.doubts, *unread]
     if times is None and signals.displacement is None:
         doubts.append(f"velocity steps cannot be seen: {signals.no_motion}")
@@ -187,7 +196,7 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     checks += findings([*about, *signals.signs], len(trace), float(time[-1] - time[0]))
     borne = signals.load
     return SlidingMeasurement(
-        friction=mean_level(time, friction),
+        friction=mean_level(time, friction, recorded),
         load=None if borne is None else mean_level(time[: borne.size], borne),
         load_unit=signals.load_unit,
         segments=segments,
@@ -229,7 +238,9 @@ def _with_holds(
     return Partition(cut.cuts, cut.velocities, tuple(e in starts for e in edges), cut.doubts)
 
 
-def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> SlidingSegment:
+def _segment(
+    time: Float, friction: Float, velocity: float, hold: bool, recorded: float
+) -> SlidingSegment:
     means = block_means(friction, 100)
     begin = steady_from(means, 1) * max(1, friction.size // 100)
     late, values = time[begin:], friction[begin:]
@@ -240,7 +251,7 @@ def _segment(time: Float, friction: Float, velocity: float, hold: bool) -> Slidi
         end=float(time[-1]),
         velocity=velocity,
         hold=hold,
-        steady=mean_level(late, values),
+        steady=mean_level(late, values, recorded),
         slope=slope,
         scatter=float(np.std(values - slope * (late - late.mean()))),
         highest=float(smooth.max()),
@@ -254,6 +265,7 @@ def _steps(
     bounds: list[int],
     segments: tuple[SlidingSegment, ...],
     degree: int,
+    recorded: float,
 ) -> tuple[list[VelocityStep], list[str]]:
     """Steps between two sliding segments, and sentences on steps that cannot be read."""
     steps: list[VelocityStep] = []
@@ -279,7 +291,14 @@ def _steps(
             # Friction is counted against the motion, whatever its direction.
             turned = -1.0 if np.median(part) < 0 else 1.0
             sides.append((signals.time[low:high], turned * part, velocity))
-        step = read_step(change.time, sides[0], sides[1], degree=degree, first_settling=settling)
+        step = read_step(
+            change.time,
+            sides[0],
+            sides[1],
+            degree=degree,
+            first_settling=settling,
+            recorded=recorded,
+        )
         if step is None:
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
             settling = np.inf
@@ -290,7 +309,12 @@ def _steps(
 
 
 def _holds(
-    signals: SlidingSignals, cut: Partition, bounds: list[int], degree: int
+    signals: SlidingSignals,
+    cut: Partition,
+    bounds: list[int],
+    segments: tuple[SlidingSegment, ...],
+    degree: int,
+    recorded: float,
 ) -> list[HoldReading]:
     holds = []
     for k, hold in enumerate(cut.holds):
@@ -299,6 +323,11 @@ def _holds(
         a, b, c, d = bounds[k - 1 : k + 3]
         if min(b - a, d - c) < _FEWEST or c - b < 2:
             continue
+        # Sliding may settle from the hold before it; the first sliding may begin with the loading.
+        begin = a + int(_SETTLING * (b - a))
+        if k == 1:
+            steady = int(np.searchsorted(signals.time, segments[0].steady.start))
+            begin = min(steady, (a + b) // 2)
         holds.append(
             read_hold(
                 signals.time,
@@ -308,7 +337,9 @@ def _holds(
                 (cut.cuts[k - 1].time, cut.cuts[k].time),
                 cut.velocities[k + 1],
                 degree=degree,
-                settling=k > 1,
+                begin=begin,
+                unsure=cut.cuts[k].doubt,
+                recorded=recorded,
             )
         )
     return holds

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from asperity.arrays import Float
+from asperity.lock_in.rounding import rounding_variance
 from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend, moving_mean
 
 #: Lengths of windows, over the slip of the shorter side.
@@ -72,7 +73,7 @@ class VelocityStep:
         Steady friction after less before, both at the step, and its standard uncertainty: noise
         and choice together.
     noise_uncertainty, choice_uncertainty : float
-        Its parts: correlated noise, and the spread over trends and windows.
+        Its parts: correlated noise and rounding, and the spread over trends and windows.
     dof : float
         Degrees of freedom of the uncertainty.
     interval_95 : float
@@ -127,6 +128,7 @@ def read_step(
     *,
     degree: int,
     first_settling: float = 0.0,
+    recorded: float = 0.0,
 ) -> VelocityStep | None:
     """Read one step; None if what has settled after it is too short.
 
@@ -140,6 +142,8 @@ def read_step(
         0 for levels without trend, 1 for a linear trend, 2 for one that is quadratic as well.
     first_settling : float
         Slip at the beginning of the segment before the step that still holds an earlier transient.
+    recorded : float
+        Step in which the recorder has the friction.
     """
     known = all(np.isfinite(side[2]) and side[2] != 0 for side in (before, after))
     speeds = [abs(side[2]) if known else 1.0 for side in (before, after)]
@@ -173,7 +177,9 @@ def read_step(
             readings.append((*_combined(left, right, degree, start, window[1]), left, right))
     if not readings:
         return None
-    return _result(time, before, after, readings, settling, known, degree)
+    steady = earlier.friction, later.friction[later.slip >= min(settling, shorter / 2)]
+    rounding = sum(rounding_variance(recorded, float(np.std(side)))[0] for side in steady)
+    return _result(time, before, after, readings, settling, known, degree, float(rounding) ** 0.5)
 
 
 def _windowed(side: _Side, low: float, high: float) -> _Side | None:
@@ -251,6 +257,7 @@ def _result(
     settling: float,
     known: bool,
     degree: int,
+    rounding: float,
 ) -> VelocityStep:
     dof = float(min(min(left.dof, right.dof) for *_, left, right in readings))
     # Student's t of the slopes' difference, of the choice that tells them apart best.
@@ -270,7 +277,7 @@ def _result(
     weight = 1 / np.maximum(trusted, 1e-150) ** 2
     weight /= weight.sum()
     mean = float(weight @ change)
-    from_noise = float(weight @ trusted)
+    from_noise = float(np.hypot(weight @ trusted, rounding))
     spread = float(np.sqrt(weight @ (change - mean) ** 2))
     uncertainty = float(np.hypot(from_noise, spread))
     half = float(stdtrit(dof, 0.975)) * uncertainty
