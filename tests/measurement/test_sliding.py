@@ -282,6 +282,18 @@ def test_a_peak_in_the_noise_has_its_uncertainty(pulled, sliding_trace) -> None:
     assert abs(hold.healing - healing) < hold.interval_95 < 0.03
 
 
+def test_a_gap_that_may_hide_the_peak_is_named(pulled, sliding_trace) -> None:
+    time, slip, _, friction, bounds = pulled(
+        (V, 0.0, V), (400e-6, 20.0, 400e-6), (100,) * 3, noise=1e-4, resolution=2e-8
+    )
+    for first, verdict in ((0.2, "suspicious"), (15.0, "ok")):
+        kept = (time < bounds[2] + first) | (time > bounds[2] + first + 3)
+        found = measure_sliding(sliding_trace(time[kept], friction[kept], slip[kept]))
+        check = next(c for c in found.checks if c.name == "segments")
+        assert check.verdict == verdict
+        assert ("may lie in a gap of 3" in check.sentence) == (verdict != "ok")
+
+
 def test_the_loading_before_the_first_hold_is_left_out(pulled, sliding_trace) -> None:
     time, slip, clean, friction, bounds = pulled(
         (V, 0.0, V), (400e-6, 20.0, 400e-6), (100,) * 3, noise=1e-4, resolution=2e-8

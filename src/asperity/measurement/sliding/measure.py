@@ -45,6 +45,9 @@ if TYPE_CHECKING:
 _DEFAULTS = Question()
 #: Samples on each side that a step needs, and in a hold's surroundings.
 _FEWEST = 16
+#: A gap may hide a peak if it is longer than so many usual sampling intervals, and than this share
+#: of the time from the end of the hold to the peak.
+_GAP, _GAP_SHARE = 4.0, 0.2
 #: Share of the sliding before a hold that is left out, as it may settle from the hold before it.
 _SETTLING = 0.3
 
@@ -188,7 +191,7 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     )
     read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
     read_holds = _holds(signals, cut, bounds, segments, DRIFTS[detrend], recorded)
-    doubts = [*cut.doubts, *unread]
+    doubts = [*cut.doubts, *unread, *_hidden_peaks(time, read_holds)]
     if times is None and signals.displacement is None:
         doubts.append(f"velocity steps cannot be seen: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
@@ -343,6 +346,20 @@ def _holds(
             )
         )
     return holds
+
+
+def _hidden_peaks(time: Float, holds: list[HoldReading]) -> list[str]:
+    """Sentences on gaps of the recording in which the peak after a hold may lie."""
+    usual, doubts = float(np.median(np.diff(time))), []
+    for hold in holds:
+        since = hold.peak_time - hold.end
+        first, last = np.searchsorted(time, [hold.end, hold.peak_time + since])
+        gap = float(np.diff(time[max(first - 1, 0) : last + 1]).max(initial=0.0))
+        if gap > max(_GAP * usual, _GAP_SHARE * since):
+            doubts.append(
+                f"the peak after the hold at {hold.start:.6g} s may lie in a gap of {gap:.3g} s"
+            )
+    return doubts
 
 
 def _rates(time: Float) -> tuple[tuple[float, float], ...]:
