@@ -105,8 +105,9 @@ def integrated(
     time: np.ndarray,
     load: Callable[[Any], Any] = np.ones_like,
     tolerance: float = 1e-11,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> np.ndarray:
-    """F/W of the ageing law at times, from steady sliding, by SciPy.
+    """F/W of the ageing law at times, from steady sliding and `start` off it, by SciPy.
 
     The numbers are mu0, A, B, D0, V0, alpha and k = K/W0. The velocity of the drive is constant
     between the edges (s), and W/W0 is `load` of the time.
@@ -121,7 +122,7 @@ def integrated(
         return [k * (V - v), (V0 * np.exp(-log_age) - v) / D0]
 
     first = np.log(velocities[0] / V0)
-    y = np.array([mu0 + (A - B) * first, -first])
+    y = np.array([mu0 + (A - B) * first, -first]) + start
     out = np.empty_like(time)
     for V, (a, b) in zip(velocities, pairwise(edges), strict=True):
         here = (time >= a) & ((time < b) | (b == edges[-1]))

@@ -138,10 +138,10 @@ def numpyro_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
     return np.exp(np.asarray(chains.get_samples(group_by_chain=True)))
 
 
-def asperity_draws(found: Fit, draws: int) -> np.ndarray:
-    """The same by asperity, in this process."""
-    posterior = sample_posterior(found, chains=4, draws=draws, jobs=1)
-    return np.stack([posterior.draws[name] for name in TRUTH], axis=-1)
+def asperity_draws(found: Fit, names: Iterable[str], draws: int, **options: Any) -> np.ndarray:
+    """Draws of four chains by asperity; (4, draws, n)."""
+    posterior = sample_posterior(found, chains=4, draws=draws, **options)
+    return np.stack([posterior.draws[name] for name in names], axis=-1)
 
 
 def effective(draws: np.ndarray) -> float:
@@ -220,7 +220,7 @@ def main() -> None:
         print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
     density = log_density(*data)
     samplers: dict[str, Callable[[], np.ndarray]] = {
-        "asperity posterior": lambda: asperity_draws(found, chosen.draws),
+        "asperity posterior": lambda: asperity_draws(found, TRUTH, chosen.draws, jobs=1),
         "numpyro, same density": lambda: numpyro_draws(density, found, chosen.draws),
         "emcee, same density": lambda: emcee_draws(density, found, chosen.draws),
     }

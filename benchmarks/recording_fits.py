@@ -23,10 +23,10 @@ import jax
 import numpy as np
 from scipy.optimize import least_squares
 
-from asperity.inference import Fit, compare, fit, sample_posterior
+from asperity.inference import Fit, compare, fit
 from asperity.inference.posterior.density import Whitened
 from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, integrated, runs_of
-from benchmarks.fits import off, print_samplers, timed
+from benchmarks.fits import asperity_draws, off, print_samplers, timed
 
 FREE = ("A", "B", "D0", "K")
 LAWS = ("rice-ruina", "ruina-slip", "perrin-rice-zheng", "nagata")
@@ -82,12 +82,6 @@ def emcee_draws(found: Fit, draws: int) -> np.ndarray:
     return np.stack([values[list(found.values).index(n)] for n in FREE], axis=-1)
 
 
-def asperity_draws(found: Fit, draws: int) -> np.ndarray:
-    """Draws of four chains; (4, draws, n)."""
-    posterior = sample_posterior(found, chains=4, draws=draws)
-    return np.stack([posterior.draws[name] for name in FREE], axis=-1)
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.recording_fits")
@@ -110,7 +104,7 @@ def main() -> None:
     seconds, compared = timed(lambda: compare(runs[-1], LAWS, several))
     name = f"asperity compare, four laws, best {compared.best}"
     print(f"| {name} | {seconds:.0f} | | | |", flush=True)
-    samplers = {"asperity posterior": lambda: asperity_draws(found, chosen.draws)}
+    samplers = {"asperity posterior": lambda: asperity_draws(found, FREE, chosen.draws)}
     if not chosen.without_peers:
         seconds, values = timed(lambda: scipy_fit(found))
         name = "SciPy least_squares, differences"

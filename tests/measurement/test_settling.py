@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import asperity as asp
 from references.populations import draws
@@ -12,13 +13,6 @@ measure = partial(asp.measure, modulated=True)
 
 LEVEL, DROP = 0.43, -0.005
 MU1 = 0.02 * np.exp(-0.5j)
-
-
-def red(rng, size, rho):
-    noise = rng.standard_normal(size + 500)
-    for k in range(1, noise.size if rho else 0):
-        noise[k] = rho * noise[k - 1] + np.sqrt(1 - rho**2) * noise[k]
-    return noise[500:]
 
 
 def recording(rng, length, decay, amplitude, *, rho=0.0, drift=0.0, recovery=None, sigma=1e-3):
@@ -32,7 +26,9 @@ def recording(rng, length, decay, amplitude, *, rho=0.0, drift=0.0, recovery=Non
     if recovery is not None:
         since = time - before - length
         mean += np.where(since >= 0, DROP * np.exp(-since / recovery), 0.0)
-    friction = mean + on * (MU1 * np.exp(1j * phi)).real + sigma * red(rng, time.size, rho)
+    white = rng.standard_normal(time.size + 500)
+    noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], white)[500:]
+    friction = mean + on * (MU1 * np.exp(1j * phi)).real + sigma * noise
     load = 7 * (1 + 0.24 * on * np.cos(phi)) + 3e-3 * rng.standard_normal(time.size)
     return time, load, 7 * friction
 

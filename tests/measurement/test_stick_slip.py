@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
-from benchmarks.stick_slip_recordings import saw
+from benchmarks.stick_slip_recordings import SHAPES, chain, saw
 
 import asperity as asp
 from asperity import Slider, laws
@@ -36,15 +36,10 @@ def recorded(friction, rate=2000.0, name="mu"):
 
 def growing(ratio):
     """Cycles whose drops grow by `ratio` each."""
-    parts, level = [], 0.3
-    for k in range(40):
-        drop = 0.03 * ratio ** (k - 20)
-        stick = int(drop / 1e-4)
-        parts.append(level + 1e-4 * np.arange(stick))
-        level += 1e-4 * stick
-        parts.append(level - drop * (1 - np.cos(np.pi * np.arange(1, 21) / 20)) / 2)
-        level -= drop
-    friction = np.concatenate(parts)
+    drops, slope = 0.03 * ratio ** np.arange(-20.0, 20.0), 1e-4
+    sticks, slips = (np.append(drops[1:], 0.01) / slope).astype(int), np.full(40, 20)
+    first = int(drops[0] / slope)
+    friction = chain(drops, slips, sticks, slope, SHAPES["free"], first=first)[0]
     return friction + 5e-4 * np.random.default_rng(0).standard_normal(friction.size)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from asperity.air import AirLayer, transfer_function
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import require
 from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
 from asperity.measurement.campaign import column_unit, modulated_rows
@@ -294,14 +294,12 @@ def amplitude_motion(
     W0 = np.asarray(slider.W0).item()
     borne_load = Programme(*borne, load=W0, velocity=speed)
     applied_load = Programme(*applied, load=W0, velocity=speed)
-    columns, last = signals(slider, borne_load, rate, ("force",), **options)
-    if last.stopped is not None:
-        rule, got = "slide to the end of the protocol", f"a motion that ended: {last.stopped}"
-        raise InputError("amplitude_series.slider", rule, got)
+    rule = "amplitude_series.slider must slide to the end of the protocol"
+    columns, provenance = signals(slider, borne_load, rate, ("force",), rule, options)
     time = columns["time"]
     return AmplitudeMotion(
         time, columns["force"], applied_load.load(time), tuple(map(float, epsilons)),
-        speed, off, on, exciter, last.provenance,
+        speed, off, on, exciter, provenance,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from asperity.errors import InputError
 from asperity.loads import Programme
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
-from asperity.transients import Trajectory, integrate_blocks
+from asperity.transients import integrate_blocks
 from asperity.tribometer.tribometer import Tribometer
 
 #: Channels that a tribometer may have of a simulated slider; the drive is the load point.
@@ -31,9 +31,14 @@ def motion_rate(tribometer: Tribometer) -> float:
 
 
 def signals(
-    slider: Slider, programme: Programme, rate: float, names: tuple[str, ...], **options: Any
-) -> tuple[dict[str, Float], Trajectory]:
-    """Time and selected columns of a transient.
+    slider: Slider,
+    programme: Programme,
+    rate: float,
+    names: tuple[str, ...],
+    rule: str,
+    options: Mapping[str, Any],
+) -> tuple[dict[str, Float], Mapping[str, Any]]:
+    """Time and selected columns of a transient, and its provenance.
 
     Parameters
     ----------
@@ -42,19 +47,23 @@ def signals(
         Hz.
     names : tuple of str
         Attributes of `Trajectory`.
-    **options
+    rule : str
+        Beginning of the message where the motion ends early: field and rule.
+    options : mapping
         Options of `asperity.transients.transient`.
 
-    Returns
-    -------
-    (dict of str to array, Trajectory)
-        The columns with ``time``, and the last block, which has the reason of the end.
+    Raises
+    ------
+    InputError
+        If the motion ends before the programme does.
     """
     kept: dict[str, list[Float]] = {name: [] for name in ("time", *names)}
     for block in integrate_blocks(slider, programme, sampling=rate, **options):
         for name, parts in kept.items():
             parts.append(getattr(block, name))
-    return {name: np.concatenate(parts) for name, parts in kept.items()}, block
+    if block.stopped is not None:
+        raise InputError(f"{rule}, got a motion that ended: {block.stopped}")
+    return {name: np.concatenate(parts) for name, parts in kept.items()}, block.provenance
 
 
 def recorded_motion(
@@ -68,25 +77,12 @@ def recorded_motion(
 ) -> Trace:
     """Integrate a programme to its end, and record the channels of the tribometer.
 
-    Parameters
-    ----------
-    slider, tribometer, programme
-    rule : str
-        Beginning of the message where the motion ends early: field and rule.
-    seed : int
-        Seed of the tribometer's noise.
-    options : mapping
-        Options of `asperity.transients.transient`.
-
-    Raises
-    ------
-    InputError
-        If the motion ends before the programme does.
+    Parameters as of `signals`, which refuses a motion that ends early, and `seed`, that of the
+    tribometer's noise.
     """
     wanted = ("force", "load", "displacement")
-    columns, last = signals(slider, programme, motion_rate(tribometer), wanted, **options)
-    if last.stopped is not None:
-        raise InputError(f"{rule}, got a motion that ended: {last.stopped}")
+    rate = motion_rate(tribometer)
+    columns, provenance = signals(slider, programme, rate, wanted, rule, options)
     offered = {
         FORCE: columns["force"],
         LOAD: columns["load"],
@@ -94,4 +90,4 @@ def recorded_motion(
         DRIVE: programme.position(columns["time"]),
     }
     taken = {name: offered[name] for name in tribometer.sensors if name in offered}
-    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)
+    return tribometer.record(columns["time"], taken, seed=seed, provenance=provenance)

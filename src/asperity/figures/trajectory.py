@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.arrays import Float
 from asperity.figures.style import (
     ELASTO_PLASTIC,
     GREY,
@@ -101,24 +102,28 @@ def _draw_age(axis: Axes, run: RunOutline) -> None:
     """The age, logarithmic where it spans decades, as from slip to a hold."""
     _draw_band(axis, run, "age", RICE_RUINA, 1.0)
     axis.set_ylabel(r"age $\Phi$ (s)")
-    low, high = float(np.min(run.low["age"])), float(np.max(run.high["age"]))
-    if 0 < 30 * low < high:
-        axis.set_yscale("log")
-        axis.set_ylim(low / 2, 8 * high)
+    _spans_decades(axis, run.low["age"], run.high["age"])
 
 
 def _scale_velocity(axis: Axes, run: RunOutline) -> None:
     """Pulses and holds are decades apart: logarithmic where the velocity stays positive."""
     low, high = 1e6 * run.low["velocity"], 1e6 * run.high["velocity"]
-    if np.min(low) > 0 and np.max(high) > 30 * np.min(low):
-        axis.set_yscale("log")
-        axis.set_ylim(max(float(np.min(low)), 1e-9 * float(np.max(high))) / 2, 8 * np.max(high))
-    else:
+    if not _spans_decades(axis, low, high):
         size = max(float(np.max(np.abs([low, high]))), 1e-300)
         if size > 30 * np.median(np.maximum(np.abs(low), np.abs(high))):
             # Linear up to a power of ten, which then is the first of the marks.
             axis.set_yscale("symlog", linthresh=10.0 ** (np.floor(np.log10(size)) - 1))
             axis.autoscale(axis="y")
+
+
+def _spans_decades(axis: Axes, low: Float, high: Float) -> bool:
+    """Whether values span decades; their axis is then logarithmic."""
+    least, most = float(np.min(low)), float(np.max(high))
+    if not 0 < 30 * least < most:
+        return False
+    axis.set_yscale("log")
+    axis.set_ylim(max(least, 1e-9 * most) / 2, 8 * most)
+    return True
 
 
 def _mark_events(axis: Axes, run: RunOutline) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from benchmarks.coverage import integrated
 
 from asperity.algebra.runge_kutta import rodas_5p
 from asperity.inference.runs.drive import Drive
@@ -27,33 +27,15 @@ AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_stat
 STIFF = {**AT, "K": 3e5}
 
 
-def by_scipy(values, TIMES=TIMES):
-    """F/W of the Linker-Dieterich law, its age as the state, from the printed equations."""
-    p = values
+def by_scipy(values, times=TIMES):
+    """F/W of the Linker-Dieterich law from the printed equations."""
     edges = EDGES.copy()
-    edges[1] += p["shift_1"]
-
-    def load(t):
-        return 1 + LOAD_SLOPE[3] * max(t - EDGES[3], 0.0)
-
-    def rates(t, y, pull, slope):
-        f, phi = y
-        w = load(t)
-        v = p["V0"] * np.exp((f / w - p["mu0"] - p["B"] * phi) / p["A"])
-        ageing = (p["V0"] * np.exp(-phi) - v) / p["D0"] - p["alpha"] / p["B"] * slope / w
-        return [p["K"] * (3e-6 * pull - v), ageing]
-
-    y = np.array([p["mu0"] + p["start_force"], p["start_state_0"]])
-    friction = np.empty(TIMES.size)
-    for a, b, pull, slope in zip(edges[:-1], edges[1:], PULL, LOAD_SLOPE, strict=True):
-        here = (a <= TIMES) & ((b > TIMES) | (b == edges[-1]))
-        at = np.unique([*TIMES[here], b])
-        solution = solve_ivp(
-            rates, (a, b), y, "LSODA", at, args=(pull, slope), rtol=1e-11, atol=1e-13
-        )
-        friction[here] = solution.y[0, : here.sum()] / [load(t) for t in TIMES[here]]
-        y = solution.y[:, -1]
-    return friction
+    edges[1] += values["shift_1"]
+    return integrated(
+        {**values, "k": values["K"]}, edges, 3e-6 * PULL, times,
+        load=lambda t: 1 + LOAD_SLOPE[3] * np.maximum(t - EDGES[3], 0.0),
+        start=(values["start_force"], values["start_state_0"]),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=[AT, STIFF], ids=["soft", "stiff"])
@@ -167,23 +149,10 @@ def test_a_load_of_hundreds_of_lines_has_room():
     times = np.linspace(0.0, 300.0, 900)
     values = {**VALUES, "alpha": 0.2, "K": 1e5}
     friction, _ = recorded_friction(MOTION, values, (), drive, reading_at(times))
-    p = values
-
-    def rates(t, y, k):
-        w = load[k] + drive.load_slope[k] * (t - edges[k])
-        v = p["V0"] * np.exp((y[0] / w - p["mu0"] - p["B"] * y[1]) / p["A"])
-        slope = p["alpha"] / p["B"] * drive.load_slope[k] / w
-        return [p["K"] * (3e-6 - v), (p["V0"] * np.exp(-y[1]) - v) / p["D0"] - slope]
-
-    y, expected = np.array([p["mu0"] * load[0], 0.0]), np.empty(times.size)
-    for k in range(pieces):
-        here = (edges[k] <= times) & ((times < edges[k + 1]) | (k == pieces - 1))
-        at = np.unique([*times[here], edges[k + 1]])
-        solution = solve_ivp(
-            rates, edges[k : k + 2], y, "LSODA", at, args=(k,), rtol=1e-10, atol=1e-12
-        )
-        expected[here] = solution.y[0, : here.sum()] / np.interp(times[here], edges, load)
-        y = solution.y[:, -1]
+    expected = integrated(
+        {**values, "k": values["K"]}, edges, np.full(pieces, 3e-6), times,
+        load=lambda t: np.interp(t, edges, load),
+    )  # fmt: skip
     np.testing.assert_allclose(friction, expected, atol=2e-6)
 
 

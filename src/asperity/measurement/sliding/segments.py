@@ -188,15 +188,14 @@ def partition_at(
     """
     at = np.searchsorted(time, times)
     cuts = tuple(Cut(float(t), int(i)) for t, i in zip(times, at, strict=True))
-    result = Partition(cuts, (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1))
+    speeds, holds = (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1)
     if displacement is not None:
         pieces = list(pairwise([0, *at.tolist(), time.size]))
         motion = _motion(time, displacement)
         speeds, holds, _ = _speeds(motion, pieces, [_velocity(motion, piece) for piece in pieces])
-        result = Partition(cuts, speeds, holds)
     if velocities is None:
-        return result
-    doubts = tuple(_contradicted(velocities, result.velocities))
+        return Partition(cuts, speeds, holds)
+    doubts = tuple(_contradicted(velocities, speeds))
     return Partition(cuts, tuple(velocities), tuple(v == 0 for v in velocities), doubts)
 
 

@@ -46,8 +46,7 @@ class StickSlipSeries:
 
     def column(self, name: str) -> Float:
         """Numbers of the rows; NaN where they are not known."""
-        values = [row.get(name) for row in self.rows]
-        return np.array([np.nan if value is None else value for value in values], float)
+        return np.array([_known(row.get(name)) for row in self.rows])
 
     def mass(self, default: float) -> float:
         """Median M of the rows (kg); the default where it is not known."""
