@@ -569,7 +569,7 @@ def test_a_sample_without_a_name(asperity, tmp_path) -> None:
     [
         ("epsilon=0:1:3", "asperity: --x must be at least 0 and below 1"),
         ("epsilom=0:0.5:3", "asperity: --x must be a number of an operating point, got 'epsilom'"),
-        ("epsilon=0.1:0.5:99999999999", "asperity: --x must be a whole number"),
+        ("epsilon=0.1:0.5:99999999999", "asperity: --x must have 2 to 100,000,000 points"),
         ("tilt=0:100:3 deg", "asperity: --x must be less than a right angle"),
     ],
 )

@@ -305,7 +305,7 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
         (["--window", "12:4"], "--window must end after it begins"),
         (["--window", "4:4.001"], "--window must enclose"),
         (["--window", "10"], "--window must be START:END"),
-        (["--set", "K=1 N/m"], "--set K must go with slip events, got 1.0 and a recording without"),
+        (["--set", "K=1 N/m"], "--set K must go with slip events, got it with a recording without"),
         (["--exact-frequency"], "--exact-frequency must go with --frequency"),
         (["--unit", "N"], "--unit must be NAME=VALUE"),
         (["--column", "velocity"], "--column must be NAME=VALUE"),

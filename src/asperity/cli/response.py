@@ -157,18 +157,19 @@ def _stick_slip(point: Point, output: Output) -> int:
     from asperity.experiment import stick_slip_response
     from asperity.laws import Law, get_law
     from asperity.operating_point import point_numbers
-    from asperity.parameters import MODULATION, point_parameters
+    from asperity.parameters import MODULATION, canonical_name, point_parameters
     from asperity.slider.named import slider_from
 
     output.require_picture()
-    for name in ("epsilon", "frequency"):
-        got = f"{name} = {point.parameters.get(name)}"
-        advice = "leave it out, or leave --stick-slip out"
-        without = name not in point.parameters
-        require(without, "--stick-slip", "come without a modulation", got, advice)
-    modulation = ("epsilon", "frequency", *MODULATION)
     law: type[Law] = get_law(point.law) if point.law else Law
-    among = {n: p for n, p in point_parameters(law).items() if n not in modulation}
+    known = point_parameters(law)
+    modulation = ("epsilon", "frequency", *MODULATION)
+    for name, value in point.parameters.items():
+        advice = "leave it out, or leave --stick-slip out"
+        without = canonical_name(name, known) not in modulation
+        rule, got = "come without a modulation", f"{name} = {value}"
+        require(without, "--stick-slip", rule, got, advice)
+    among = {n: p for n, p in known.items() if n not in modulation}
     numbers = point_numbers(point, "command line", among)
     values = {name: number.value for name, number in numbers.items()}
     result = stick_slip_response(

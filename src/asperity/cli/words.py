@@ -27,7 +27,7 @@ _OPTIONS: Mapping[str, str] = {
     "seed": "--seed",
     "initial": "start.states",
     "span": "--stiffness-from",
-    **{name: f"--{name}" for name in ("workers", "cluster", "thresholds")},
+    **{name: f"--{name}" for name in ("workers", "cluster", "thresholds", "out")},
 }
 
 

@@ -168,9 +168,10 @@ def _opened(
     made = root.attributes["numerics"]
     if made != numerics() and not retry:
         raise InputError(
-            f"out must be continued with the versions that began it, got '{path.name}' with "
-            f"{differences(made, numerics())}, so that last digits may differ; finish it with "
-            "those versions, or choose another store"
+            "out",
+            "be continued with the versions that began it",
+            f"'{path.name}' with {differences(made, numerics())}, so that last digits may differ",
+            "finish it with those versions, or choose another store",
         )
     old = root.grid.record
     if old == grid.record:
@@ -241,9 +242,11 @@ def _run(
             solve_chunks(job, range(grid.chunk_count), workers, counts, tick, log)
     except WorkersGoneError:
         raise InputError(
-            f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
-            f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
-            "command, which continues from there"
+            "workers",
+            "run until the sweep ends",
+            f"no answer any more ({workers.about}) after {counts.points:,} of {counts.total:,} "
+            "points",
+            "start a cluster and repeat the command, which continues from there",
         ) from None
     finally:
         with contextlib.suppress(OSError):
