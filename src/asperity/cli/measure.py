@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity._processes import available_cores
+from asperity._processes import available_cores, process_count
 from asperity.cli.options import (
     Count,
     field_option,
@@ -445,7 +445,7 @@ def _campaign(
             out,
             inputs=rows_of.inputs(),
             resume=resume,
-            jobs=jobs or available_cores(),
+            jobs=available_cores() if jobs is None else process_count(jobs, "--jobs"),
             progress=update,
         )
     campaign = StickSlipCampaign.of(done.table)

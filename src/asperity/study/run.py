@@ -17,13 +17,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from asperity._processes import available_cores
+from asperity._processes import available_cores, process_count
 from asperity._version import __version__
 from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works, load_from
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
-from asperity.parameters.arguments import FilePath, at_least, typed
+from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid
@@ -49,8 +49,8 @@ def run_sweep(
     plan: SweepPlan | str | os.PathLike[str],
     out: FilePath,
     *,
-    workers: Annotated[int, at_least(1)] | Workers | None = None,
-    cluster: Annotated[int, at_least(1)] | None = None,
+    workers: Annotated[int, process_count] | Workers | None = None,
+    cluster: Annotated[int, process_count] | None = None,
     address: str | None = None,
     extend_store: bool = False,
     retry_failed: bool = False,
