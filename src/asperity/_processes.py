@@ -44,7 +44,13 @@ def process_count(value: int, name: str) -> int:
     InputError
     """
     most = max(64, 4 * available_cores())
-    require(1 <= value <= most, name, f"be from 1 to {most} processes", shown(value), "give another number")
+    require(
+        1 <= value <= most,
+        name,
+        f"be from 1 to {most} processes",
+        shown(value),
+        "give another number",
+    )
     return value
 
 
