@@ -188,7 +188,10 @@ def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
     assert extra.count("\n") == 1
     assert asp.measure(path).steps == asp.measure(path, modulated=False).steps
     # What the user says of it is not set aside.
-    for options in (("--frequency", "5 Hz"), ("--amplitudes",)):
+    for options in (
+        *(("--frequency", "5 Hz"), ("--amplitudes",)),
+        *(("--harmonics", "2"), ("--whole-periods",), ("--set", "K=1 N/m")),
+    ):
         assert asperity("measure", path, *options).exit_code == 2
     with pytest.raises(InputError):
         asp.measure(path, modulated=True)

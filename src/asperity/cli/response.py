@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,6 +121,11 @@ def _point(point: Point, output: Output) -> int:
         point.law,
     )
     output.draw(result)
+    if not result.stable:
+        say(
+            "the response is unstable: the slider leaves it for another motion, whose mean and "
+            "harmonics differ; asperity run integrates the motion"
+        )
     return 0
 
 
@@ -205,6 +211,8 @@ def _sections(
     ]
     rows = []
     for name, value, unit, meaning in outputs:
+        if value == "" or (isinstance(value, float) and not math.isfinite(value)):
+            continue  # of a law without states, which has no modes
         text = f"{value:.9g} {unit}".removesuffix(" 1") if isinstance(value, float) else str(value)
         yes_or_no = name in ("stable", "steady")
         rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, meaning))
