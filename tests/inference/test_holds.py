@@ -144,8 +144,9 @@ def test_what_holds_cannot_say_is_refused(exact):
     ],
 )
 def test_what_has_no_influence_on_holds_is_refused(exact, options, words):
+    data = table(exact, exact[1], healing_err=ERROR)
     with pytest.raises(InputError) as refused:
-        inference.fit(exact, "rice-ruina", ["A", "B", "D0"], **options)
+        fit(data, "rice-ruina", ["A", "B", "D0"], **options)
     assert words in str(refused.value)
 
 
