@@ -321,6 +321,12 @@ _COUNTS_WITH = {
 }
 
 
+def lacking(name: str, numbers: Mapping[str, Any]) -> str:
+    """The number without which this one has no influence; empty if it has one, or is 0."""
+    other = _COUNTS_WITH.get(name, "")
+    return other if numbers.get(name) and not numbers.get(other) else ""
+
+
 def require_influence(
     names: Iterable[str], numbers: Mapping[str, Any], field: str = "", place: str = ""
 ) -> None:
@@ -342,8 +348,8 @@ def require_influence(
     InputError
     """
     for name in names:
-        other = _COUNTS_WITH.get(name)
-        if other and numbers.get(name) and not numbers.get(other):
+        other = lacking(name, numbers)
+        if other:
             value = "1" if other == "inertia" else "0.1"
             like = f"{place}.{other} = {value}" if place else Argument("numbers", other, value)
             rule, got = f"have an influence, which it has with {other}", f"{other} = 0"
