@@ -225,6 +225,8 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     from asperity.cli.progress import bar
     from asperity.laws import get_law
     from asperity.operating_point import material_of, sourced_numbers
+    from asperity.outputs.tables import Section
+    from asperity.parameters.parameter import count_text
     from asperity.study.table import run_table
 
     law = get_law(point.law).name if point.law else None
@@ -232,8 +234,10 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     values = {name: number.value for name, number in filled.items()}
     with bar("point", "responses") as update:
         done = run_table(table, out, law=law, filled=values, resume=resume, progress=update)
-    if output.as_json:
-        output.answer(lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)}, list)
+    output.answer(
+        lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)},
+        lambda: [Section("", (f"{count_text(done.rows, 'row')} in {out}",))],
+    )
     if done.failed:
         say(
             f"{done.failed} of {done.rows} rows have no response; the column 'result' of {out} "

@@ -16,6 +16,7 @@ from asperity.measurement.stick_slip.measure import (
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import OF_MODULATION, OF_SLIPS, Measurement as Question
 from asperity.recording import Trace
+from asperity.recording.finding import with_cause
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
@@ -190,7 +191,7 @@ def _either(
         if unread is not None and question.normal_load is not None:
             raise unread from None
         if not constant and len(trace.channels) == 1:
-            raise _which_force(trace) from None
+            raise with_cause(_which_force(trace), trace.findings) from None
         raise error from None
     changes = len(measurement.steps) + len(measurement.holds)
     if events is not None and _rather_events(events, changes):
