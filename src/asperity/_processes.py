@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from typing import Any
 
 from asperity.errors import InputError, require
-from asperity.parameters.arguments import shown
 
 #: One thread for XLA and for the linear algebra of NumPy: sums over several threads differ in their
 #: last bits from sums in one, and more threads than cores slow all of them. The CPU, as in
