@@ -11,7 +11,7 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 #: One thread for XLA and for the linear algebra of NumPy: sums over several threads differ in their
 #: last bits from sums in one, and more threads than cores slow all of them. The CPU, as in
@@ -33,6 +33,24 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def process_count(value: int, name: str) -> int:
+    """The rule of a number of processes, as an annotation: more than the cores only slow it down.
+
+    Raises
+    ------
+    InputError
+    """
+    most = max(64, 4 * available_cores())
+    require(
+        1 <= value <= most,
+        name,
+        f"be from 1 to {most} processes",
+        shown(value),
+        "give another number",
+    )
+    return value
 
 
 def kept_processes(count: int) -> Any:

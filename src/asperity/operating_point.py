@@ -193,13 +193,39 @@ def point_numbers(
     Raises
     ------
     InputError
-        If law or material are unknown, a name belongs to other laws or to nothing, or a number is
-        missing or breaks its rule.
+        If law or material are unknown, a name belongs to other laws or to nothing, a number is
+        missing or breaks its rule, or a given number has no influence.
     """
     offered = offered_numbers(point, origin, place)
     for name in point.parameters if place and among is not None else ():
         known_name(name, among or {}, f"{place}.{name}")
-    return numbers_for(point.law, offered, among, needed, place)
+    numbers = numbers_for(point.law, offered, among, needed, place)
+    if among is None or "inertia" in among:
+        require_given_influence(numbers, origin)
+    return numbers
+
+
+def require_given_influence(
+    numbers: Mapping[str, SourcedNumber], origin: str, varied: Iterable[str] = ()
+) -> None:
+    """Refuse a number of the user without influence; those of materials may have none.
+
+    Parameters
+    ----------
+    numbers : mapping of str to SourcedNumber
+    origin : str
+        Of the user's numbers.
+    varied : iterable of str
+        Numbers that have several values.
+
+    Raises
+    ------
+    InputError
+        As `require_influence`.
+    """
+    given = [name for name, number in numbers.items() if number.origin == origin]
+    values = {name: number.value for name, number in numbers.items()}
+    require_influence(given, {**values, **dict.fromkeys(varied, 1.0)})
 
 
 def offered_numbers(
@@ -295,19 +321,25 @@ _COUNTS_WITH = {
 }
 
 
+def lacking(name: str, numbers: Mapping[str, Any]) -> str:
+    """The number without which this one has no influence; empty if it has one, or is 0."""
+    other = _COUNTS_WITH.get(name, "")
+    return other if numbers.get(name) and not numbers.get(other) else ""
+
+
 def require_influence(
-    axes: Iterable[str], numbers: Mapping[str, Any], field: str, place: str = ""
+    names: Iterable[str], numbers: Mapping[str, Any], field: str = "", place: str = ""
 ) -> None:
-    """Refuse an axis along which no response changes, such as one of M without inertia.
+    """Refuse a number on which no response depends, such as M without inertia.
 
     Parameters
     ----------
-    axes : iterable of str
-        Names of the numbers that vary.
+    names : iterable of str
+        Numbers that vary, or that the user has given.
     numbers : mapping of str to float
-        The fixed ones.
+        All numbers; one that varies has any value but 0.
     field : str
-        An axis in messages, of which ``{}`` is the name.
+        A number in messages, of which ``{}`` is the name; by default an argument of its own.
     place : str
         As in `numbers_for`.
 
@@ -315,13 +347,14 @@ def require_influence(
     ------
     InputError
     """
-    for name in axes:
-        other = _COUNTS_WITH.get(name)
-        if other and other not in axes and not numbers.get(other):
+    for name in names:
+        other = lacking(name, numbers)
+        if other:
             value = "1" if other == "inertia" else "0.1"
             like = f"{place}.{other} = {value}" if place else Argument("numbers", other, value)
             rule, got = f"have an influence, which it has with {other}", f"{other} = 0"
-            raise InputError(field.format(name), rule, got, f"add {like}, or leave the axis out")
+            about = field.format(name) if field else Argument("numbers", name)
+            raise InputError(about, rule, got, f"add {like}, or leave {name} out")
 
 
 def without_mass(values: Mapping[str, Float]) -> Bool:

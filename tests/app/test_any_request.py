@@ -114,6 +114,19 @@ def test_every_endpoint_refuses_what_is_no_question(ask, path):
         assert " must " in answer.json["error"], body
 
 
+@pytest.mark.parametrize("path", ENDPOINTS)
+def test_a_key_twice_is_refused_wherever_json_is_read(ask, path):
+    for body in (b'{"law": "amontons", "law": "rice-ruina"}', b'{"a": [{"V": 1e-6, "V": 1e-5}]}'):
+        answer = ask(path, body)
+        assert answer.status == 400
+        assert "request.body must name every key once, got '" in answer.json["error"]
+
+
+def test_a_long_text_is_named(ask):
+    answer = ask("explore", json.dumps({"law": "x" * 301}).encode())
+    assert "law must have at most 300 characters, got 301" in answer.json["error"]
+
+
 def test_a_whole_surrogate_pair_is_a_character(ask):
     answer = ask("explore", b'{"law": "\\ud83d\\ude00"}')
     assert "got '\U0001f600'" in answer.json["error"]

@@ -27,6 +27,18 @@ def test_numbers_are_those_of_the_package(explored):
     assert mean == pytest.approx(float(found.mean_friction), rel=1e-3)
 
 
+@pytest.mark.parametrize("inertia", [0, 1])
+def test_the_copied_command_has_a_mass_only_where_it_counts(ask, inertia):
+    numbers = {**POINT, "M": 2.0, "inertia": inertia}
+    answer = ask("explore/text", {"law": "rice-ruina", "numbers": numbers})
+    assert ('--set "M=2 kg"' in answer.json["command"]) == bool(inertia)
+
+
+def test_modulations_that_no_copied_line_would_have_are_refused(ask):
+    answer = ask("explore/text", {"law": "rice-ruina", "numbers": {**POINT, "epsilon2": 0.1}})
+    assert (answer.status, answer.json["error"][:30]) == (400, "epsilon2 must be left out on t")
+
+
 def test_the_motion_below_the_threshold_is_stick_slip(ask):
     """On average the slider moves at V, and what the spring lets go of is the slip."""
     numbers = {"V": 1e-5, "epsilon": 0.0, "frequency": 120.0, "K": 5e4, "W0": 7.0}

@@ -569,7 +569,7 @@ def test_a_sample_without_a_name(asperity, tmp_path) -> None:
     [
         ("epsilon=0:1:3", "asperity: --x must be at least 0 and below 1"),
         ("epsilom=0:0.5:3", "asperity: --x must be a number of an operating point, got 'epsilom'"),
-        ("epsilon=0.1:0.5:99999999999", "asperity: --x must be a whole number"),
+        ("epsilon=0.1:0.5:99999999999", "asperity: --x must have 2 to 100,000,000 points"),
         ("tilt=0:100:3 deg", "asperity: --x must be less than a right angle"),
     ],
 )
@@ -591,3 +591,70 @@ def test_inertia_without_a_mass(asperity) -> None:
     point = [part for pair in POINT.items() for part in pair]
     call = (*OF, *point, "--set", "M=0 kg", "--inertia")
     refused(asperity(*call), "--set M must be positive with inertia, got 0 kg", '--set "M=1.6 kg"')
+
+
+SLIDING = ("--material", "bureau2000", "--law", "rice-ruina", "-V", "1 um/s")
+POINT_OPTIONS = (*SLIDING, "-e", "0.24", "-f", "120 Hz")
+PLANE = (
+    *(*SLIDING, "-f", "120 Hz", "--x", "epsilon=0.1:0.2:3"),
+    *("--y", "K=0.2:0.3:3 N/um", "--out", "m.nc"),
+)
+LAYER = ("--material", "bureau2000", "-f", "120 Hz", "--inverse", "0.48", "--for", "radius")
+#: Options that are accepted elsewhere, and have no influence here.
+WITHOUT_INFLUENCE = [
+    (("response", *POINT_OPTIONS, "--set", "M=2 kg"), "--set M must have an influence"),
+    (("response", *POINT_OPTIONS, "--set", "pull_phase=1"), "--set pull_phase must have an"),
+    (
+        ("response", *SLIDING, "--stick-slip", "--set", "epsilon2=0.1"),
+        "--stick-slip must come without a modulation, got epsilon2 = 0.1",
+    ),
+    (
+        ("response", *SLIDING, "--stick-slip", "--set", "eps=0.1"),
+        "--stick-slip must come without a modulation, got eps = 0.1",
+    ),
+    (("response", *SLIDING, "--stick-slip", "--set", "M=2 kg"), "--set M must have an influence"),
+    (("map", *PLANE, "--set", "M=2 kg"), "--set M must have an influence"),
+    (("map", *PLANE, "--show", "mu1"), "--show must go with --plot"),
+    (("air", *LAYER, "--set", "R=1 cm"), "--set R must be left out with --for radius"),
+    (("sweep", "p.toml", "--dry-run", "--extend"), "--extend must go without --dry-run"),
+    (("sweep", "p.toml", "--dry-run", "--retry-failed"), "--retry-failed must go without"),
+    (("serve", "--law", "rice"), "law must be a registered law, got 'rice'"),
+]
+
+
+@pytest.mark.parametrize(("call", "sentence"), WITHOUT_INFLUENCE)
+def test_an_option_without_influence_is_refused(
+    asperity, tmp_path, monkeypatch, call, sentence
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused(asperity(*call), sentence)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_phase_counts_with_an_axis_of_its_amplitude(asperity, tmp_path) -> None:
+    axes = ("--x", "epsilon=0.05:0.1:2", "--y", "epsilon2=0.05:0.1:2")
+    call = ("map", *SLIDING, "-f", "120 Hz", *axes, "--set", "epsilon2_phase=1")
+    assert asperity(*call, "--out", tmp_path / "m.nc").exit_code == 0
+
+
+def test_a_decimal_comma_is_named(asperity) -> None:
+    refused(asperity("response", *SLIDING[:-1], "0,1 mm/s"), "-V must have a decimal point")
+
+
+@pytest.mark.parametrize("option", ["--workers", "--cluster"])
+def test_more_processes_than_any_machine_runs(asperity, tmp_path, option) -> None:
+    plan = tmp_path / "p.toml"
+    plan.write_text(
+        'law = "rice-ruina"\nmaterial = "bureau2000"\n'
+        'parameters = { V = "1 um/s", frequency = "120 Hz" }\naxes.epsilon.values = [0.1]\n'
+    )
+    call = ("sweep", plan, "--out", tmp_path / "s.zarr", option)
+    for count in ("1000000", "0"):
+        refused(asperity(*call, count), f"{option} must be from 1 to")
+
+
+def test_an_unstable_response_is_said_to_be_left(asperity) -> None:
+    # Without modulation sliding is unstable below (B - A) W0/D0 = 0.23 N/um.
+    point = ("response", *SLIDING, "-f", "120 Hz", "-e", "0", "--set")
+    assert "the response is unstable" in asperity(*point, "K=0.22 N/um").stderr
+    assert not asperity(*point, "K=0.24 N/um").stderr

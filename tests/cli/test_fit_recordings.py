@@ -45,6 +45,9 @@ def test_priors_of_a_material_want_the_free_parameters(recording):
     assert "--prior bureau2000 must go with --free" in found.output + str(found.exception)
 
 
+KNOWN = ["--fix", "B=0.01", "--fix", "D0=1 um"]
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [
@@ -54,6 +57,11 @@ def test_priors_of_a_material_want_the_free_parameters(recording):
         (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
         (["--velocities", "1 um/s"], "must be one more than the steps"),
         (["--gauge", "-1 Hz"], "--gauge must be positive"),
+        ([*KNOWN, "--inertia"], "--inertia must go with a value of M, got none; add --fix"),
+        ([*KNOWN, "--radiation-damping"], "--radiation-damping must go with a value of eta"),
+        (["--fix", "M=1 kg"], "--fix must be parameters that count, got 'M', which has no"),
+        (["--fix", "eps_ratio=0.5"], "--fix eps_ratio must have an influence"),
+        (["--law", "amontons"], "--law must be"),
         (["--fit-rate", "-1 Hz"], "--fit-rate must be positive"),
         (
             ["--fit-rate", "0.1 Hz"],

@@ -188,7 +188,10 @@ def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
     assert extra.count("\n") == 1
     assert asp.measure(path).steps == asp.measure(path, modulated=False).steps
     # What the user says of it is not set aside.
-    for options in (("--frequency", "5 Hz"), ("--amplitudes",)):
+    for options in (
+        *(("--frequency", "5 Hz"), ("--amplitudes",)),
+        *(("--harmonics", "2"), ("--whole-periods",), ("--set", "K=1 N/m")),
+    ):
         assert asperity("measure", path, *options).exit_code == 2
     with pytest.raises(InputError):
         asp.measure(path, modulated=True)
@@ -305,7 +308,7 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
         (["--window", "12:4"], "--window must end after it begins"),
         (["--window", "4:4.001"], "--window must enclose"),
         (["--window", "10"], "--window must be START:END"),
-        (["--set", "K=1 N/m"], "--set K must go with slip events, got 1.0 and a recording without"),
+        (["--set", "K=1 N/m"], "--set K must go with slip events, got it with a recording without"),
         (["--exact-frequency"], "--exact-frequency must go with --frequency"),
         (["--unit", "N"], "--unit must be NAME=VALUE"),
         (["--column", "velocity"], "--column must be NAME=VALUE"),

@@ -134,6 +134,22 @@ def test_what_holds_cannot_say_is_refused(exact):
         fit(few, "rice-ruina", ["A", "B", "D0"])
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"inertia": True}, "inertia must have an influence, got it with a table of holds"),
+        ({"radiation_damping": True}, "radiation_damping must have an influence"),
+        ({"fixed": {"eps_ratio": 0.5}}, "eps_ratio'] must have an influence"),
+        ({"fixed": {"M": "1 kg"}}, "M'] must have an influence"),
+    ],
+)
+def test_what_has_no_influence_on_holds_is_refused(exact, options, words):
+    data = table(exact, exact[1], healing_err=ERROR)
+    with pytest.raises(InputError) as refused:
+        fit(data, "rice-ruina", ["A", "B", "D0"], **options)
+    assert words in str(refused.value)
+
+
 def test_a_posterior_is_refused(fitted):
     with pytest.raises(InputError, match="profile likelihood"):
         sample_posterior(fitted)

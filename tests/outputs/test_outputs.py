@@ -18,7 +18,8 @@ from asperity.outputs import (
     undisturbed,
     written_file,
 )
-from asperity.outputs.tables import rounded
+from asperity.outputs.json import json_content, parsed_json
+from asperity.outputs.tables import aligned, rounded
 
 
 def a_folder(path: Path) -> None:
@@ -280,3 +281,17 @@ def test_undisturbed_work_hands_back_results_and_errors() -> None:
 )
 def test_an_uncertainty_has_two_digits_and_its_number_as_many(value, doubt, shown) -> None:
     assert rounded(value, doubt) == shown
+
+
+def test_a_json_key_twice_is_refused_and_a_file_with_one_damaged(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="request must name every key once, got 'b' twice"):
+        parsed_json('{"a": [{"b": 1, "c": 2, "b": 1}]}', "request")
+    file = tmp_path / "record.json"
+    file.write_text('{"a": 1, "b": {"a": 2}}', encoding="utf-8")
+    assert json_content(file) == {"a": 1, "b": {"a": 2}}
+    file.write_text('{"a": 1, "a": 2}', encoding="utf-8")
+    assert json_content(file) is None
+
+
+def test_cells_of_a_table_change_no_terminal() -> None:
+    assert aligned([("title", "a\x1b[31m\nb"), ("µ", "2")]) == "title  a\\x1b[31m b\nµ      2"

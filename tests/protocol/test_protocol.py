@@ -139,6 +139,12 @@ def test_one_mistake_is_one_sentence(write, old, new, message) -> None:
     assert message in str(caught.value)
 
 
+def test_a_mass_without_inertia_is_refused(write) -> None:
+    light = FILE.replace("[parameters]\n", "[parameters]\nM = '2 kg'\n")
+    with pytest.raises(InputError, match=r"parameters\.M must go with inertia"):
+        load_protocol(write(light))
+
+
 def test_steps_that_take_no_time_are_refused(write) -> None:
     start = FILE.index("steps = [")
     text = FILE[:start] + 'steps = ["step load to 9 N"]' + FILE[FILE.index("\n[parameters]") :]

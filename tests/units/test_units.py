@@ -184,7 +184,7 @@ def test_the_wrong_dimension_is_told_with_the_right_one(
 ) -> None:
     message = refusal(text, kind)
     assert f"must be {expected}, got '{text}'" in message
-    assert message.endswith(f"write it like '{example}'")
+    assert message.endswith(f"like '{example}'")
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError, MistakesError, require
+from asperity.outputs.json import parsed_json
 from asperity.questions import record as questions
 
 
@@ -120,13 +121,15 @@ async def question_in(request: Request, kind: type[Question]) -> Any:
         raise InputError("request.body", "be JSON", "another type", "send application/json")
     body = await request.body()
     try:
-        value = json.loads(body, parse_constant=_no_constant)
+        value = parsed_json(body, "request.body", parse_constant=_no_constant)
         _require_short(value)
         # Half a surrogate pair is JSON and no text: nothing can write it again.
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         rule, got = "hold texts of whole characters", "half a surrogate pair"
         raise InputError("request.body", rule, got, "leave it out") from None
+    except InputError:
+        raise
     except (ValueError, RecursionError):
         raise InputError("request.body", "be JSON", "something else", "send JSON") from None
     holds = isinstance(value, dict)

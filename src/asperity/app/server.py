@@ -60,10 +60,10 @@ def serve(
         If the extra ``app`` is not installed, a law is not found or the port cannot be used.
     """
     require_extra()
-    from asperity.laws import known_law
+    from asperity.laws import get_law, known_law
 
     for law in laws:
-        known_law(law)
+        get_law(known_law(law))
     listening = listen(port)
     server = server_on(listening, laws=laws)
     if started is not None:

@@ -214,7 +214,7 @@ class Branch(Displayed):
             "mean_friction": along(self.mean_friction, "1", "mean of F/W0"),
             "mu1": along(self.mu1, "1", "first harmonic of F/W0, peak"),
             "mu2": along(self.mu2, "1", "second harmonic of F/W0, peak"),
-            "stable": along(self.stable, "1", "all multipliers inside the unit circle"),
+            "stable": along(self.stable, "1", "whether all multipliers are inside the unit circle"),
             "bifurcation_kind": at([b.kind for b in bifurcations], "1", "kind of the bifurcation"),
             "bifurcation_value": at([b.value for b in bifurcations], unit, self.name),
             "bifurcation_frequency": at(

@@ -76,8 +76,12 @@ def air(
     require(layered, "--inverse", "have an air layer", "--vacuum", "leave one of them out")
     one, count = inverse is None or len(frequencies) == 1, len(frequencies)
     require(one, "--inverse", "have one frequency", count, "call once for each")
-    unknown = {"radius": "R", "gap": "h0"}.get(sought or "", "")
-    numbers = _numbers(settings_of(settings), material_named(material), vacuum, unknown)
+    unknown, given = {"radius": "R", "gap": "h0"}.get(sought or "", ""), settings_of(settings)
+    rule = f"be left out with --for {sought}"
+    require(
+        unknown not in given, f"--set {unknown}", rule, f"'{given.get(unknown)}'", "it is sought"
+    )
+    numbers = _numbers(given, material_named(material), vacuum, unknown)
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
     layer = None
     if not vacuum:

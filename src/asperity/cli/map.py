@@ -34,6 +34,10 @@ bifurcation and the frequency of its mode.
 """
 
 
+#: What a picture shows by default.
+_SHOWN = "growth_rate"
+
+
 @click.command(epilog=_EPILOG, short_help="Response and stability over any two numbers.")
 @option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".')
 @option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".')
@@ -43,9 +47,7 @@ bifurcation and the frequency of its mode.
 @option(
     "--show",
     "QUANTITY",
-    "What the picture shows: mu1, delta_mu, floquet_max, ...",
-    default="growth_rate",
-    show_default=True,
+    f"What the picture shows: mu1, delta_mu, floquet_max, ...; {_SHOWN} by default.",
 )
 @switch("--log-x", "Points along x at equal ratios.")
 @switch("--log-y", "Points along y at equal ratios.")
@@ -58,7 +60,7 @@ def map(
     point: Point,
     out: Path | None,
     output: Output,
-    show: str,
+    show: str | None,
     resume: bool,
 ) -> int:
     """Response and stability over any two numbers, with the stability boundary.
@@ -68,12 +70,17 @@ def map(
     """
     from asperity.cli.progress import bar
     from asperity.figures.map import draw_map
-    from asperity.operating_point import offered_numbers
+    from asperity.laws import get_law
+    from asperity.operating_point import offered_numbers, require_given_influence
     from asperity.outputs import output_files, require_netcdf
     from asperity.outputs.tables import Section
+    from asperity.parameters import point_parameters
     from asperity.study.map import SHOWN, write_map
 
-    one_of(show, SHOWN, "--show")
+    one_of(show or _SHOWN, SHOWN, "--show")
+    pictured = show is None or output.plot is not None
+    advice = "add --plot map.png or leave it out"
+    require(pictured, "--show", "go with --plot", "no picture", advice)
     for name, text, example in (
         ("--out", out, "map.nc"),
         ("--x", x, "'epsilon=0.01:0.5:200'"),
@@ -86,25 +93,29 @@ def map(
     require_netcdf(out, "--out", "map.nc")
     along_x, along_y = _axis(str(x), log_x, "--x"), _axis(str(y), log_y, "--y")
     # A material's number gives way to an axis; one that was given for this map does not.
+    axes = (along_x.name, along_y.name)
     numbers = {
         name: number
         for name, number in offered_numbers(point, "command line").items()
-        if name in point.parameters or name not in (along_x.name, along_y.name)
+        if name in point.parameters or name not in axes
     }
+    require_given_influence(numbers, "command line", axes)
     with bar("point", "map") as update:
         result = write_map(
             out, point.law, numbers, x=along_x, y=along_y, resume=resume, progress=update
         )
     if output.plot is not None:
-        save_figure(lambda: draw_map(result, show), output.plot, output.names)
+        save_figure(lambda: draw_map(result, show or _SHOWN), output.plot, output.names)
     record = _record(result, out)
     rows = tuple((name, str(record[name])) for name in ("points", "stable", "unstable", "failed"))
     boundaries = []
+    known = point_parameters(get_law(point.law))
+    units = {name: known[name].unit for name in axes}
     for line in record["boundaries"]:
         kinds = " and ".join(dict.fromkeys(line["kind"]))
         spans = ", ".join(
-            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g}"
-            for name in (record["x"], record["y"])
+            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g} {unit}".rstrip()
+            for name, unit in units.items()
         )
         boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
     table = [Section("", rows=rows), Section("", tuple(boundaries))]

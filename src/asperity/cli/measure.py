@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity._processes import available_cores
+from asperity._processes import available_cores, process_count
 from asperity.cli.options import (
     Count,
     field_option,
@@ -428,6 +428,8 @@ def _campaign(
         write_thresholds,
     )
     from asperity.outputs import output_files, written_file
+    from asperity.outputs.tables import Section
+    from asperity.parameters.parameter import count_text
 
     question = rows_of.question
     advice = "add it: the end of stick-slip needs the recordings of steady sliding too"
@@ -445,16 +447,20 @@ def _campaign(
             out,
             inputs=rows_of.inputs(),
             resume=resume,
-            jobs=jobs or available_cores(),
+            jobs=available_cores() if jobs is None else process_count(jobs, "--jobs"),
             progress=update,
         )
     campaign = StickSlipCampaign.of(done.table)
-    if output.as_json or campaign.series:
-        healing = {"healing": campaign.healing_record()} if campaign.series else {}
-        counts = {"files": done.files, "rows": done.rows, "failed": done.failed, "out": str(out)}
-        output.answer(
-            lambda: {**counts, **healing}, lambda: [healing_section(campaign, output.names)]
-        )
+    healing = {"healing": campaign.healing_record()} if campaign.series else {}
+    counts = {"files": done.files, "rows": done.rows, "failed": done.failed, "out": str(out)}
+    made = f"{count_text(done.rows, 'row')} of {count_text(done.files, 'file')} in {out}"
+    output.answer(
+        lambda: {**counts, **healing},
+        lambda: [
+            Section("", (made,)),
+            *([healing_section(campaign, output.names)] if campaign.series else []),
+        ],
+    )
     if output.plot is not None:
         output.draw(with_cycles(campaign))
     unknown = []

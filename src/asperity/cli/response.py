@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,6 +121,11 @@ def _point(point: Point, output: Output) -> int:
         point.law,
     )
     output.draw(result)
+    if not result.stable:
+        say(
+            "the response is unstable: the slider leaves it for another motion, whose mean and "
+            "harmonics differ; asperity run integrates the motion"
+        )
     return 0
 
 
@@ -157,18 +163,19 @@ def _stick_slip(point: Point, output: Output) -> int:
     from asperity.experiment import stick_slip_response
     from asperity.laws import Law, get_law
     from asperity.operating_point import point_numbers
-    from asperity.parameters import MODULATION, point_parameters
+    from asperity.parameters import MODULATION, canonical_name, point_parameters
     from asperity.slider.named import slider_from
 
     output.require_picture()
-    for name in ("epsilon", "frequency"):
-        got = f"{name} = {point.parameters.get(name)}"
-        advice = "leave it out, or leave --stick-slip out"
-        without = name not in point.parameters
-        require(without, "--stick-slip", "come without a modulation", got, advice)
-    modulation = ("epsilon", "frequency", *MODULATION)
     law: type[Law] = get_law(point.law) if point.law else Law
-    among = {n: p for n, p in point_parameters(law).items() if n not in modulation}
+    known = point_parameters(law)
+    modulation = ("epsilon", "frequency", *MODULATION)
+    for name, value in point.parameters.items():
+        advice = "leave it out, or leave --stick-slip out"
+        without = canonical_name(name, known) not in modulation
+        rule, got = "come without a modulation", f"{name} = {value}"
+        require(without, "--stick-slip", rule, got, advice)
+    among = {n: p for n, p in known.items() if n not in modulation}
     numbers = point_numbers(point, "command line", among)
     values = {name: number.value for name, number in numbers.items()}
     result = stick_slip_response(
@@ -204,6 +211,8 @@ def _sections(
     ]
     rows = []
     for name, value, unit, meaning in outputs:
+        if value == "" or (isinstance(value, float) and not math.isfinite(value)):
+            continue  # of a law without states, which has no modes
         text = f"{value:.9g} {unit}".removesuffix(" 1") if isinstance(value, float) else str(value)
         yes_or_no = name in ("stable", "steady")
         rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, meaning))
@@ -216,6 +225,8 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     from asperity.cli.progress import bar
     from asperity.laws import get_law
     from asperity.operating_point import material_of, sourced_numbers
+    from asperity.outputs.tables import Section
+    from asperity.parameters.parameter import count_text
     from asperity.study.table import run_table
 
     law = get_law(point.law).name if point.law else None
@@ -223,8 +234,10 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     values = {name: number.value for name, number in filled.items()}
     with bar("point", "responses") as update:
         done = run_table(table, out, law=law, filled=values, resume=resume, progress=update)
-    if output.as_json:
-        output.answer(lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)}, list)
+    output.answer(
+        lambda: {"rows": done.rows, "failed": done.failed, "out": str(out)},
+        lambda: [Section("", (f"{count_text(done.rows, 'row')} in {out}",))],
+    )
     if done.failed:
         say(
             f"{done.failed} of {done.rows} rows have no response; the column 'result' of {out} "

@@ -7,7 +7,7 @@ import sys
 
 import click
 
-from asperity.cli.options import option, switch
+from asperity.cli.options import Count, option, switch
 
 _EPILOG = """\b
 Examples:
@@ -27,7 +27,7 @@ an environment.
     "--port",
     "NUMBER",
     "Port to listen on; 0 for any that is free.",
-    int,
+    Count(),
     default=8765,
     show_default=True,
 )

@@ -12,7 +12,7 @@ import click
 from asperity.cli.options import Count, option, output_options, switch
 from asperity.cli.progress import bar
 from asperity.cli.report import Output, save_figure, say
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 
 if TYPE_CHECKING:
     from asperity.outputs.tables import Section
@@ -103,7 +103,14 @@ def run(
 ) -> int:
     """Run a plan; "asperity sweep PLAN" is the same."""
     if dry_run:
-        return _estimate(plan, output)
+        for name in ("extend_store", "retry_failed"):
+            option, rule = (
+                f"--{name.replace('_store', '').replace('_', '-')}",
+                "go without --dry-run",
+            )
+            require(not options[name], option, rule, "both", "a dry run is that of the whole plan")
+        workers, cluster = options["workers"], options["cluster"]
+        return _estimate(plan, cluster if workers is None else workers, output)
     if out is None:
         raise InputError("--out", "be given", "nothing", "name the store, like --out results.zarr")
     from tqdm import tqdm
@@ -154,13 +161,13 @@ def run(
     return 1 if result.failed else 0
 
 
-def _estimate(plan: Path, output: Output) -> int:
-    from asperity._processes import available_cores
+def _estimate(plan: Path, processes: int | None, output: Output) -> int:
+    from asperity._processes import available_cores, process_count
     from asperity.outputs import size_text
     from asperity.study import dry_run
 
     result = dry_run(plan)
-    cores = available_cores()
+    cores = available_cores() if processes is None else process_count(processes, "workers")
     alone, together = _time_text(result.seconds), _time_text(result.seconds / cores)
     output.answer(
         lambda: {**vars(result), "cores": cores},
@@ -246,7 +253,7 @@ def export(store: Path, out: Path) -> int:
 @option("--show", "OUTPUT", "What is drawn, such as delta_mu.", required=True)
 @option("--x x", "AXIS", "Axis along x.", required=True)
 @option("--y y", "AXIS", "Axis along y; a curve without it.")
-@option("--at", "AXIS=VALUE", "Where another axis is: SI value, or row.", multiple=True)
+@option("--at", "AXIS=VALUE", "Where another axis is: its nearest value, or row.", multiple=True)
 @option("--out", "PNG", "Where the picture goes.", Path, required=True)
 def plot(
     store: Path,
@@ -260,12 +267,8 @@ def plot(
     from asperity.cli.options import settings_of
     from asperity.figures.slice import plot_slice
     from asperity.outputs import output_file
-    from asperity.units import to_si
 
-    where = {
-        name: float(to_si(value, "dimensionless", f"--at {name}"))
-        for name, value in settings_of(at, "--at").items()
-    }
+    where = settings_of(at, "--at")
     target = output_file(out, "--out", example="slice.png")
     save_figure(lambda: plot_slice(store, show, x=x, y=y, at=where), target, option="--out")
     return 0

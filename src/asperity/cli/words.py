@@ -10,6 +10,8 @@ from asperity.errors import Argument, InputError, naming
 #: Fields of an operating point, and fields whose options take NAME=VALUE.
 POINT_OPTIONS: Mapping[str, str] = {"law": "--law", "material": "--material"}
 _PAIRS = ("fixed", "numbers", "start", "prior")
+#: Arguments that are options under their own name.
+_SAME = ("workers", "cluster", "thresholds", "out", "show", "x", "y", "at")
 _OPTIONS: Mapping[str, str] = {
     "measure.trace": "the recording",
     "measure.steps and holds": "--steps and --holds",
@@ -23,11 +25,12 @@ _OPTIONS: Mapping[str, str] = {
     "lock_in.time": "the time column",
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
+    "write.path": "--out",
     "slice.start and slice.end": "--window",
     "seed": "--seed",
     "initial": "start.states",
     "span": "--stiffness-from",
-    **{name: f"--{name}" for name in ("workers", "cluster", "thresholds")},
+    **{name: f"--{name}" for name in _SAME},
 }
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from cmcrameri import cm
 from matplotlib.figure import Figure
 
-from asperity.errors import InputError, closest
+from asperity.errors import Argument, InputError, closest, require
 from asperity.figures.style import new_figure
+from asperity.parameters.arguments import number
 from asperity.study import open_store
+from asperity.units import KINDS
 
 
 def plot_slice(
@@ -32,9 +35,9 @@ def plot_slice(
         An output of the store.
     x, y : str
         Axes of the picture; a curve without `y`.
-    at : mapping of str to float or int, optional
-        Positions on the other axes: the nearest value of an axis with labels, the number of the row
-        of another; the first row by default.
+    at : mapping of str to float, int or str, optional
+        Positions on the other axes: the nearest value of an axis with labels, in SI or a text with
+        its unit, or the number of the row of another axis; the first row by default.
 
     Raises
     ------
@@ -50,16 +53,22 @@ def plot_slice(
     for name, side in (("x", x), ("y", y)):
         if side is not None and side not in dims:
             raise InputError(name, "be an axis of the store", f"'{side}'", closest(side, dims))
+    require(x != y, "y", "be another axis than x", f"'{y}' for both", "leave it out for a curve")
     chosen = dict(at or {})
+    others = [dim for dim in dims if dim not in (x, y)]
     for name in chosen:
-        if name not in dims or name in (x, y):
-            raise InputError("at", "name other axes", f"'{name}'", closest(name, dims))
+        advice = closest(name, others) if others else "leave it out"
+        require(name in others, "at", "name another axis than x and y", f"'{name}'", advice)
     numbered = {d: d in part.indexes and part[d].dtype.kind in "if" for d in dims}
     for dim in dims:
         if dim in chosen and numbered[dim]:
-            part = part.sel({dim: float(chosen[dim])}, method="nearest")
+            position = _in_si(chosen[dim], part[dim].attrs.get("units", "1"), dim)
+            part = part.sel({dim: position}, method="nearest")
         elif dim not in (x, y):
-            part = part.isel({dim: int(chosen.get(dim, 0))})
+            row, rows = _in_si(chosen.get(dim, 0), "1", dim), part.sizes[dim]
+            whole, advice = row in range(rows), "give the number of a row"
+            require(whole, "at", f"be a row from 0 to {rows - 1} of {dim}", f"{row:g}", advice)
+            part = part.isel({dim: int(row)})
     for side in (x, y):
         if side is not None and not numbered[side]:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})
@@ -79,6 +88,17 @@ def plot_slice(
             options |= {"cmap": cm.vik, "center": 0.0}
         part.plot.pcolormesh(x=x, y=y, ax=axis, **options)
     return figure
+
+
+def _in_si(value: Any, unit: str, dim: str) -> float:
+    """A position in SI; a text has its unit, or is a number in SI."""
+    kind = next(name for name, kind in KINDS.items() if kind.si == unit.removeprefix("1"))
+    with suppress(ValueError):
+        value = float(value)
+    try:
+        return number(value, "", kind)
+    except InputError as error:
+        raise error.about(Argument("at", key=dim)) from None
 
 
 def _scale(values: np.ndarray) -> str:

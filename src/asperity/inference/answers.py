@@ -121,8 +121,8 @@ def read_data(
     # Arguments of recordings, such as velocities, need a recording.
     for name in ("steps", "velocities"):
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
-            rule = "go with one recording"
-            raise InputError(name, rule, recordings, "cut the recordings beforehand")
+            got = f"{recordings} of them" if recordings else "a table"
+            raise InputError(name, "go with one recording", got, "leave it out")
     # Readings in a table are final: nothing would apply a gauge or a trend to them.
     for name in (
         () if recordings else ("trend", "drift", "initial", "gauge", "gauge_order", "fit_rate")
@@ -130,7 +130,9 @@ def read_data(
         value = getattr(question, name)
         same = value == type(question).model_fields[name].default
         # Those that are numbers are frequencies.
-        got = f"{value:g} Hz" if isinstance(value, float) else shown(value)
+        got = (
+            f"{value:g} Hz" if isinstance(value, float) else "it" if value is True else shown(value)
+        )
         require(same, name, "go with a recording", f"{got} with a table", "leave it out")
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
@@ -258,8 +260,9 @@ def _prior_of_unloading(
     other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
     if other is not None:
         raise InputError(label, "be the only number of K", f"{Argument(other)} K too", "drop one")
-    rule, got, advice = "go with one recording", f"{len(question.data)} files", "give one recording"
-    require(len(question.data) == 1 and not is_table(question.data[0]), label, rule, got, advice)
+    rule, advice = "go with one recording", "give one recording"
+    require(len(question.data) == 1, label, rule, f"{len(question.data)} files", advice)
+    require(not is_table(question.data[0]), label, rule, "a table", advice)
     rule, advice = "be without a prior of gain", "give the prior of K from another source"
     got = "both: the slope is measured by the same gauge, and scales with it"
     require(not any(name.partition("[")[0] == "gain" for name in priors), label, rule, got, advice)

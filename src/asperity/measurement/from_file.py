@@ -14,14 +14,13 @@ from asperity.measurement.stick_slip.measure import (
     measure_stick_slip,
 )
 from asperity.parameters.arguments import FilePath, typed
-from asperity.questions.recording import Measurement as Question
+from asperity.questions.recording import OF_MODULATION, OF_SLIPS, Measurement as Question
 from asperity.recording import Trace
+from asperity.recording.finding import with_cause
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
 
-#: Numbers of the machine, which only slip events need.
-_OF_SLIPS = ("stiffness", "velocity", "mass", "normal_load")
 #: Slip events for each velocity step or hold above which these are read within stick-slip.
 _EVENTS = 10
 
@@ -129,12 +128,25 @@ def answer_measurement(
         As in `measure_recording`.
     """
     result, note = _either(trace, question, measure, plain=plain)
-    for name in () if isinstance(result, StickSlipMeasurement) else _OF_SLIPS:
-        given, slips = getattr(question, name), Argument("measure.stick_slip")
-        rule, got = "go with slip events", f"{given} and a recording without them"
-        advice = f"leave it out, or give {slips} too"
-        require(given is None, f"measure.{name}", rule, got, advice)
+    if not isinstance(result, StickSlipMeasurement):
+        advice = f"leave it out, or give {Argument('measure.stick_slip')} too"
+        _require_unset(question, OF_SLIPS, "slip events", "a recording without them", advice)
+    if not isinstance(result, Measurement):
+        slips = isinstance(result, StickSlipMeasurement)
+        what = "a recording of slip events" if slips else "a constant load"
+        names = OF_MODULATION if slips else OF_MODULATION[:-1]
+        _require_unset(question, names, "a modulated load", what, "leave it out")
     return result, note
+
+
+def _require_unset(
+    question: Question, names: Sequence[str], needed: str, recording: str, advice: str
+) -> None:
+    """Refuse fields that have no influence on the measurement of this recording."""
+    for name in names:
+        value = getattr(question, name)
+        unset = value == Question.model_fields[name].default
+        require(unset, f"measure.{name}", f"go with {needed}", f"it with {recording}", advice)
 
 
 def measured_parts(
@@ -179,7 +191,7 @@ def _either(
         if unread is not None and question.normal_load is not None:
             raise unread from None
         if not constant and len(trace.channels) == 1:
-            raise _which_force(trace) from None
+            raise with_cause(_which_force(trace), trace.findings) from None
         raise error from None
     changes = len(measurement.steps) + len(measurement.holds)
     if events is not None and _rather_events(events, changes):

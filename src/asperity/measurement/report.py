@@ -101,7 +101,8 @@ def amplitude_sections(rows: list[dict[str, Any]], name: str) -> list[Section]:
     notes = [f"part {row['part']}: {row['reason']}" for row in rows if row["reason"]]
     notes += [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
     count = f"{name}: {len(rows)} modulated {'part' if len(rows) == 1 else 'parts'}"
-    head = ("part", "from", "to", *shown, "verdict")
+    units = {"frequency": "frequency (Hz)", "phase1": "phase1 (rad)"}
+    head = ("part", "from", "to", *(units.get(n, n) for n in shown), "verdict")
     return [Section(count, head=head, rows=tuple(table)), Section("", tuple(notes))]
 
 

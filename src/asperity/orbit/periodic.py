@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity._processes import available_cores
+from asperity._processes import available_cores, process_count
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation
 from asperity.orbit.outcome import Outcome
@@ -47,7 +47,7 @@ def periodic_response(
     waveform: Annotated[int, at_least(0)] = 0,
     progress: Callable[[int, int], None] | None = None,
     methods: tuple[str, ...] = CHOICES,
-    workers: Annotated[int, at_least(1)] | None = None,
+    workers: Annotated[int, process_count] | None = None,
 ) -> PeriodicResponse:
     """Periodic response to W = W0 (1 + eps cos wt), stable or not.
 

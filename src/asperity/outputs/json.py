@@ -1,14 +1,16 @@
-"""Strict JSON: arrays as lists, and numbers that are not finite as null."""
+"""Strict JSON: arrays as lists, numbers that are not finite as null, and every key once."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from asperity.errors import InputError, printable
 
 
 def to_json(value: Any, *, indent: int | None = None) -> str:
@@ -40,12 +42,44 @@ def plain(value: Any) -> Any:
     return array.tolist()
 
 
+def parsed_json(
+    text: str | bytes, label: str, parse_constant: Callable[[str], Any] | None = None
+) -> Any:
+    """The value of a JSON text.
+
+    Parameters
+    ----------
+    text : str or bytes
+    label : str
+        What it is, for messages.
+    parse_constant : callable, optional
+        As of `json.loads`.
+
+    Raises
+    ------
+    InputError
+        If an object names a key twice: Python's reader takes the last one without a word.
+    ValueError, RecursionError
+        If it is no JSON, or is nested too deep.
+    """
+
+    def named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        value = dict(pairs)
+        if len(value) < len(pairs):
+            names = [name for name, _ in pairs]
+            twice = printable(next(name for name in value if names.count(name) > 1), 60)
+            raise InputError(label, "name every key once", f"'{twice}' twice", "leave one out")
+        return value
+
+    return json.loads(text, object_pairs_hook=named_once, parse_constant=parse_constant)
+
+
 def json_content(file: Path) -> Any:
     """Content of a JSON file of this package; None if it is missing or damaged.
 
     Devices and pipes have no end, and count as damaged.
     """
     try:
-        return json.loads(file.read_bytes()) if file.is_file() else None
+        return parsed_json(file.read_bytes(), str(file)) if file.is_file() else None
     except (OSError, ValueError, RecursionError):
         return None

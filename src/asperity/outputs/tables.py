@@ -11,6 +11,7 @@ from string import Template
 from typing import Any, NamedTuple
 
 from asperity._version import __version__
+from asperity.errors import printable
 
 Row = Sequence[str]
 
@@ -53,7 +54,8 @@ class Section(NamedTuple):
 
 def aligned(rows: Iterable[Row], indent: str = "") -> str:
     """Rows of text in columns, two blanks apart."""
-    table = [list(row) for row in rows]
+    # Names and titles may come from files with anything in them.
+    table = [[printable(cell, 9 * len(cell)) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return "\n".join(
         (indent + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True))).rstrip()

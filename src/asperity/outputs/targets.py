@@ -137,14 +137,15 @@ def output_file(
     require_short(target, files, name)
     for file in files:
         kind = not_a_file(file)
+        if kind and file == target:
+            got, advice = f"'{path}', which is {kind}", f"add a file name such as '{example}'"
+            raise InputError(name, "be the name of a file", got, advice)
         if kind:
-            raise InputError(
-                f"{name} must be the name of a file, got '{path}', which is {kind}; "
-                f"add a file name such as '{example}'"
-                if file == target
-                else f"{name} must leave room for '{file.name}' next to it, got '{path}', where "
-                f"that is {kind}; choose another name, or move what is there"
+            rule, got = (
+                f"leave room for '{file.name}' next to it",
+                f"'{path}', where that is {kind}",
             )
+            raise InputError(name, rule, got, "choose another name, or move what is there")
     folder = target.parent
     rule = "lie in a folder that exists"
     require(folder.is_dir(), name, rule, f"'{path}'", "make the folder or choose another")

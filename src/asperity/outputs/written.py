@@ -188,10 +188,8 @@ def _move_files(staging: Path, folder: Path, name: str) -> None:
 
 def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
     why = (error.strerror or "no reason given").lower()
-    return InputError(
-        f"{name} must be a folder that can be written, got '{folder}' ({why}); "
-        "choose another folder"
-    )
+    rule, advice = "be a folder that can be written", "choose another folder"
+    return InputError(name, rule, f"'{folder}' ({why})", advice)
 
 
 def write_table(path: Path, names: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

@@ -99,7 +99,10 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **keywords: P.kwargs) -> R:
-        bound = signature.bind(*args, **keywords)
+        try:
+            bound = signature.bind(*args, **keywords)
+        except TypeError as error:
+            raise TypeError(f"{function.__qualname__}() {error}") from None
         for name, kind in known().items():
             if name in bound.arguments:
                 bound.arguments[name] = of_type(bound.arguments[name], kind, name)

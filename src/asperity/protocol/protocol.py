@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import PrivateAttr, model_validator
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.laws import get_law, registered
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme
@@ -108,6 +108,9 @@ class Protocol(Experiment):
         """Every number that the motion depends on, in SI."""
         among = {**law_parameters(get_law(self.law)), **MACHINE}
         needed = ("M",) if self.solver.inertia else ()
+        advice = "add solver.inertia = true, or leave M out"
+        counted, rule = self.solver.inertia or "M" not in self.parameters, "go with inertia"
+        require(counted, "parameters.M", rule, "solver.inertia = false", advice)
         return point_numbers(self, "protocol", among, needed, "parameters")
 
     def _level(self) -> LoadAndVelocity:

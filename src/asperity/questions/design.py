@@ -160,6 +160,15 @@ class Design(Question):
         return self
 
     @model_validator(mode="after")
+    def _used_by_draws(self) -> Design:
+        for name in ("uncertainty", "usable_share"):
+            unset = getattr(self, name) == Design.model_fields[name].get_default(
+                call_default_factory=True
+            )
+            require(self.draws or unset, name, "go with draws", "none", "add draws, like draws = 8")
+        return self
+
+    @model_validator(mode="after")
     def _one_budget(self) -> Design:
         if (self.points is None) == (self.time is None):
             rule, got = "have points or time", "none" if self.points is None else "both"

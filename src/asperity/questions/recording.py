@@ -98,7 +98,9 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
 
 
 #: Fields that say how a modulated load is read; a drift is that of sliding too.
-_OF_MODULATION = ("frequency", "exact_frequency", "harmonics", "whole_periods", "detrend")
+OF_MODULATION = ("frequency", "exact_frequency", "harmonics", "whole_periods", "detrend")
+#: Numbers of the machine, which only slip events need.
+OF_SLIPS = ("stiffness", "velocity", "mass", "normal_load")
 
 
 class Measurement(Question):
@@ -199,7 +201,7 @@ class Measurement(Question):
         if self.modulated is False or self.stick_slip:
             if named == "modulated":
                 kind = Argument("modulated", value="False")
-            for name in _OF_MODULATION[: None if self.stick_slip else -1]:
+            for name in OF_MODULATION[: None if self.stick_slip else -1]:
                 got, field = getattr(self, name), type(self).model_fields[name]
                 other = Argument("measure.stick_slip") if self.stick_slip else kind
                 rule = f"go without {other}"

@@ -256,6 +256,8 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
         raise InputError("count", f"be from 1 to {MOST_LISTED:,}", shown(count))
     rule, advice = "be at least 2 between two ends", "write { values = ['...'] } for one value"
     require(count > 1 or low == high, "count", rule, count, advice)
+    rule = "have two different ends"
+    require(count == 1 or low != high, name, rule, f"{low:g} for both", advice)
     return spaced(low, high, count, log=spacing == "log").tolist()
 
 

@@ -127,6 +127,9 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         varied = dict.fromkeys(itertools.chain(*columns), 1.0)
         with _noted(mistakes):
             require_influence(alone, {**numbers, **varied}, "axes.{}", "parameters")
+        with _noted(mistakes):
+            fixed = [name for name, origin in origins.items() if origin == "plan"]
+            require_influence(fixed, {**numbers, **varied}, "parameters.{}", "parameters")
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path, typed
 from asperity.study.axes import TEXTS
@@ -203,6 +203,8 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     """
     opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     target = output_file(out, example="results.nc")
+    outside = opened.path not in target.parents
+    require(outside, "out", "lie outside the store", f"'{out}'", "choose another folder")
     writers = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}
     write = writers.get(target.suffix.lower())
     if write is None:

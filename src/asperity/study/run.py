@@ -17,13 +17,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from asperity._processes import available_cores
+from asperity._processes import available_cores, process_count
 from asperity._version import __version__
 from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works, load_from
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
-from asperity.parameters.arguments import FilePath, at_least, typed
+from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid
@@ -49,8 +49,8 @@ def run_sweep(
     plan: SweepPlan | str | os.PathLike[str],
     out: FilePath,
     *,
-    workers: Annotated[int, at_least(1)] | Workers | None = None,
-    cluster: Annotated[int, at_least(1)] | None = None,
+    workers: Annotated[int, process_count] | Workers | None = None,
+    cluster: Annotated[int, process_count] | None = None,
     address: str | None = None,
     extend_store: bool = False,
     retry_failed: bool = False,
@@ -168,9 +168,10 @@ def _opened(
     made = root.attributes["numerics"]
     if made != numerics() and not retry:
         raise InputError(
-            f"out must be continued with the versions that began it, got '{path.name}' with "
-            f"{differences(made, numerics())}, so that last digits may differ; finish it with "
-            "those versions, or choose another store"
+            "out",
+            "be continued with the versions that began it",
+            f"'{path.name}' with {differences(made, numerics())}, so that last digits may differ",
+            "finish it with those versions, or choose another store",
         )
     old = root.grid.record
     if old == grid.record:
@@ -241,9 +242,11 @@ def _run(
             solve_chunks(job, range(grid.chunk_count), workers, counts, tick, log)
     except WorkersGoneError:
         raise InputError(
-            f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
-            f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
-            "command, which continues from there"
+            "workers",
+            "run until the sweep ends",
+            f"no answer any more ({workers.about}) after {counts.points:,} of {counts.total:,} "
+            "points",
+            "start a cluster and repeat the command, which continues from there",
         ) from None
     finally:
         with contextlib.suppress(OSError):

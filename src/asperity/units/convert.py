@@ -206,6 +206,9 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     if match is None:
         rule = f"be a finite number{' with a unit' if spec.si else ''}"
         raise InputError(name, rule, f"'{shortened(text)}'", f"write it like '{spec.example}'")
+    if re.match(r",\d", match[3]):
+        advice = f"write it like '{spec.example}', without commas"
+        raise InputError(name, "have a decimal point", f"'{shortened(text)}'", advice)
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
         rule = "carry a unit"

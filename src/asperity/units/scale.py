@@ -96,6 +96,8 @@ def _factor_by_pint(unit: str, kind: str) -> Decimal:
         what = "stress" if kind == "force" else "stress over a length"
         like = "'50 MN' for 50 MPa" if kind == "force" else "'17 GN/m' for 17 MPa/mm"
         raise _UnitError(f", a {what}", f"give the {spec.noun[2:]} on a square metre, like {like}")
+    if root != si_root and not spec.si:
+        raise _UnitError(", which has a unit", f"give a ratio, like '{spec.example}'")
     if root != si_root:
         raise _UnitError
     if registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0:

@@ -109,8 +109,11 @@ def test_time_is_spent_on_settling_and_reading():
         ({"fixed": {"V": "1 um/s"}}, "must not have what ranges has"),
         ({"draws": 4}, "uncertainty"),
         ({"draws": -1}, "draws must be at least 0"),
-        ({"uncertainty": {"lambda": "-1 um"}}, "uncertainty.lambda must not be negative"),
-        ({"uncertainty": {"Q": 1}}, "uncertainty must be of free parameters, got 'Q'"),
+        (
+            {"draws": 4, "uncertainty": {"lambda": "-1 um"}},
+            "uncertainty.lambda must not be negative",
+        ),
+        ({"draws": 4, "uncertainty": {"Q": 1}}, "uncertainty must be of free parameters, got 'Q'"),
         ({"draws": 4, "uncertainty": {"A": 0.001}}, "of free parameters, got 'A'"),
         ({"prior": 3}, "prior must be materials or priors by name"),
         ({"material": None}, "got none for lambda"),
@@ -119,6 +122,9 @@ def test_time_is_spent_on_settling_and_reading():
             {"free": ["lambda", "M"]},
             "'M', which has no influence without inertia",
         ),
+        ({"uncertainty": {"lambda": "1 nm"}}, "uncertainty must go with draws"),
+        ({"usable_share": 0.5}, "usable_share must go with draws"),
+        ({"fixed": {"M": "2 kg"}}, "fixed must be parameters that count, got 'M'"),
         ({"usable_share": 2}, "usable_share must be at most 1"),
     ],
 )

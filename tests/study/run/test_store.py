@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -453,6 +454,8 @@ def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedFo
         assert set(table["outcome"]) == {"converged", "folded", "stopped"}
     with pytest.raises(InputError, match=r"end in \.nc, \.csv, \.parquet"):
         export_store(out, tmp_path / "s.xlsx")
+    with pytest.raises(InputError, match="out must lie outside the store"):
+        export_store(out, out / "s.csv")
 
 
 def test_every_run_is_on_record(tmp_path: Path, closed_form: ClosedForm) -> None:
@@ -477,6 +480,17 @@ def test_a_plane_and_a_curve(tmp_path: Path, closed_form: ClosedForm) -> None:
     assert np.array_equal(drawn, values, equal_nan=True)
     curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"K": 2.1})
     assert np.array_equal(curve.axes[0].lines[0].get_ydata(), values[1], equal_nan=True)
+    same = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"K": "2.1e-6 N/um"})
+    assert np.array_equal(same.axes[0].lines[0].get_ydata(), values[1], equal_nan=True)
+    for at, sentence in (
+        ({"K": "2 N"}, r"at\['K'\] must be a stiffness"),
+        ({"K": math.nan}, r"at\['K'\] must be finite"),
+        ({"epsilon": 0.1}, "at must name another axis than x and y, got 'epsilon'"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at=at)
+    with pytest.raises(InputError, match="y must be another axis than x"):
+        plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", y="epsilon")
     with pytest.raises(InputError, match="did you mean 'epsilon'"):
         plot_slice(tmp_path / "s.zarr", "mu1", x="epsilom")
     with pytest.raises(InputError, match="show must be an output"):

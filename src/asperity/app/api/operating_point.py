@@ -23,7 +23,7 @@ from asperity.operating_point import (
     sourced_numbers,
 )
 from asperity.orbit import PeriodicResponse
-from asperity.parameters import obeying, point_parameters
+from asperity.parameters import MODULATION, obeying, point_parameters
 from asperity.parameters.arguments import one_of
 from asperity.units import KINDS
 
@@ -75,6 +75,9 @@ class OperatingPoint(Question):
         others = {n for result in registered().values() for n in point_parameters(result)}
         given = {n: v for n, v in self.numbers.items() if n in known or n not in others}
         refuse_foreign(law, given)
+        for name in given:
+            rule, advice = "be left out on the page", "the library and the commands take it"
+            require(name not in MODULATION, name, rule, f"{given[name]!r}", advice)
         offered = sourced_numbers(given, self.chosen_material(), "page", law)
         result = numbers_for(law, offered)
         for name in given:

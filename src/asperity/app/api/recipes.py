@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from asperity.app.api.operating_point import OperatingPoint
 from asperity.laws import get_law
 from asperity.materials import Material
+from asperity.operating_point import lacking
 from asperity.parameters import law_parameters, point_parameters
 from asperity.study.map import Axis
 from asperity.units import format_si, to_si
@@ -141,6 +142,8 @@ def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> lis
         parts.append(f'--radiation-damping "{exact_text(values["eta"], "damping")}"')
     for name in (n for n in values if n not in {"V", "epsilon", "frequency", "inertia", "eta"}):
         published = _published(material, name)
+        if lacking(name, values):
+            continue
         if values[name] != (known[name].default if published is None else published):
             parts.append(f'--set "{name}={exact_text(values[name], known[name].kind)}"')
     return parts

@@ -281,10 +281,8 @@ def compare(
     if missed := _better_at_extension(fits):
         fits |= fits_to(several, lambda _: None, missed)
     if len(fits) < 2:
-        raise InputError(
-            f"laws must be two or more that can be fitted to these data, got {len(fits)}; "
-            + "; ".join(not_compared.values())
-        )
+        rule, reasons = "be two or more that can be fitted to these data", not_compared.values()
+        raise InputError("laws", rule, len(fits), "; ".join(reasons))
     result = judge(fits)
     outliers = _common_outliers(fits)
     if outliers:

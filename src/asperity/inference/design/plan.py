@@ -187,6 +187,8 @@ def _checked(question: Design, name: str) -> DesignPlan:
     uncertainty = _uncertainties(question, known, material, truth)
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
     require_motion(truth.names, plan.motion)
+    for label in ("values", "fixed", "ranges"):
+        require_motion(getattr(question, label), plan.motion, label=label)
     if rival is not None:
         require_motion(rival.names, plan.motion, label="rival_free")
     for parameter in question.measure:

@@ -22,8 +22,10 @@ from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
     of_the_table,
+    require_counted,
     require_enough,
     require_free,
+    require_masses,
     require_motion,
     require_rows,
     start_values,
@@ -154,10 +156,8 @@ def fit(
     """
     chosen = get_law(law) if isinstance(law, str) else law
     if not chosen.rate_dependent:
-        raise InputError(
-            f"law must depend on the velocity, got {chosen.name}; its one number follows from the "
-            "mean friction"
-        )
+        advice = "its one number follows from the mean friction"
+        raise InputError("law", "depend on the velocity", chosen.name, advice)
     options = runs or RunOptions()
     several = listed_data(data, options)
     cycles = [d for d in several if isinstance(d, AveragedCycle)]
@@ -168,10 +168,8 @@ def fit(
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
     for some, what in ((cycles, "cycles of stick-slip"), (holds, "tables of holds")):
         if some and len(some) < len(several):
-            raise InputError(
-                f"data must be {what} alone or other data, got both; fit them one after the "
-                "other, with the first as the prior of the second"
-            )
+            advice = "fit them one after the other, with the first as the prior of the second"
+            raise InputError("data", f"be {what} alone or other data", "both", advice)
     numbers = _Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
@@ -181,8 +179,11 @@ def fit(
         )
 
     if cycles:
+        # A cycle needs a mass.
+        require_counted(numbers.fixed, motion, ("M", "inertia"), "cycles of stick-slip")
         objective = _cycle_objective(chosen, cycles, free, numbers)
     elif holds:
+        require_counted(numbers.fixed, motion, (), "a table of holds")
         objective = _hold_objective(chosen, joined_holds(holds), names, numbers, bare=bare)
     else:
         objective = compared(recordings)
@@ -415,12 +416,16 @@ def _objective(
     bare: bool,
 ) -> Objective:
     """The function to minimise; all inputs are checked before anything is computed."""
-    require_motion(free, motion)
     fixed, material = given.fixed, given.material
+    require_motion(free, motion)
+    require_motion(fixed, motion, label="fixed")
     if recordings:
         require_no_layer(free)
     if recordings and table is None:
         require_seen(recordings, free)
+        if not any(run.load_varies for run in recordings):
+            counted = ("M", "eta", *motion)
+            require_counted(fixed, motion, counted, "a recording of a constant load")
     # The stiffness of a recording is free, shared by all data if it is named.
     shared = "K" in free
     if table is not None and (shared or "K" in fixed):
@@ -429,6 +434,7 @@ def _objective(
     priors = given.priors(free)
     begun = start_values(law, free, given.start, material, runs=recordings)
     constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    require_masses(free, constants, motion)
     if table is not None and not recordings:
         begun, priors = of_the_table(begun, priors, constants)
     if recordings:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -251,16 +251,19 @@ def require_free(
         require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
 
 
-def require_motion(free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free") -> None:
-    """Refuse a free M without inertia and a free eta without radiation damping.
+def require_motion(
+    names: Collection[str], motion: Mapping[str, bool], *, label: str = "free"
+) -> None:
+    """Refuse M without inertia and eta without radiation damping.
 
     Parameters
     ----------
-    free : sequence of str
+    names : collection of str
+        Parameters that are free, or that the user has fixed.
     motion : mapping of str to bool
         ``inertia`` and ``radiation_damping``.
     label : str
-        Name of `free` in messages.
+        Name of `names` in messages.
 
     Raises
     ------
@@ -270,10 +273,62 @@ def require_motion(free: Sequence[str], motion: Mapping[str, bool], *, label: st
         ("M", "inertia", "inertia"),
         ("eta", "radiation_damping", "radiation damping"),
     ):
-        if name in free and not motion[option]:
+        if name in names and not motion[option]:
             got = f"'{name}', which has no influence without {word}"
-            advice = f"add {Argument(option, value='True')} or fix {name}"
+            advice = f"add {Argument(option, value='True')} or leave it out"
             raise InputError(label, "be parameters that count", got, advice)
+
+
+def require_masses(
+    free: Collection[str], constants: Mapping[str, Any], motion: Mapping[str, bool]
+) -> None:
+    """Refuse inertia without M and radiation damping without eta.
+
+    Parameters
+    ----------
+    free : collection of str
+    constants : mapping of str to number or array
+        Values of the parameters that are not free.
+    motion : mapping of str to bool
+        As of `require_motion`.
+
+    Raises
+    ------
+    InputError
+    """
+    for option, name in (("inertia", "M"), ("radiation_damping", "eta")):
+        known = name in free or np.all(np.asarray(constants.get(name, 0.0)) > 0)
+        like = Argument("fixed", name, MACHINE[name].example)
+        advice = f"add {like}, or name it in {Argument('free')}"
+        require(known or not motion[option], option, f"go with a value of {name}", "none", advice)
+
+
+def require_counted(
+    fixed: Collection[str], motion: Mapping[str, bool], counted: Collection[str], data: str
+) -> None:
+    """Refuse numbers and terms of the equation of motion on which a kind of data does not depend.
+
+    Parameters
+    ----------
+    fixed : collection of str
+        Parameters that the user has fixed.
+    motion : mapping of str to bool
+        As of `require_motion`.
+    counted : collection of str
+        Those of M, eta, eps_ratio, inertia and radiation_damping on which the data depend.
+    data : str
+        The kind of data in messages.
+
+    Raises
+    ------
+    InputError
+    """
+    rule, advice = "have an influence", "leave it out"
+    for option, included in motion.items():
+        require(option in counted or not included, option, rule, f"it with {data}", advice)
+    for name in ("M", "eta", EPS_RATIO.name):
+        given = name in fixed and name not in counted
+        require(not given, Argument("fixed", name), rule, f"it with {data}", advice)
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:

@@ -160,10 +160,11 @@ def require_no_layer(free: Sequence[str]) -> None:
     for name in free:
         if name in _LAYER:
             raise InputError(
-                f"free must be parameters of the motion in a recording, got '{name}' of an air "
-                "layer: a layer has one share of the load at one frequency of modulation, and a "
-                "step of the load passes it within a relaxation time; free eps_ratio, and take the "
-                "gap or the radius from it (asperity.air)"
+                "free",
+                "be parameters of the motion in a recording",
+                f"'{name}' of an air layer: a layer has one share of the load at one frequency of "
+                "modulation, and a step of the load passes it within a relaxation time",
+                "free eps_ratio, and take the gap or the radius from it (asperity.air)",
             )
 
 

@@ -142,10 +142,11 @@ def _given_or_measured(
         raise InputError("velocities", "be one more than the steps", got, "give both")
     if displacement is None and velocities is None:
         raise InputError(
-            f"{name} must have the displacement or velocity of the drive, got none: "
-            f"{signals.no_motion}; name a channel, like "
-            f"{Argument('columns', 'displacement', 'x')}, or give {Argument('steps')} and "
-            f"{Argument('velocities')}"
+            name,
+            "have the displacement or velocity of the drive",
+            f"none: {signals.no_motion}",
+            f"name a channel, like {Argument('columns', 'displacement', 'x')}, or give "
+            f"{Argument('steps')} and {Argument('velocities')}",
         )
     if steps is None:
         return partition(time, displacement)

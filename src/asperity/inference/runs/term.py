@@ -345,8 +345,8 @@ class RunTerm(DataTerm):
         effective = float(self.noise["effective_samples"])
         if effective < 3 * (len(self.linear) + 4):
             said.append(
-                f"the noise of {self.name} is so slow that its {self.run.time.size} samples are "
-                f"worth {max(effective, 1):.2g} samples with white noise: the intervals are rough; "
+                f"the noise of {self.name} is so slow that its {self.run.time.size} samples count "
+                f"as {max(effective, 1):.2g} independent of each other: the intervals are rough; "
                 f"give a longer window, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:

@@ -156,9 +156,11 @@ def measured_stiffness(
     share = 2 * slope / max(usual, 1e-300)
     if slope < _SEEN * se or share < _CHANGES:
         raise InputError(
-            f"span must have a force that rises with the load point's displacement, got a change by"
-            f" {share:.2g} of the friction ({2 * se / max(usual, 1e-300):.1g} standard error) from "
-            f"{low:g} to {high:g} s; give a stretch of unloading or reloading"
+            "span",
+            "have a force that rises with the load point's displacement",
+            f"a change by {share:.2g} of the friction "
+            f"({2 * se / max(usual, 1e-300):.1g} standard error) from {low:g} to {high:g} s",
+            "give a stretch of unloading or reloading",
         )
     bend, bend_se = _bend(u, t, F, slope, low, high)
     # Ratio of the true to the attenuated slope: noise of the displacement is not in the force.
@@ -203,9 +205,11 @@ def _bend(
     bend, bend_se = 4 * coefficients[2] / slope, 4 * math.sqrt(covariance[2, 2]) / slope
     if abs(bend) > min(max(_BENT * bend_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
         raise InputError(
-            f"span must have one slope of the force over the displacement, got one that changes by "
-            f"{abs(bend):.1%} ({bend_se:.1%} standard error) from {low:g} to {high:g} s: the "
-            "contact slides in a part of it; give a shorter span"
+            "span",
+            "have one slope of the force over the displacement",
+            f"one that changes by {abs(bend):.1%} ({bend_se:.1%} standard error) from {low:g} to "
+            f"{high:g} s: the contact slides in a part of it",
+            "give a shorter span",
         )
     clock = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     own = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
@@ -217,9 +221,11 @@ def _bend(
         )
         if apart > min(max(_BENT * apart_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
             raise InputError(
-                f"span must have one line of the force on the ways back and forth, got lines that "
-                f"are {apart:.1%} of the force apart ({apart_se:.1%} standard error) from {low:g} "
-                f"to {high:g} s: the contact slides in a part of it; give a shorter span"
+                "span",
+                "have one line of the force on the ways back and forth",
+                f"lines that are {apart:.1%} of the force apart ({apart_se:.1%} standard error) "
+                f"from {low:g} to {high:g} s: the contact slides in a part of it",
+                "give a shorter span",
             )
     return float(bend), float(bend_se)
 

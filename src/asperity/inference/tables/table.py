@@ -6,7 +6,6 @@ many recordings, or the JSON that ``asperity measure --json`` prints for one rec
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,6 +19,7 @@ from scipy.special import chdtr
 from asperity.arrays import Bool, Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.laws import registered
+from asperity.outputs.json import parsed_json
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
 from asperity.parameters.arguments import shown as shown_value, typed
@@ -298,7 +298,7 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
         "something else; give that or a CSV file"
     )
     try:
-        record = json.loads(text)
+        record = parsed_json(text, shown)
         modulated = record["mode"] == "modulated"
         errors, unit = record["uncertainties"], record["unit"]
         columns = {name: float(record[name]) for name in ("epsilon", "frequency", "W0")}
@@ -310,6 +310,8 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
         for i, first in enumerate(joint["names"]):
             for j, second in enumerate(joint["names"][:i]):
                 columns[f"{second}_{first}_cov"] = float(joint["matrix"][i][j])
+    except InputError:
+        raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
         raise wrong from None
     if not modulated:

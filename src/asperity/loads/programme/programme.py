@@ -82,8 +82,9 @@ class Programme:
         for i, step in enumerate(steps):
             new, reached = step.lay_out(reached, f"{name}.steps[{i}]")
             segments.extend(new)
-        got = f"{len(steps)} steps of no duration"
-        require(segments, f"{name}.steps", "take time", got, "add one such as Slide('10 s')")
+        got = "none with a duration" if steps else "none"
+        advice = "add one, such as 10 s of sliding"
+        require(segments, f"{name}.steps", "take time", got, advice)
         durations = [float(s.duration) for s in segments]
         # Frozen: attributes are set once, here.
         object.__setattr__(self, "steps", steps)

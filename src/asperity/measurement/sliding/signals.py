@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -103,7 +104,7 @@ def sliding_signals(
     if window is not None:
         rising(window, "measure.window")
     friction, weight, unit, read, signs = _friction(trace, load, force)
-    moved, is_velocity, no_motion = _motion(trace)
+    moved, is_velocity, no_motion = _motion(trace, read)
     motion = None if moved is None else moved.values
     read = [*read, *([] if moved is None else [moved])]
     names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
@@ -192,7 +193,7 @@ def _friction(
     return friction, borne, unit, read, turned
 
 
-def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
+def _motion(trace: Trace, read: Sequence[Channel]) -> tuple[Channel | None, bool, str]:
     """Displacement or velocity, whether it is a velocity, and the reason if there is neither.
 
     Of several displacements that of the load point is taken: it is what the machine imposes. A
@@ -222,4 +223,16 @@ def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
             f"'{name}' has no known unit of a {kind}; give it one, like "
             f"{Argument('units', name, unit)}"
         )
-    return None, False, reasons[0] if reasons else "neither displacement nor velocity is recorded"
+    if not reasons:
+        # Of an unread channel without a known unit anything may be meant.
+        used = [any(c is one for one in read) for c in trace.channels.values()]
+        unread = [
+            name
+            for (name, c), known in zip(trace.channels.items(), used, strict=True)
+            if not known and c.kind in (None, "length", "velocity")
+        ]
+        reasons = ["neither displacement nor velocity is recorded"]
+        if unread:
+            like = Argument("columns", "displacement", unread[0])
+            reasons = [f"no channel is called a displacement or velocity; if one is, write {like}"]
+    return None, False, reasons[0]

@@ -262,7 +262,7 @@ def one_table(
     if chosen is not None:
         wanted = chosen.strip("/")
         if wanted not in filled:
-            advice = closest(wanted, filled) if filled else f"'{path.name}' has none"
+            advice = closest(wanted, filter(None, filled)) if any(filled) else "leave it out"
             refused = InputError("read.group", "be a group with columns", f"'{chosen}'", advice)
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}

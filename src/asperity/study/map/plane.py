@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, require_influence, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
-from asperity.parameters.arguments import at_least, number, shown, typed
+from asperity.parameters.arguments import number, shown, typed
 from asperity.study.crossings import STABILITY
 from asperity.study.points import Answers
 from asperity.study.responses import answers_of_law
@@ -27,7 +27,10 @@ SHOWN = (
 #: Outputs of each point that a map keeps.
 OUTPUTS = tuple(dict.fromkeys((*SHOWN, *STABILITY)))
 
-_AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)(?:\s+|(?=%))(.*)")
+#: Most points of an axis.
+_MOST = 100_000_000
+
+_AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d{1,99})(?:\s+|(?=%))(.*)")
 
 
 @typed
@@ -56,7 +59,7 @@ class Axis:
     name: str
     low: float | str
     high: float | str
-    count: Annotated[int, at_least(0)]
+    count: int
     log: bool = False
 
     def __post_init__(self) -> None:
@@ -72,8 +75,8 @@ class Axis:
             rule = "go from a smaller to a larger value"
             got = f"{self.low:g} to {self.high:g}{_unit(parameter)}"
             raise InputError(f"axis of {self.name}", rule, got, "write the smaller end first")
-        rule = "have at least 2 points"
-        require(self.count >= 2, f"axis of {self.name}", rule, self.count, "choose 2 or more")
+        rule, got = f"have 2 to {_MOST:,} points", shown(self.count)
+        require(2 <= self.count <= _MOST, f"axis of {self.name}", rule, got, "write another number")
         if self.log and not self._ends[0] > 0:
             rule, got = "start above zero to be logarithmic", f"{self.low:g}{_unit(parameter)}"
             advice = "raise its lower end or make it linear"
@@ -157,7 +160,8 @@ class MapPlane:
     y: Axis
 
     def __post_init__(self) -> None:
-        require_influence((self.x.name, self.y.name), self.fixed, "axis of {}")
+        axes = (self.x.name, self.y.name)
+        require_influence(axes, {**self.fixed, **dict.fromkeys(axes, 1.0)}, "axis of {}")
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -227,7 +227,10 @@ def _fit_point(
     ]
     fixed = _fixed(values, [n for n in known if n not in free], record["origins"], tables)
     truth = {name: values[name] for name in free if name in values}
-    inertia = values.get("inertia", 0.0) > 0
+    inertia, damped = values.get("inertia", 0.0) > 0, values.get("eta", 0.0) > 0 or "eta" in free
+    # A material has a mass whether it counts or not.
+    without = {name for name, counts in (("M", inertia), ("eta", damped)) if not counts}
+    fixed = {name: value for name, value in fixed.items() if name not in without}
     if "noise_seed" in values:
         noise = np.random.default_rng(round(values["noise_seed"]))
         simulated = [_simulated(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
@@ -238,7 +241,7 @@ def _fit_point(
     priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
     fitted = fit(
         tables, law, free, fixed=fixed, start=truth, prior=priors or None,
-        inertia=inertia, radiation_damping=values.get("eta", 0.0) > 0 or "eta" in free,
+        inertia=inertia, radiation_damping=damped,
         profile=settings["profile"], starts=settings["starts"], seed=settings["seed"],
         # This check costs a second fit; a sweep keeps the number of warnings only.
         check_stiffness=False,

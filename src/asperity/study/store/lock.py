@@ -98,10 +98,12 @@ def _locked(path: Path) -> int:
                 return descriptor
         os.close(descriptor)
         if held:
+            user = _text(holder) or "another process"
             raise InputError(
-                f"out must not be in use, got '{path.with_suffix('').name}', which "
-                f"{_text(holder) or 'another process'} is using; wait for it or stop it (asperity "
-                "sweep status shows its progress)"
+                "out",
+                "not be in use",
+                f"'{path.with_suffix('').name}', which {user} is using",
+                "wait for it or stop it (asperity sweep status shows its progress)",
             )
 
 
