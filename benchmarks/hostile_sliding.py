@@ -128,7 +128,7 @@ def judged(seed):
         if velocities[at] or not 0.8 < hold.hold_time / (bounds[at + 1] - bounds[at]) < 1.2:
             continue
         after = (time >= bounds[at + 1]) & (time <= bounds[at + 2])
-        level = float(np.interp(bounds[at], time, clean))
+        level = float(clean[time <= bounds[at]][-1])
         off = (hold.healing - (clean[after].max() - level)) / hold.interval_95
         row["off"].append(("healing", float(off)))
     return row
