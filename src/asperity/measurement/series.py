@@ -90,7 +90,9 @@ def mean_level(time: Float, values: Float, step: float = 0.0) -> MeanLevel:
     span = float(time[0]), float(time[-1])
     if means.size < 2:
         return MeanLevel(mean, np.inf, 1.0, *span)
-    variance, dof = slow_variance(means - means.mean(), np.ones((means.size, 1)))
+    # A drift is part of the cosines already; as a power law it would count twice.
+    left, level = means - means.mean(), np.ones((means.size, 1))
+    variance, dof = slow_variance(left, level, grows=False)
     variance = variance / means.size + rounding_variance(step, float(np.std(values)))[0]
     return MeanLevel(mean, float(np.sqrt(variance)), float(dof), *span)
 
@@ -265,7 +267,7 @@ def fit_trend(matrix: Float, values: Float) -> TrendFit:
     return TrendFit(beta / scale, inverse / np.outer(scale, scale), variance, dof)
 
 
-def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
+def slow_variance(residual: Float, matrix: Float, *, grows: bool = True) -> tuple[float, int]:
     """Variance per bin of white noise as strong as the slow noise, and its degrees of freedom.
 
     Parameters
@@ -273,6 +275,8 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     residual : array, (n,)
     matrix : array, (n, p)
         The fitted columns, which have absorbed part of the noise.
+    grows : bool
+        Whether noise that grows towards zero is extrapolated to there.
     """
     n, taken = matrix.shape
     count = max(1, min(_COSINES, (n - taken) // 4))
@@ -289,5 +293,5 @@ def slow_variance(residual: Float, matrix: Float) -> tuple[float, int]:
     power = np.asarray(projections[taken:] ** 2, dtype=np.float64)
     # The fitted columns have absorbed the strongest part of noise that grows towards zero.
     lines = np.arange(1, power.size + 1) + taken / 2
-    exponent = red_exponent(lines, power, _LOG_SCATTER)
+    exponent = red_exponent(lines, power, _LOG_SCATTER) if grows else np.zeros(())
     return float(power[:count].mean() / np.mean(lines[:count] ** -exponent)), count
