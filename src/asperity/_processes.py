@@ -47,7 +47,7 @@ def process_count(value: int, name: str) -> int:
         1 <= value <= most,
         name,
         f"be from 1 to {most} processes",
-        shown(value),
+        value,
         "give another number",
     )
     return value
