@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.recording import Channel, Finding, Trace, check, derive, stress_to_force
+from asperity.recording import (
+    Channel,
+    Finding,
+    Trace,
+    check,
+    stiffness_from_friction,
+    stress_to_force,
+)
 
 N = 2000
 
@@ -298,3 +305,15 @@ def test_friction_times_load_is_a_force(rock):
     made = derive(rock, {"force": "friction * load"})
     assert np.allclose(made.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
     assert made.provenance["derived channels"] == {"force": "friction * load"}
+
+
+@pytest.mark.parametrize("text", ["1e-3 /um", "1e-3 1/um", "1e-3 friction/um", "1 /mm", 1000.0])
+def test_stiffness_in_friction_per_length(text):
+    assert stiffness_from_friction(text, "7 N") == pytest.approx(7000, rel=1e-15)
+    assert stiffness_from_friction(text, "20 MPa") == pytest.approx(20e9, rel=1e-15)
+
+
+@pytest.mark.parametrize(("k", "load"), [("1 N/um", "7 N"), ("1e-3 um", 7.0), ("-1 /um", 7.0)])
+def test_what_is_no_friction_per_length_is_refused(k, load):
+    with pytest.raises(InputError, match="stiffness_from_friction"):
+        stiffness_from_friction(k, load)

@@ -65,10 +65,14 @@ class Labelled(Displayed):
         lines = [number_line(n, getattr(self, n), self.meanings[n][1]) for n in self.shown]
         return f"{type(self).__name__}, {self.slider.law.name}, {self.outcomes()}", lines
 
-    def to_dataset(self) -> xarray.Dataset:
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
         """Arrays, drive, slider and law with units and meanings.
 
-        An axis has the name of the only quantity that varies along it, where there is one.
+        Parameters
+        ----------
+        dims : tuple of str, optional
+            Names of the axes. By default an axis has the name of the only quantity that varies
+            along it.
         """
         import xarray
 
@@ -85,7 +89,7 @@ class Labelled(Displayed):
             padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
             values[name] = padded, known[name].attributes
         varying = {name: _varying(value) for name, (value, _) in values.items()}
-        names = dimension_names(shape, varying)
+        names = dimension_names(shape, varying, dims)
         data = {
             name: (names, getattr(self, name), {"units": unit, "long_name": meaning})
             for name, (unit, meaning) in self.meanings.items()

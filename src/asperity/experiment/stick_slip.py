@@ -80,6 +80,7 @@ def stick_slip_response(
     slider: Slider,
     *,
     velocity: ArrayLike | str,
+    spring: ArrayLike | str | None = None,
     inertia: bool = True,
     radiation_damping: float | str | None = None,
     rtol: float = 1e-9,
@@ -92,6 +93,8 @@ def stick_slip_response(
         Its parameters may be arrays, which broadcast with the velocity.
     velocity : array or str
         Velocity of the drive (m/s), positive.
+    spring : array or str, optional
+        Stiffness (N/m) in the place of that of the slider.
     inertia : bool
         Whether the mass of the slider counts. Without it a slip of most laws runs away, and there
         is no cycle; `result` says so.
@@ -123,6 +126,9 @@ def stick_slip_response(
     )
     require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
+    if spring is not None:
+        stiffness: Any = spring
+        slider = Slider(slider.law, spring=stiffness, load=slider.W0, mass=slider.M)
     eta = None
     if radiation_damping is not None:
         eta = number(radiation_damping, MACHINE["eta"].label, "damping", "positive")

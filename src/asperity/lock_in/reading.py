@@ -62,8 +62,8 @@ class Phasor:
         across = self._along(np.array([-along[1], along[0]]))
         return min(across / self.amplitude if self.amplitude else math.inf, _UNKNOWN_PHASE)
 
-    def excludes(self, value: complex) -> bool:
-        """Whether `value` lies outside the confidence ellipse of 95 %."""
+    def excludes(self, value: complex, level: float = 0.95) -> bool:
+        """Whether `value` lies outside the confidence ellipse of probability `level`."""
         from scipy.special import fdtri
 
         away = np.array([value.real - self.value.real, value.imag - self.value.imag])
@@ -72,7 +72,7 @@ class Phasor:
         if not spread[0] > 1e-14 * spread[1]:
             return bool(away.any())
         distance = float(away @ np.linalg.solve(self.covariance, away)) / 2
-        return bool(distance > fdtri(2, self.dof, 0.95))
+        return bool(distance > fdtri(2, self.dof, level))
 
     @property
     def _direction(self) -> Float:
@@ -223,8 +223,8 @@ class LockInReading:
         dof = float(min(self.dof[n], self.dof[1]))
         return Phasor(complex(harmonics[n - 1]), self.covariance[np.ix_(at, at)], dof)
 
-    def half_width(self, name: str) -> float:
-        """Half width of the 95 % interval of a number, by Student's t.
+    def half_width(self, name: str, level: float = 0.95) -> float:
+        """Half width of the confidence interval of a number, by Student's t.
 
         For a phase it is pi where the amplitude of its harmonic is compatible with zero.
 
@@ -232,14 +232,16 @@ class LockInReading:
         ----------
         name : str
             As in `uncertainty`.
+        level : float
+            Probability.
         """
         from scipy.special import stdtrit
 
-        if name.startswith("phase") and not self.phasor(int(name[5:])).excludes(0):
+        if name.startswith("phase") and not self.phasor(int(name[5:])).excludes(0, level):
             return math.pi
         digits = "".join(filter(str.isdigit, name.removeprefix("W0")))
         at = {"W0": 0, "mean_force": 0, "mean_friction": 0}.get(name, int(digits or 1))
-        quantile = stdtrit(min(self.dof[at], self.dof[min(at, 1)]), 0.975)
+        quantile = stdtrit(min(self.dof[at], self.dof[min(at, 1)]), 0.5 + level / 2)
         return float(quantile) * self.uncertainty(name)
 
 

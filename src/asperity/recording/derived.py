@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -15,9 +16,11 @@ from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace
-from asperity.units import KINDS
+from asperity.units import KINDS, to_si
 from asperity.units.scale import kind_of_dimension, unit_text
 
+#: A number of friction over a length.
+_PER_LENGTH = re.compile(r"\s*([-+.\deE]+)\s*(?:friction|mu|1)?\s*/\s*(.+?)\s*")
 #: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
@@ -92,6 +95,41 @@ def stress_to_force(trace: Trace, area: float | str) -> Trace:
     note = {"area (m^2)": size, "stresses made forces": stresses}
     channels, provenance = {**trace.channels, **forces}, {**trace.provenance, **note}
     return replace(trace, channels=channels, provenance=provenance)
+
+
+def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
+    """Convert a stiffness in friction per length to force per length, K = k W.
+
+    Parameters
+    ----------
+    stiffness : float or str
+        Friction per metre, or a text such as ``"1e-3 /um"`` or ``"0.5 friction/mm"``.
+    load : float or str
+        Mean normal load W, N; or normal stress as a text such as ``"20 MPa"``.
+
+    Returns
+    -------
+    float
+        N/m; Pa/m if the load is a stress.
+
+    Raises
+    ------
+    InputError
+        If one of the two is not understood or not positive.
+    """
+    field, per_length = "stiffness_from_friction", stiffness
+    if isinstance(stiffness, str):
+        match = _PER_LENGTH.fullmatch(stiffness)
+        if match is None:
+            rule, advice = "be a friction per length", "write it like '1e-3 /um'"
+            raise InputError(f"{field}.stiffness", rule, f"'{stiffness}'", advice)
+        per_length = to_si(match[1], "dimensionless", f"{field}.stiffness")
+        per_length /= to_si(f"1 {match[2]}", "length", f"{field}.stiffness")
+    stress = isinstance(load, str) and load.rstrip().endswith(("Pa", "bar"))
+    weight = to_si(load, "pressure" if stress else "force", f"{field}.load")
+    holds, rule = float(per_length) > 0 and weight > 0, "have a positive stiffness and load"
+    require(holds, field, rule, f"{stiffness} and {load}", "check the signs")
+    return float(per_length) * weight
 
 
 def _with_channel(
