@@ -13,6 +13,7 @@ from asperity.recording import (
     Finding,
     Trace,
     check,
+    derive,
     stiffness_from_friction,
     stress_to_force,
 )
