@@ -169,8 +169,8 @@ def continuation(
         Values at which the branch starts and ends. A positive parameter whose ends differ by more
         than a factor of 2 is continued by equal factors.
     velocity : float or str
-        Pulling velocity V (m/s). Velocity, epsilon, frequency or damping are left out if it is the
-        continued parameter; `span` replaces the value of a parameter of the slider.
+        Pulling velocity V (m/s). The velocity, epsilon or frequency may be left out if it is the
+        continued parameter: `span` replaces the parameter's value in slider and arguments.
     epsilon : float or str
         Relative amplitude of the load.
     frequency : float or str

@@ -131,15 +131,6 @@ def _end(parameter: Parameter, value: Any, field: str) -> float:
     return checked
 
 
-#: Arguments of an operating point that are left out where their parameter is continued.
-_CONTINUED = {
-    "velocity": "V",
-    "epsilon": "epsilon",
-    "frequency": "frequency",
-    "radiation_damping": "eta",
-}
-
-
 def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Problem:
     """Equations and load of one operating point, parameters of shape (1,).
 
@@ -160,11 +151,8 @@ def one_problem(arguments: Mapping[str, Any], spans: Mapping[str, Any]) -> Probl
     slider: Slider = arguments["slider"]
     point = {name: arguments[name] for name in _POINT}
     moving = {continued_name(type(slider.law), name): span[0] for name, span in spans.items()}
-    for name, symbol in _CONTINUED.items():
-        once, got = symbol not in moving or point[name] is None, "a value and a span"
-        require(once, name, "be given once", got, "leave the value out")
-    for name in ("velocity", "frequency"):
-        point[name] = moving.get(_CONTINUED[name], point[name])
+    for name, symbol in (("velocity", "V"), ("frequency", "frequency")):
+        point[name] = moving.get(symbol, point[name])
         if point[name] is None:
             raise InputError(name, "be given", "None", "or continue in it")
     rule, got = "depend on the velocity to have a branch with bifurcations", slider.law.name
