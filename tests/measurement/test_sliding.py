@@ -273,6 +273,24 @@ def test_the_relaxation_is_that_at_the_end_of_a_hold(pulled, sliding_trace) -> N
     assert hold.relaxation == pytest.approx(relaxation, abs=3e-6)
 
 
+@pytest.mark.parametrize(
+    ("hold", "off", "least", "most"), [(1.0, 0.2, 0.1, 0.5), (3e3, 0.05, 0, 0.1)]
+)
+def test_slip_on_the_rise_is_in_the_uncertainty_of_its_slope(
+    pulled, sliding_trace, hold, off, least, most
+) -> None:
+    """After a short hold the contact slips on all of the rise: the slope is not the stiffness."""
+    time, slip, _, friction, _ = pulled(
+        (V, 0.0, V), (400e-6, hold, 400e-6), (500, 500 if hold < 10 else 1, 500),
+        noise=1e-5, resolution=1e-9, k=STIFFNESS,
+    )  # fmt: skip
+    (found,) = measure_sliding(sliding_trace(time, friction, slip)).holds
+    away = found.reload_slope / STIFFNESS - 1
+    assert (away < -off) == (hold < 10)
+    assert abs(away) * STIFFNESS < 2 * found.reload_uncertainty
+    assert least < found.reload_uncertainty / STIFFNESS < most
+
+
 def test_a_peak_in_the_noise_has_its_uncertainty(pulled, sliding_trace) -> None:
     time, slip, clean, friction, bounds = pulled(
         (V, 0.0, V), (8e-3, 3.0, 8e-3), (10,) * 3, noise=8e-3, resolution=2e-8

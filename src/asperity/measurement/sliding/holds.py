@@ -60,8 +60,9 @@ class HoldReading:
         Half of the 95 % interval of `healing`.
     reload_slope, reload_uncertainty : float
         Slope of friction over load-point displacement on sliding again (1/m), which is the
-        machine's stiffness over the normal load while the contact does not slip; NaN without
-        displacement or with fewer than four samples on the rise.
+        machine's stiffness over the normal load while the contact does not slip; its uncertainty
+        has an estimate of that slip. NaN without displacement or with fewer than four samples on
+        the rise.
     """
 
     start: float
@@ -155,13 +156,14 @@ def read_hold(
     slow = max(float(np.var(left)) - quick**2 * mu.size / (hold - begin), 0.0)
     # The time of its end may be off by what the cut says.
     ends = max(hold + 1, int(np.searchsorted(time, edges[1] - unsure)))
-    low, low_doubt = _rested(time[hold:ends] - edges[1], friction[hold:ends], quick)
+    low, low_doubt, falls = _rested(time[hold:ends] - edges[1], friction[hold:ends], quick)
     low_doubt = np.sqrt(low_doubt**2 + slow + rounding(friction[hold:ends][-_RESTED:]))
     peak, peak_doubt, at = _peak(time, friction, again, stop, level, quick)
     peak_doubt = float(np.sqrt(peak_doubt**2 + slow + rounding(np.array([peak]))))
     half = float(stdtrit(fit.dof, 0.975))
     healing_doubt = float(np.hypot(doubt, peak_doubt))
-    slope, slope_doubt = _reload(time, friction, displacement, again, at, edges[1], low, peak)
+    creep = -falls / abs(velocity) if velocity else np.nan
+    slope, slope_doubt = _reload(friction, displacement, again, at, low, peak, creep)
     return HoldReading(
         start=edges[0],
         end=edges[1],
@@ -182,8 +184,8 @@ def read_hold(
     )
 
 
-def _rested(since: Float, friction: Float, quick: float) -> tuple[float, float]:
-    """Friction at the end of a hold, and its uncertainty by noise.
+def _rested(since: Float, friction: Float, quick: float) -> tuple[float, float, float]:
+    """Friction at the end of a hold, its uncertainty by noise, and its rate (1/s).
 
     It falls with the logarithm of time: a line through the last part of the hold is extrapolated to
     its end. Its last sample may hold the beginning of the loading.
@@ -195,7 +197,7 @@ def _rested(since: Float, friction: Float, quick: float) -> tuple[float, float]:
     power = float(away @ away)
     slope, lever = slope_of(since, friction), (since.mean() ** 2 / power if power else 0.0)
     end = float(friction.mean() - slope * since.mean())
-    return end, quick * float(np.sqrt(1 / friction.size + lever))
+    return end, quick * float(np.sqrt(1 / friction.size + lever)), slope
 
 
 def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
@@ -299,16 +301,21 @@ def _smoothed(values: Float, wide: int) -> Float:
 
 
 def _reload(
-    time: Float,
     friction: Float,
     displacement: Float | None,
     again: int,
     top: int,
-    resumed: float,
     low: float,
     peak: float,
+    creep: float,
 ) -> tuple[float, float]:
-    """Slope of friction over displacement on the rise, and its uncertainty."""
+    """Slope of friction over displacement on the rise, and its uncertainty.
+
+    The contact slips a little on the rise, so that the slope is below the stiffness. When the drive
+    starts, the rate of friction jumps by the stiffness times the velocity of the drive: the slope
+    at the beginning of the rise plus `creep`, the fall of friction during the hold over that
+    velocity (1/m). The difference is a part of the uncertainty.
+    """
     if displacement is None or not np.isfinite(low) or top - again < 4:
         return np.nan, np.nan
     mu = friction[again : top + 1]
@@ -317,13 +324,21 @@ def _reload(
     end = int(np.argmax(mu > below))
     if end - begin < 4:
         return np.nan, np.nan
-    x, y = displacement[again + begin : again + end], mu[begin:end]
-    away = np.abs(x - x[0])
-    away = away - away.mean()
+    x = np.abs(displacement[again : again + end] - displacement[again])
+    slope, doubt = _line(x[begin:], mu[begin:end])
+    if not np.isfinite(slope) or not np.isfinite(creep):
+        return slope, doubt
+    start = float(np.polynomial.Polynomial.fit(x, mu[:end], 2).deriv()(0.0))
+    return slope, float(np.hypot(doubt, start + creep - slope))
+
+
+def _line(x: Float, y: Float) -> tuple[float, float]:
+    """Slope of y over x, and its standard uncertainty in noise that neighbours share."""
+    away = x - x.mean()
     power = float(away @ away)
     if power <= 0:
         return np.nan, np.nan
-    slope = float(away @ y) / power
+    slope = slope_of(x, y)
     residual = y - y.mean() - slope * away
     spread = float(residual @ residual) / max(y.size - 2, 1) * _inflation(residual)
     return slope, float(np.sqrt(spread / power))
