@@ -243,10 +243,11 @@ def _holds(measurement: SlidingMeasurement) -> list[Section]:
             (hold.relaxation, hold.relaxation_uncertainty),
             (hold.peak, 0.0),
             (hold.healing, hold.healing_uncertainty),
+            (1e-3 * hold.reload_slope, 1e-3 * hold.reload_uncertainty),
         )
         cells = [_number(value, doubt) if doubt else f"{value:.5g}" for value, doubt in numbers]
-        reload = f"{1e-3 * hold.reload_slope:.3g}" if math.isfinite(hold.reload_slope) else "-"
-        table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells, reload))
+        cells[-1] = cells[-1] if math.isfinite(hold.reload_slope) else "-"
+        table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells))
     head = ("from (s)", "hold (s)", "level", "relaxation", "peak", "healing", "reload (1/mm)")
     sections = [Section("holds", head=head, rows=tuple(table))]
     if (rate := measurement.healing) is not None:
