@@ -158,6 +158,20 @@ def test_noise_is_no_sideband_of_few_periods(made, trace) -> None:
     assert checks["leakage"].verdict == "bad"
 
 
+def test_spikes_have_no_share_in_the_numbers(made, trace) -> None:
+    """Nor in the search for the modulation, of which they are many times larger."""
+    time, load, force = made(epsilon=0.01)
+    rng = np.random.default_rng(3)
+    for values, size in ((load, 10.0), (force, 1.0)):
+        values[rng.choice(time.size, 12, replace=False)] += size * rng.choice([-1, 1], 12)
+    found = measure(trace(time, load, force))
+    first = found.reading.phasor(1)
+    assert found.samples.dropped == 24
+    assert abs(found.reading.epsilon - 0.01) < 4 * found.reading.uncertainty("epsilon") < 1e-4
+    assert abs(first.amplitude - 2e-3) < 4 * first.amplitude_uncertainty < 4e-5
+    assert "spike" in {c.name for c in found.checks if c.verdict != "ok"}
+
+
 def test_a_pause_with_a_saturated_gauge_is_named(truth, protocol, trace) -> None:
     """Its level is too low, and with it the change of friction."""
     time, load, force = protocol(truth, noise=3e-2)

@@ -336,7 +336,9 @@ def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None
     time = samples.time
 
     def about(start: float, end: float) -> list[Check]:
-        count = int(np.sum((time >= start) & (time <= end)))
+        # Spikes and missing values are no usable samples.
+        recorded = samples.trace.time
+        count = int(np.sum((recorded >= start) & (recorded <= end)))
         return checks.findings(about_window(samples, start, end), count, end - start)
 
     answers = about(float(time[first]), float(time[stop - 1]))

@@ -16,6 +16,7 @@ from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError, require
 from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
 from asperity.recording.defects.sampling import even_times
+from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 from asperity.recording.roles import role_of
 
@@ -232,12 +233,12 @@ class Samples:
     names : (str, str)
         Names of the two channels.
     defects : int array
-        Indices of samples that are saturated, are spikes, or follow a gap or a missing sample, in
+        Indices of samples that are saturated, or follow a gap, a missing sample or a spike, in
         rising order.
     findings : tuple of Finding
         About time and these two channels.
     dropped : int
-        Number of samples of the recording that were left out.
+        Number of samples of the recording that were left out, spikes among them.
     unread : int
         Number of findings about channels that are not read.
     trace : Trace
@@ -292,8 +293,10 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     time, values = even_times(trace.time), (turned_load, turned_force)
     names_found = {finding.name for finding in findings}
     keep = None
-    if names_found & {"missing values", "infinite", "backward time", "repeated time"}:
+    if names_found & {"missing values", "infinite", "backward time", "repeated time", "spike"}:
         keep = usable_rows(time, values)
+        for channel in values:
+            keep[np.flatnonzero(keep)[spikes(channel[keep])]] = False
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < _FEWEST:
         recorded = {names[0]: W.values, names[1]: F.values}
