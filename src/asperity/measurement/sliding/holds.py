@@ -326,7 +326,8 @@ def _reload(
         return np.nan, np.nan
     x = np.abs(displacement[again : again + end] - displacement[again])
     slope, doubt = _line(x[begin:], mu[begin:end])
-    if not np.isfinite(slope) or not np.isfinite(creep):
+    # A coarse displacement may have two values, and no bend.
+    if not np.isfinite([slope, creep]).all() or np.unique(x).size < 3:
         return slope, doubt
     start = float(np.polynomial.Polynomial.fit(x, mu[:end], 2).deriv()(0.0))
     return slope, float(np.hypot(doubt, start + creep - slope))
