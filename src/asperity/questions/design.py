@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from asperity.errors import InputError, require
 from asperity.questions.fit import Priors
-from asperity.questions.record import Given, Names, Question, Record, quantity
+from asperity.questions.record import Given, Names, Question, Record, Whole, quantity
 
 #: Readings, levels of an axis, and draws at most.
 MOST, _MOST_DRAWS = 100_000, 1000
@@ -33,7 +33,7 @@ class Range(Record):
     values: tuple[Given, ...] | None = None
     from_: Given | None = Field(default=None, alias="from")
     to: Given | None = None
-    levels: Annotated[StrictInt, Field(ge=2, le=MOST)] = 7
+    levels: Annotated[Whole, Field(ge=2, le=MOST)] = 7
     spacing: Literal["log", "linear"] | None = None
 
     @model_validator(mode="before")
@@ -126,7 +126,7 @@ class Design(Question):
     measure: Names = ()
     rival: str | None = None
     rival_free: Names | None = None
-    points: Annotated[StrictInt, Field(ge=1, le=MOST)] | None = None
+    points: Annotated[Whole, Field(ge=1, le=MOST)] | None = None
     time: quantity("time", "positive") | None = None  # type: ignore[valid-type]
     settling_slip: quantity("length", "not negative") | None = None  # type: ignore[valid-type]
     integration: quantity("time", "not negative") | None = None  # type: ignore[valid-type]
@@ -134,12 +134,12 @@ class Design(Question):
     prior: Priors = Field(default_factory=dict)
     values: dict[str, Given] = Field(default_factory=dict)
     fixed: dict[str, Given] = Field(default_factory=dict)
-    draws: Annotated[StrictInt, Field(ge=0, le=_MOST_DRAWS)] = 0
+    draws: Annotated[Whole, Field(ge=0, le=_MOST_DRAWS)] = 0
     uncertainty: dict[str, Given] = Field(default_factory=dict)
     usable_share: Annotated[quantity("dimensionless"), Field(gt=0, le=1)] = 0.9  # type: ignore[valid-type]
     inertia: StrictBool = False
     radiation_damping: StrictBool = False
-    seed: Annotated[StrictInt, Field(ge=0, le=2**31 - 1)] = 0
+    seed: Annotated[Whole, Field(ge=0, le=2**31 - 1)] = 0
 
     @model_validator(mode="after")
     def _one_aim(self) -> Design:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import PositiveInt, ValidationError, WrapValidator
+from pydantic import Field, StrictBool, StrictFloat, ValidationError, WrapValidator
 
 from asperity.errors import InputError, MistakesError
 from asperity.loads import ProgrammeStep
 from asperity.questions.point import Point
-from asperity.questions.record import Record, quantity, shown
+from asperity.questions.record import Record, Whole, quantity, shown
 
 
 class ProtocolError(MistakesError):
@@ -59,7 +59,7 @@ class Repeat(Record):
     steps : tuple of str, ProgrammeStep or Repeat
     """
 
-    repeat: PositiveInt
+    repeat: Annotated[Whole, Field(gt=0)]
     steps: tuple[str | Repeat | ProgrammeStep, ...]
 
 
@@ -79,7 +79,7 @@ class ProtocolStart(Record):
 
     velocity: quantity("velocity")  # type: ignore[valid-type]
     load: quantity("force") | None = None  # type: ignore[valid-type]
-    states: tuple[float, ...] | None = None
+    states: tuple[StrictFloat, ...] | None = None
 
 
 class Track(Record):
@@ -97,9 +97,9 @@ class Track(Record):
         Where on the track the slider begins (m).
     """
 
-    amplitude: float
+    amplitude: StrictFloat
     length: quantity("length")  # type: ignore[valid-type]
-    exponent: float = 2.0
+    exponent: StrictFloat = 2.0
     origin: quantity("length") = 0.0  # type: ignore[valid-type]
 
 
@@ -120,11 +120,11 @@ class SolverSettings(Record):
         Largest number of steps of the integration; that of `asperity.transient` by default.
     """
 
-    inertia: bool = False
+    inertia: StrictBool = False
     sampling: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
-    rtol: float = 1e-9
+    rtol: StrictFloat = 1e-9
     method: Literal["auto", "explicit", "implicit"] = "auto"
-    most_steps: float | None = None
+    most_steps: StrictFloat | None = None
 
 
 class Experiment(Point):

@@ -7,7 +7,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WrapValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    StrictBool,
+    StrictFloat,
+    WrapValidator,
+    model_validator,
+)
 
 from asperity.errors import Argument, InputError, require
 from asperity.questions.record import (
@@ -17,6 +24,7 @@ from asperity.questions.record import (
     Record,
     Seconds,
     Span,
+    Whole,
     quantity,
     shown,
 )
@@ -58,8 +66,8 @@ class NormalPrior(Record):
         In SI, or texts with units.
     """
 
-    mean: float | str
-    std: float | str
+    mean: StrictFloat | str
+    std: StrictFloat | str
 
     @model_validator(mode="before")
     @classmethod
@@ -113,9 +121,9 @@ class Estimation(Record):
 
     free: Names | None = None
     prior: Priors = Field(default_factory=dict)
-    profile: bool = False
-    starts: Annotated[int, Field(ge=0, le=10_000)] = 64
-    seed: Annotated[int, Field(ge=0)] = 0
+    profile: StrictBool = False
+    starts: Annotated[Whole, Field(ge=0, le=10_000)] = 64
+    seed: Annotated[Whole, Field(ge=0)] = 0
 
 
 class FitOptions(Estimation):
@@ -147,13 +155,13 @@ class FitOptions(Estimation):
     fixed: dict[str, Given] = Field(default_factory=dict)
     start: dict[str, Given] = Field(default_factory=dict)
     material: str | None = None
-    inertia: bool = False
-    radiation_damping: bool = False
+    inertia: StrictBool = False
+    radiation_damping: StrictBool = False
     trend: Literal["none", "linear", "quadratic"] = "linear"
-    drift: bool = False
+    drift: StrictBool = False
     initial: Literal["steady", "free"] = "steady"
     gauge: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
-    gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
+    gauge_order: Annotated[Whole, Field(ge=1, le=8)] = 1
     fit_rate: float | str | None = None
     stiffness_from: Span | None = None
 

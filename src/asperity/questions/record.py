@@ -17,6 +17,7 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    StrictInt,
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
@@ -185,6 +186,14 @@ def quantity(kind: str, rule: str = "finite") -> Any:
         "examples": [spec.example],
     }
     return Annotated[float, BeforeValidator(in_si), WithJsonSchema(schema)]
+
+
+def _plain_integer(value: Any) -> Any:
+    return int(value) if isinstance(value, np.integer) else value
+
+
+#: A whole number; neither `true` nor a text.
+Whole = Annotated[StrictInt, BeforeValidator(_plain_integer)]
 
 
 def _one_or_several(value: Any) -> Any:

@@ -8,10 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Seconds, Span, quantity, shown
+from asperity.questions.record import Question, Seconds, Span, Whole, quantity, shown
 
 Column = str | int
 
@@ -138,19 +138,19 @@ class Measurement(Question):
     subject = "measure"
     prefix = "measure."
 
-    modulated: bool | None = None
+    modulated: StrictBool | None = None
     load: str = "W"
     force: str = "F"
     frequency: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
-    exact_frequency: bool = False
-    harmonics: Annotated[int, Field(ge=1, le=64)] = 4
+    exact_frequency: StrictBool = False
+    harmonics: Annotated[Whole, Field(ge=1, le=64)] = 4
     window: Span | None = None
-    whole_periods: bool = False
+    whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
     steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
     velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
-    stick_slip: bool | None = None
+    stick_slip: StrictBool | None = None
     stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]
     velocity: quantity("velocity", "positive") | None = None  # type: ignore[valid-type]
     mass: quantity("mass", "positive") | None = None  # type: ignore[valid-type]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PositiveInt, model_validator
+from pydantic import Field, StrictFloat, model_validator
 
 from asperity.errors import MistakesError, require
 from asperity.questions.fit import Estimation
 from asperity.questions.point import Point
-from asperity.questions.record import Given, Names, Record
+from asperity.questions.record import Given, Names, Record, Whole
 
 
 class PlanError(MistakesError):
@@ -41,7 +41,7 @@ class AxisTable(Record):
 
     from_: Given | None = Field(default=None, alias="from")
     to: Given | None = None
-    count: PositiveInt | None = None
+    count: Annotated[Whole, Field(gt=0)] | None = None
     spacing: Literal["linear", "log"] | None = None
     values: tuple[Given, ...] | None = None
     zip: Mapping[str, tuple[Given, ...]] | None = None
@@ -86,8 +86,8 @@ class ThresholdTable(Record):
         Number of stiffnesses solved before the search, at equal ratios.
     """
 
-    between: tuple[float, float] = (0.3, 4.0)
-    scan: Annotated[PositiveInt, Field(lt=2**63)] = 24
+    between: tuple[StrictFloat, StrictFloat] = (0.3, 4.0)
+    scan: Annotated[Whole, Field(gt=0, lt=2**63)] = 24
 
 
 class NumberTable(Record):
@@ -127,8 +127,8 @@ class TransientTable(Record):
     steps: tuple[str, ...]
     numbers: Mapping[str, NumberTable]
     sampling: float | str
-    rtol: float = 1e-9
-    most_steps: float = 2e6
+    rtol: StrictFloat = 1e-9
+    most_steps: StrictFloat = 2e6
 
 
 class FitTable(Estimation):
@@ -176,8 +176,8 @@ class Sweep(Point):
     axes: Mapping[str, AxisTable]
     solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
     outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    seed: int = Field(default=0, ge=0)
-    chunk: PositiveInt | None = None
+    seed: Annotated[Whole, Field(ge=0)] = 0
+    chunk: Annotated[Whole, Field(gt=0)] | None = None
     threshold: ThresholdTable = ThresholdTable()
     transient: TransientTable | None = None
     fit: FitTable | None = None

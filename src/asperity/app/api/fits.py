@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
@@ -29,7 +29,7 @@ from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
-from asperity.questions.record import Seconds, Span
+from asperity.questions.record import Seconds, Span, Whole
 from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 
@@ -92,10 +92,10 @@ class Fitted(Question, FitOptions):
     tables: Annotated[tuple[Table, ...], Field(max_length=10)] = ()
     rows: Annotated[tuple[dict[str, Cell], ...], Field(max_length=1000)] = ()
     runs: Annotated[tuple[Run, ...], Field(max_length=10)] = ()
-    posterior: bool = False
-    chains: Annotated[int, Field(ge=2, le=8)] = 4
-    draws: Annotated[int, Field(ge=100, le=10_000)] = 1000
-    report: bool = False
+    posterior: StrictBool = False
+    chains: Annotated[Whole, Field(ge=2, le=8)] = 4
+    draws: Annotated[Whole, Field(ge=100, le=10_000)] = 1000
+    report: StrictBool = False
     names: Names = "friction"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from asperity.app.api import recipes
 from asperity.app.api.operating_point import Name, OperatingPoint, Value
@@ -14,6 +14,7 @@ from asperity.app.endpoints import Answer, Job, Question
 from asperity.errors import require
 from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
+from asperity.questions.record import Whole
 from asperity.study.map import SHOWN, Axis, response_map
 from asperity.study.map.dataset import boundary_lines
 
@@ -30,7 +31,7 @@ class MapAxis(Question):
     name: Name
     low: Value
     high: Value
-    log: bool = False
+    log: StrictBool = False
 
 
 class MapQuestion(OperatingPoint):
@@ -48,7 +49,7 @@ class MapQuestion(OperatingPoint):
     x: MapAxis
     y: MapAxis
     show: Name = "growth_rate"
-    count: Annotated[int, Field(ge=2, le=_FINEST)] = 64
+    count: Annotated[Whole, Field(ge=2, le=_FINEST)] = 64
 
     def axes(self, count: int) -> tuple[Axis, Axis]:
         """Axes with `count` points each."""

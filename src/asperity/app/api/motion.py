@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import StrictFloat
 
 from asperity.app.api.operating_point import OperatingPoint, epsilon_on_contacts
 from asperity.app.endpoints import Job
@@ -49,7 +50,7 @@ class Motion(OperatingPoint):
         Growth rate of the slowest mode (1/s).
     """
 
-    growth_rate: float | None = None
+    growth_rate: StrictFloat | None = None
 
 
 class Cycles(NamedTuple):

@@ -27,7 +27,7 @@ from asperity.inference.fitting.minima import FAR_OFF, GAIN, extends
 from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit, fit_record
 from asperity.inference.runs.assembly import RunOptions
-from asperity.inference.tables.residuals import residuals_of, weights_of
+from asperity.inference.tables.residuals import DESCRIBED, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm, all_converged
 from asperity.inference.unknowns import UnfittableLawError
@@ -44,8 +44,6 @@ Report = Callable[[float], None]
 _STEPS = 100
 #: Random starts of a fit that is repeated without outliers.
 _STARTS_WITHOUT_OUTLIERS = 16
-#: Outliers are searched for only if the p-value of chi-squared is below this.
-_DESCRIBED = 0.01
 #: Factors of amplitude, velocity and frequency at which the predictions of two laws are compared.
 _FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 #: Largest amplitude on the contacts for that comparison.
@@ -349,7 +347,7 @@ def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
     """The smallest set of rows without which a law describes the data."""
     lists = [list(f.outliers) for f in fits.values() if f.converged and len(f.residuals) == 1]
     if not lists or any(
-        f.converged and (f.dof <= 0 or f.p_value >= _DESCRIBED) for f in fits.values()
+        f.converged and (f.dof <= 0 or f.p_value >= DESCRIBED) for f in fits.values()
     ):
         return []
     return min((rows for rows in lists if rows), key=len, default=[])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
@@ -25,7 +26,12 @@ from asperity.inference.fitting.intervals import (
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.objective import Minimum, Objective, Residuals, log_density
-from asperity.inference.tables.residuals import outlying_rows
+from asperity.inference.tables.residuals import (
+    DESCRIBED,
+    outlying_rows,
+    p_value_without,
+    weights_without,
+)
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 from asperity.units import quantity_text
@@ -100,9 +106,12 @@ def described_fit(
         )
         return replace(result, warnings=(lost, *result.warnings))
     outliers, lower = _outliers(objective, at)
-    if lower is not None:
-        again = [lower, *minima]
-        return described_fit(objective, again, profile=profile, described=described)
+    while lower is not None:
+        lower = Minimum(objective.ordered(lower.u), lower.chi2)
+        minima, at = [lower, *minima], parabola_of(objective, *lower) or at
+        if outliers and at.p_value < DESCRIBED:
+            break
+        outliers, lower = _outliers(objective, at)
     # If the data contradict the law, a search for orbits would not improve the intervals.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
@@ -513,10 +522,9 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
     if len(objective.terms) > 1:
         data = objective.data_residuals(at.u)
         return tuple(outlying_rows(data[tables[0]])) if data else (), None
-    (term,) = objective.terms_of(LockInTerm)
     u = at.u
 
-    def whole(u: Float) -> Residuals | None:
+    def whole(objective: Objective) -> Residuals | None:
         data = objective.data_residuals(u)
         if data is None:
             return None
@@ -527,14 +535,19 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
             row=np.concatenate([data[0].row, np.full(values.size, -1)]),
         )
 
-    def refit(weights: Float) -> Residuals | None:
+    def refit(objective: Objective, weights: Float) -> Residuals | None:
         nonlocal u
+        (term,) = objective.terms_of(LockInTerm)
         weighted = replace(objective, terms=(term.weighted(weights),))
         u, _ = weighted.minimise(u, tolerance=_REFIT_TOLERANCE, evaluations=_EVALUATIONS)
-        return whole(u)
+        return whole(objective)
 
-    now = whole(u)
-    outliers = () if now is None else tuple(outlying_rows(now, refit))
+    now, coarse = whole(objective), objective.coarser()
+    outliers = () if now is None else tuple(outlying_rows(now, partial(refit, coarse)))
+    if now is not None and outliers and coarse is not objective:
+        without = refit(objective, weights_without(now, outliers))
+        if without is None or not p_value_without(without, outliers) >= DESCRIBED:
+            outliers = ()
     if u is at.u or not (outliers or at.p_value >= FAR_OFF):
         return outliers, None
     end = objective.minimise(u)

@@ -210,7 +210,7 @@ _CHANCE = 1e-4
 #: rows for each.
 _SHARE, _OTHERS_EACH = 0.1, 3
 #: Chi-squared of the other rows must have at least this probability.
-_DESCRIBED = 0.01
+DESCRIBED = 0.01
 #: Largest change of a coordinate for which predictions count as linear.
 _FARTHEST = 0.3
 #: Largest numbers of reweighted fits (for the sum of distances) and of fits to the nearest rows.
@@ -248,7 +248,7 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
     """
     rows = np.unique(residuals.row[residuals.row >= 0])
     most = max(1, int(_SHARE * rows.size), min(2, rows.size // (1 + _OTHERS_EACH)))
-    if not _p_value(residuals, ()) < _DESCRIBED:
+    if not p_value_without(residuals, ()) < DESCRIBED:
         return []
     refit = refit or partial(_linear_refit, residuals)
 
@@ -266,7 +266,7 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
         for _ in range(_REWEIGHTED):
             now = fitted(np.maximum(row_distances(now), 1.0) ** -0.5)
             before, apart = apart, _chi2(now, farthest_of(now))
-            if apart > _FALLING * before and _p_value(now, farthest_of(now)) < _FAR_OFF:
+            if apart > _FALLING * before and p_value_without(now, farthest_of(now)) < _FAR_OFF:
                 # The law is wrong for most rows, and further fits do not improve this.
                 return []
         out: set[int] = set()
@@ -275,13 +275,13 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
             if farthest == out:
                 break
             out = farthest
-            now = fitted(_without(residuals, out))
+            now = fitted(weights_without(residuals, out))
         while near := {row for row in out if _chance(now, row, out) * rows.size > _CHANCE}:
             out -= near
-            now = fitted(_without(residuals, out))
+            now = fitted(weights_without(residuals, out))
     except _NoFitError:
         return []
-    if not _p_value(now, out) >= _DESCRIBED:
+    if not p_value_without(now, out) >= DESCRIBED:
         return []
     return sorted(out, key=lambda row: -row_distances(now)[row])
 
@@ -309,14 +309,14 @@ def row_distances(residuals: Residuals) -> Float:
     return np.asarray(np.sqrt(squares / np.maximum(np.bincount(row), 1)))
 
 
-def _without(residuals: Residuals, out: Collection[int]) -> Float:
+def weights_without(residuals: Residuals, out: Collection[int]) -> Float:
     """Weights without the rows in `out`."""
     weights = np.ones(residuals.row.max() + 1)
     weights[list(out)] = 0.0
     return weights
 
 
-def _p_value(residuals: Residuals, out: Collection[int]) -> float:
+def p_value_without(residuals: Residuals, out: Collection[int]) -> float:
     """Probability of chi-squared of the kept rows; NaN without degrees of freedom."""
     kept = ~np.isin(residuals.row, list(out))
     dof = int(kept.sum()) - int(residuals.jacobian.any(0).sum())
