@@ -177,10 +177,12 @@ def _by_few_rows(
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
-    minima = _on_all_rows(objective, _roughly_minimised(coarse, starts, progress))
+    roughly = _roughly_minimised(coarse, starts, progress)
+    minima = _on_all_rows(objective, roughly)
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
-    if minima:
+    # A law that is far off for few rows does not describe all of them.
+    if minima or (again and roughly and _far_off(coarse, roughly[0])):
         return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
     again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
@@ -210,11 +212,16 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
     """Minima of all rows from those of the coarse objective that may be as good as the best."""
     ends = distinct(ends, _SAME_COARSE)
     minima: list[Minimum] = []
+    before: list[Minimum] = []
     coarser = objective.coarser()
     for end in ends:
         if minima and end.chi2 > ends[0].chi2 + _CONTINUED:
             break
         near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        before.append(near)
+        if len(distinct(before, _SAME_COARSE)) < len(before):
+            before.pop()
+            continue
         far_off = _far_off(coarser, near)
         if not far_off and not math.isfinite(objective.chi2(near.u)):
             # Transients do not reach orbits that are hardly stable; continuation does, in up to
