@@ -1,15 +1,15 @@
-"""Orbits followed in frequency, from a modulation so fast that the averaged limit holds.
-
-Each point has a step length: it grows after a success and shrinks after a failure.
-"""
+"""Orbits followed in frequency, from a modulation so fast that the averaged limit holds."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import equinox as eqx
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import remeshed, solve
@@ -23,10 +23,8 @@ Float = NDArray[np.float64]
 
 #: Rate per radian of a perturbation at which the averaged limit is close enough to start from.
 _FAST_MODULATION = 0.02
-#: Lengths of the first and shortest step (fractions of the path), and largest number of steps.
-_FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
-#: Change of the length of a step after a success and after a failure.
-_GROWTH, _SHRINKAGE = 1.6, 0.35
+#: Length of the first step (a fraction of the path), and largest number of steps.
+_FIRST_STEP, _MOST_STEPS = 0.02, 250
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED, _NEWTON_STEPS = 1e-5, 10
 
@@ -64,27 +62,71 @@ def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, I
     chunk = mesh_chunk(problem.system.size)
     for part, value in run_chunks(_rate, (problem,), everyone, chunk):
         rate[part] = value
-    end = np.asarray(problem.system.omega)
-    first = end * np.maximum(rate / _FAST_MODULATION, 1.0)
-    orbit, active = orbits_from_averaged_limit(_at_frequency(problem, first), everyone)
-    reached, step = np.zeros(points), np.full(points, _FIRST_STEP)
-    for _ in range(_MOST_STEPS):
-        if not len(active):
-            break
-        # Evenly in the logarithm of the frequency.
-        trial = np.minimum(1.0, reached + step)
-        inputs = (_at_frequency(problem, first * (end / first) ** trial), orbit)
-        for part, (moved, error) in run_chunks(_advance, inputs, active, chunk):
+    faster = np.maximum(rate / _FAST_MODULATION, 1.0)
+    orbit, rows = orbits_from_averaged_limit(_faster(problem, faster), everyone)
+    paths = FrequencyPaths(problem, faster, orbit)
+    why = follow(paths, np.full(points, _FIRST_STEP), rows=rows, most=_MOST_STEPS)
+    return paths.orbit, np.flatnonzero(np.array(why) == _ARRIVED)
+
+
+#: Reason why a path ends at the frequency of its point.
+_ARRIVED = "arrived"
+
+
+class FrequencyPaths(Curves):
+    """Orbits at falling frequency, evenly in its logarithm.
+
+    Parameters
+    ----------
+    problem : Problem
+    faster : array, shape (points,)
+        Frequency at the beginning of each path over that of its point.
+    orbit : Orbit
+        Orbits there.
+    """
+
+    control = StepControl(
+        shortest=1e-4,  # in fractions of the path
+        longest=1.0,
+        growth=1.6,
+        easy=_NEWTON_STEPS,
+        hard=_NEWTON_STEPS,
+        sharpest_turn=-1.0,
+        farthest=np.inf,
+        most_failures=_MOST_STEPS,
+    )
+
+    def __init__(self, problem: Problem, faster: Float, orbit: Orbit) -> None:
+        self.problem, self.faster, self.orbit = problem, faster, orbit
+        self.left = np.ones_like(faster)
+
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """No further than the frequency of the point."""
+        return np.minimum(length, self.left)
+
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Indices, Attempt]]:
+        """Collocation from the orbit at a higher frequency."""
+        inputs = _faster(self.problem, self.faster ** (self.left - length)), self.orbit
+        for part, (moved, error) in run_chunks(
+            _advance, inputs, rows, mesh_chunk(self.problem.system.size)
+        ):
             # The re-meshed orbit, which is the next guess, must also be finite.
             good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
-            put(orbit, part[good], take(moved, np.flatnonzero(good)))
-            reached[part[good]] = trial[part[good]]
-            step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
-        active = active[(reached[active] < 1) & (step[active] > _SHORTEST_STEP)]
-    return orbit, np.flatnonzero(reached >= 1)
+            none = np.zeros(len(part))
+            yield part, Attempt(moved, good, none, none, none, length[part])
+
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Keep the orbits; a path ends at the frequency of its point."""
+        put(self.orbit, rows, take(attempt.next, chosen))
+        self.left[rows] -= attempt.length[chosen]
+        return [_ARRIVED if left == 0 else "" for left in self.left[rows]]
 
 
-def _at_frequency(problem: Problem, omega: Float) -> Problem:
+def _faster(problem: Problem, factor: Float) -> Problem:
+    """The problem at a frequency that is higher by a factor."""
+    omega = np.asarray(problem.system.omega) * factor
     return problem._replace(system=eqx.tree_at(lambda q: q.omega, problem.system, omega))
 
 
