@@ -35,8 +35,9 @@ from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Branches that are followed in a call.
-CHUNK = 8
+#: Branches that are followed in a call; the last few, which may need by far the most steps, take the
+#: smaller number, in half of the time.
+CHUNK = (8, 2)
 
 
 class BranchMesh(NamedTuple):
