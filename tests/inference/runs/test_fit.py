@@ -331,7 +331,6 @@ def test_a_wrong_sample_costs_as_much_as_the_largest_departure_of_noise(found):
         term.fixed,
         linear=term.linear,
         nuisances=term.nuisances,
-        own={f"step_time_{k}": f"shift_{edge}" for k, edge in enumerate(term.run.cuts, 1)},
     )
     without.models = term.models
     without._prepare()

@@ -13,7 +13,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
@@ -51,7 +50,6 @@ from asperity.inference.runs.assembly import (
     require_seen,
     run_terms,
     shared_stiffness,
-    stiffness_in,
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser
@@ -200,18 +198,21 @@ def fit(
         minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
         return with_noise(objective, minima, searched) if minima and recordings else (minima, True)
 
-    minima, agreed = minima_under(objective, recordings)
     cleaner = recordings
-    for _ in range(_CLEANINGS):
+    for left in reversed(range(_CLEANINGS + 1)):
+        minima, agreed = minima_under(objective, cleaner)
         if not minima or not math.isfinite(minima[0].chi2):
-            break
-        before, cleaner = cleaner, _without_wrong_samples(objective, minima[0].u, recordings)
-        if [(r.wrong or (), r.doubts) for r in before] == [(r.wrong, r.doubts) for r in cleaner]:
+            return failed_fit(objective)
+        # Samples that neither the motion nor noise explains are left out of the next fit.
+        values, terms = objective.named(minima[0].u), objective.terms_of(RunTerm)
+        before = [(run.wrong or (), run.doubts) for run in cleaner]
+        cleaner = [
+            with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
+            for run, term in zip(recordings, terms, strict=True)
+        ]
+        if not left or before == [(run.wrong, run.doubts) for run in cleaner]:
             break
         objective = compared(cleaner)
-        minima, agreed = minima_under(objective, cleaner)
-    if not minima or not math.isfinite(minima[0].chi2):
-        return failed_fit(objective)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
         minima = _with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
@@ -223,7 +224,9 @@ def fit(
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
-        begun = {**(start or {}), **_begun(result, recordings, given)}
+        laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
+        # The K of each recording begins at the fixed or shared one.
+        begun = {**(start or {}), "K": given, **laws}
         others = {n: v for n, v in numbers.fixed.items() if n != "K"}
         freed = fit(
             recordings,
@@ -241,20 +244,6 @@ def fit(
             else contradicted_stiffness(result, freed, recordings, given)
         )
     return replace(result, warnings=(*said, *result.warnings))
-
-
-def _without_wrong_samples(
-    objective: Objective, u: Float, recordings: Sequence[RecordedRun]
-) -> list[RecordedRun]:
-    """Recordings without wrong samples: those that neither the motion at u nor noise explains.
-
-    Recordings whose spikes the user has named are unchanged.
-    """
-    values, terms = objective.named(u), objective.terms_of(RunTerm)
-    return [
-        with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
-        for run, term in zip(recordings, terms, strict=True)
-    ]
 
 
 class _Given(NamedTuple):
@@ -380,18 +369,6 @@ class _Steps:
         self._report(self._total + done, self._total + total)
 
 
-def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
-    """Start of a fit with a stiffness for each recording: a fit with a fixed or shared one."""
-    laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
-    several = len(recordings) > 1
-    return laws | {
-        f"K[{run.name}]" if several else "K": (
-            laws["K"] if given is None else stiffness_in(run, given)
-        )
-        for run in recordings
-    }
-
-
 def listed_data(
     data: Data | Iterable[Data], options: RunOptions
 ) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
@@ -484,7 +461,7 @@ def _objective(
             start=begun,
             priors=priors,
             options=options,
-            **motion,
+            motion=motion,
         )
         terms += own
         unknowns += nuisances

@@ -179,8 +179,7 @@ def run_terms(
     start: Mapping[str, Any],
     priors: Mapping[str, Prior],
     options: RunOptions,
-    inertia: bool,
-    radiation_damping: bool,
+    motion: Mapping[str, bool],
 ) -> tuple[list[RunTerm], list[Unknown]]:
     """Terms of the runs, and free parameters of single runs.
 
@@ -199,7 +198,8 @@ def run_terms(
     start, priors : mapping
         Start values and priors, by names of the nuisances; K stands for the K of each run.
     options : RunOptions
-    inertia, radiation_damping : bool
+    motion : mapping of str to bool
+        ``inertia`` and ``radiation_damping``.
     """
     if len({run.name for run in runs}) < len(runs):
         twice = [run.name for run in runs]
@@ -208,36 +208,29 @@ def run_terms(
     terms, unknowns = [], []
     for run in runs:
         suffix = f"[{run.name}]" if len(runs) > 1 or beside_table else ""
-        nuisances, own = cut_delays(run, suffix)
+        nuisances = cut_delays(run, suffix)
         fixed = {name: value for name, value in constants.items() if name != "K"}
         if fixed_stiffness is not None:
             fixed["K"] = stiffness_in(run, fixed_stiffness)
         elif not shared_stiffness:
-            K = free_stiffness(run, f"K{suffix}", start, priors)
-            nuisances += (K,)
-            own[K.name] = "K"
-        if (gain := gain_of(suffix, priors)) is not None:
-            nuisances += (gain,)
-            own[gain.name] = GAIN
+            nuisances.append(free_stiffness(run, f"K{suffix}", start, priors))
+        nuisances += _gain(suffix, priors)
         if options.initial == "free":
-            begin, names = _initial(run, law, suffix)
-            nuisances += begin
-            own |= names
+            nuisances += _initial(law, suffix)
         terms.append(
             RunTerm(
                 run,
                 law,
                 fixed,
                 linear=options.linear,
-                nuisances=nuisances,
-                own=own,
+                nuisances=tuple(nuisances),
+                suffix=suffix,
                 gauge=options.gauge,
-                inertia=inertia,
-                radiation_damping=radiation_damping,
                 order=options.order,
+                **motion,
             )
         )
-        unknowns += list(nuisances)
+        unknowns += nuisances
     return terms, unknowns
 
 
@@ -300,19 +293,20 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
             )
 
 
-def _initial(
-    run: RecordedRun, law: type[Law], suffix: str
-) -> tuple[tuple[Unknown, ...], dict[str, str]]:
-    result, own = [], {}
+def _initial(law: type[Law], suffix: str) -> list[Unknown]:
+    """Departures of the initial force and states from steady sliding, as free parameters."""
     places = [("start_force", _START_FORCE)]
     places += [(f"start_state_{i}", _START_STATE) for i in range(len(law.state_names))]
-    for inner, sd in places:
-        name = inner + suffix
-        meaning = "departure of the initial state from steady sliding"
-        parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
-        result.append(about_zero(parameter, sd, 10 * sd, "wide"))
-        own[name] = inner
-    return tuple(result), own
+    meaning = "departure of the initial state from steady sliding"
+    return [
+        about_zero(
+            Parameter(name + suffix, "dimensionless", "finite", meaning, place="drive"),
+            sd,
+            10 * sd,
+            "wide",
+        )
+        for name, sd in places
+    ]
 
 
 PARAMETER = Parameter(
@@ -320,8 +314,8 @@ PARAMETER = Parameter(
 )
 
 
-def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
-    """The gain of a run as a free parameter; None without a prior.
+def _gain(suffix: str, priors: Mapping[str, Prior]) -> list[Unknown]:
+    """The gain of a run as a free parameter; none without a prior.
 
     Parameters
     ----------
@@ -333,8 +327,8 @@ def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
     name = GAIN + suffix
     prior = priors.get(name, priors.get(GAIN))
     if prior is None:
-        return None
-    return unknown_of(replace(PARAMETER, name=name), prior.mean, prior, None, nuisance=True)
+        return []
+    return [unknown_of(replace(PARAMETER, name=name), prior.mean, prior, None, nuisance=True)]
 
 
 def require_calibrated(
