@@ -205,7 +205,7 @@ def unknowns_of(
     law: type[Law],
     free: Sequence[str],
     *,
-    largest_epsilon: float,
+    largest_epsilon: float = 0.0,
     start: Mapping[str, float],
     priors: Mapping[str, Prior],
     usual: Mapping[str, tuple[float, float]] | None = None,
@@ -282,6 +282,22 @@ def unknown_of(
     scale = 1.0 if positive else max(abs(middle or typical), _LEAST_SCALE * typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
+
+
+def require_free_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
+    """Refuse priors of parameters that are not free, and of unknown names or runs.
+
+    Raises
+    ------
+    InputError
+    """
+    known = [unknown.name for unknown in unknowns]
+    # Names without a run stand for the parameter of each run.
+    shared = {name.partition("[")[0] for name in known}
+    for name in priors:
+        rule = f"be of free parameters ({', '.join(known)})"
+        advice = "free it, correct the name, or leave the prior out"
+        require(name in known or name in shared, "prior", rule, f"'{name}'", advice)
 
 
 def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:

@@ -455,6 +455,26 @@ def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, f
         fit([readings(), term.run], "rice-ruina", free, fixed=given)
 
 
+def test_a_stiffness_that_readings_share_may_be_given_over_the_load(found):
+    (term,) = found.objective.terms
+    run = replace(term.run, load_unit="N", W0=1000.0)
+    both = fit(
+        [readings(), run],
+        "rice-ruina",
+        [*FREE, "K"],
+        fixed={"mu0": 0.6, "V0": 1e-6, "W0": 1000.0},
+        prior={"K": Prior(coverage.STIFFNESS, 0.001 * coverage.STIFFNESS, "unloading", "1/m")},
+        start={
+            "K": f"{1e-6 * coverage.STIFFNESS} 1/um",
+            **{name: found.values[name] for name in FREE},
+        },
+        starts=1,
+    )
+    K = both.parameters["K"]
+    assert K.unit == "N/m"
+    assert K.value == pytest.approx(1000.0 * coverage.STIFFNESS, rel=0.01)
+
+
 @pytest.mark.parametrize(("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7)])
 def test_a_stiff_machine_hides_its_stiffness_and_nothing_else(monkeypatch, case, stiffness, seed):
     """The spring relaxes within 0.03 and 0.01 um of slip; samples are 0.3 to 1 um apart.

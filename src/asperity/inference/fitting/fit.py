@@ -20,13 +20,10 @@ from asperity.inference.fitting.estimated_noise import under_drift, with_noise
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
-    of_the_table,
     require_counted,
     require_enough,
-    require_free,
     require_masses,
     require_motion,
-    require_rows,
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
@@ -45,11 +42,11 @@ from asperity.inference.runs.assembly import (
     require_calibrated,
     require_newtons,
     require_no_layer,
-    require_own_priors,
     require_own_samples,
     require_seen,
     run_terms,
     shared_stiffness,
+    stiffness_of_table,
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser
@@ -59,7 +56,12 @@ from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import Prior, material_priors, unknowns_of
+from asperity.inference.unknowns import (
+    Prior,
+    material_priors,
+    require_free_priors,
+    unknowns_of,
+)
 from asperity.laws import Law, get_law
 from asperity.materials import Material
 from asperity.parameters import MACHINE, law_parameters
@@ -68,7 +70,8 @@ from asperity.recording import Trace
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
-#: Assumed mu0 (dimensionless) and V0 (m/s) for data that are measured relative to sliding.
+#: Assumed mu0 (dimensionless) and V0 (m/s) for healing: it is measured relative to sliding, so that
+#: mu0 has no influence.
 _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 
 Data = LockInTable | HealingTable | AveragedCycle | RecordedRun | Trace
@@ -168,13 +171,14 @@ def fit(
         if some and len(some) < len(several):
             advice = "fit them one after the other, with the first as the prior of the second"
             raise InputError("data", f"be {what} alone or other data", "both", advice)
+    rule = f"name a parameter of {chosen.name}"
+    fitted = names or recordings or (free is None if cycles else bare)
+    require(fitted, "free", rule, "none", "free one, such as A or eps_ratio")
     numbers = _Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
-        return _objective(
-            chosen, table, recordings, names, numbers, options=options, motion=motion, bare=bare
-        )
+        return _objective(chosen, table, recordings, names, numbers, options=options, motion=motion)
 
     if cycles:
         # A cycle needs a mass.
@@ -182,7 +186,7 @@ def fit(
         objective = _cycle_objective(chosen, cycles, free, numbers)
     elif holds:
         require_counted(numbers.fixed, motion, (), "a table of holds")
-        objective = _hold_objective(chosen, joined_holds(holds), names, numbers, bare=bare)
+        objective = _hold_objective(chosen, joined_holds(holds), names, numbers)
     else:
         objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
@@ -261,30 +265,19 @@ class _Given(NamedTuple):
 
 
 def _hold_objective(
-    law: type[Law],
-    table: HealingTable,
-    free: list[str],
-    given: _Given,
-    *,
-    bare: bool,
+    law: type[Law], table: HealingTable, free: list[str], given: _Given
 ) -> Objective:
     """The function to minimise for a table of holds; all inputs are checked."""
     numbers = law_parameters(law)
     for name in free:
         holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
         require(holds, "free", f"be parameters of {law.name} with holds", f"'{name}'", advice)
-    priors = given.priors(free)
-    require_free(law, free, priors, bare=bare)
-    # Healing is measured relative to sliding, so that mu0 has no influence.
-    assumed = {n: v for n, v in _OF_THE_LEVEL.items() if n in numbers and n not in free}
-    material = given.material
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
-    known = {n for n in assumed if material is not None and n in material} | set(fixed)
-    fixed |= {n: v for n, v in assumed.items() if n not in known}
-    constants = fixed_values(law, None, free, fixed, material)
-    begun = start_values(law, free, given.start, material)
-    unknowns = unknowns_of(law, free, largest_epsilon=0.0, start=begun, priors=priors)
-    require_rows(table.name, table.rows, unknowns)
+    constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
+    begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
+    unknowns = unknowns_of(law, free, start=begun, priors=priors)
+    require_free_priors(unknowns, priors)
+    require_enough(table.name, table.rows, unknowns)
     term = HoldTerm(table, law, constants)
     return Objective((term,), law, unknowns, constants, tolerance=1e-9)
 
@@ -316,16 +309,14 @@ def _cycle_objective(
         advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
         raise InputError(f"{missing[0]}", "be free or fixed for a fit of cycles", "neither", advice)
     priors = given.priors(names)
-    require_free(law, names, priors, bare=False)
     # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
     K = first.loading_slope * first.W0 / first.V
     M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
     begun = {"K": K, "M": M} | start_values(law, names, given.start, given.material)
     usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
-    unknowns = unknowns_of(
-        law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
-        priors=priors, usual=usual,
-    )  # fmt: skip
+    begun = {n: v for n, v in begun.items() if n in names}
+    unknowns = unknowns_of(law, names, start=begun, priors=priors, usual=usual)
+    require_free_priors(unknowns, priors)
     # A cycle needs a mass.
     unknowns = tuple(
         replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
@@ -390,7 +381,6 @@ def _objective(
     *,
     options: RunOptions,
     motion: Mapping[str, bool],
-    bare: bool,
 ) -> Objective:
     """The function to minimise; all inputs are checked before anything is computed."""
     fixed, material = given.fixed, given.material
@@ -410,10 +400,14 @@ def _objective(
     named = [name for name in free if not (name == "K" and recordings and table is None)]
     priors = given.priors(free)
     begun = start_values(law, free, given.start, material, runs=recordings)
-    constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    assumed = {}
+    if recordings and table is None:
+        first = recordings[0]
+        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
     require_masses(free, constants, motion)
-    if table is not None and not recordings:
-        begun, priors = of_the_table(begun, priors, constants)
+    if table is not None and shared:
+        begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
     if recordings:
         published = material is not None and "mu0" in material and material["mu0"].value is not None
         require_calibrated(
@@ -441,10 +435,9 @@ def _objective(
         )
     )
     terms: list[DataTerm] = []
-    if table is not None and not recordings:
-        require_free(law, free, priors, bare=bare)
     if table is not None:
-        require_enough(table, unknowns)
+        count = sum(int(np.isfinite(v).sum()) for v in table.values.values())
+        require_enough(table.name, count, unknowns)
         terms.append(LockInTerm(table, law, constants, **motion))
     if recordings:
         if shared and table is None:
@@ -465,7 +458,7 @@ def _objective(
         )
         terms += own
         unknowns += nuisances
-        require_own_priors(unknowns, priors)
+    require_free_priors(unknowns, priors)
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )

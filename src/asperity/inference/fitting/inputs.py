@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -110,34 +109,6 @@ def start_values(
     return known
 
 
-def of_the_table(
-    start: Mapping[str, Any], priors: Mapping[str, Prior], constants: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, Prior]]:
-    """Start and prior of K in N/m, converted if they are given over the load.
-
-    Raises
-    ------
-    InputError
-        If the load is no single number, or the prior is of a stress.
-    """
-    start, priors = dict(start), dict(priors)
-    prior, text = priors.get("K"), start.get("K")
-    load = np.unique(constants.get("W0", math.nan))
-    over = over_load(text)
-    elsewhere = prior is not None and prior.unit not in ("", "N/m")
-    if (over is not None or elsewhere) and not (load.size == 1 and math.isfinite(load[0])):
-        rule = "come with one fixed W0"
-        raise InputError("K over the load", rule, "several or none", "give K in N/m")
-    if text is not None:
-        start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
-    if prior is not None and elsewhere:
-        rule = "be in N/m or 1/m for a table"
-        require(prior.unit == "1/m", Argument("prior", "K"), rule, prior.unit, "convert it")
-        W0 = float(load[0])
-        priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
-    return start, priors
-
-
 def fixed_values(
     law: type[Law],
     table: LockInTable | None,
@@ -145,13 +116,13 @@ def fixed_values(
     fixed: Mapping[str, Any] | None,
     material: Material | None,
     *,
-    runs: Sequence[RecordedRun] = (),
+    assumed: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Values of all parameters that are not free, by name in SI.
 
-    Without a table, parameters of operating points are left out, and the runs supply load, mu0 (the
-    first friction) and V0 (the first velocity). If mu0 is free and V0 is not given, V0 is 1 um/s:
-    the velocity at which mu0 is reported.
+    Without a table, parameters of operating points are left out. Numbers that are given nowhere are
+    those in `assumed`. If mu0 is free and V0 is not given, V0 is 1 um/s: the velocity at which mu0
+    is reported.
 
     Raises
     ------
@@ -166,10 +137,7 @@ def fixed_values(
         known = {
             n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
         }
-    assumed = {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
-    if runs and table is None:
-        first = runs[0]
-        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    assumed = {**({"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}), **(assumed or {})}
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
         require(name not in free, name, "be free or fixed", "both", "leave one out")
@@ -233,22 +201,6 @@ def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
         return known[name].check(value)
     except InputError as error:
         raise error.about(Argument(field, key=name)) from None
-
-
-def require_free(
-    law: type[Law], free: Sequence[str], priors: Mapping[str, Prior], *, bare: bool
-) -> None:
-    """Refuse a fit to tables without free parameters unless `bare`, and priors of fixed parameters.
-
-    Raises
-    ------
-    InputError
-    """
-    rule = f"name a parameter of {law.name}"
-    require(free or bare, "free", rule, "none", "free one, such as A or eps_ratio")
-    for name in priors:
-        rule = "be of free parameters"
-        require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
 
 
 def require_motion(
@@ -331,22 +283,17 @@ def require_counted(
         require(not given, Argument("fixed", name), rule, f"it with {data}", advice)
 
 
-def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
-    """Refuse a table unless it has more data than free parameters; one each is an inversion.
+def require_enough(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
+    """Refuse a table of `count` data unless it has more of them than free parameters.
 
-    With equally many data and parameters, the minima form a valley if some parameters have no
-    influence, and no degree of freedom is left to judge the law.
+    With one datum for the only parameter, the fit is an inversion. With equally many data and
+    parameters, the minima form a valley if some parameters have no influence, and no degree of
+    freedom is left to judge the law.
 
     Raises
     ------
     InputError
     """
-    count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
-    require_rows(table.name, count, unknowns)
-
-
-def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
-    """Refuse `count` data unless they are more than the free parameters."""
     needed = sum(1 for u in unknowns if u.prior is None)
     rule, advice = (
         "hold more data than free parameters",

@@ -72,15 +72,15 @@ class RunOptions:
             number(self.gauge[1], "gauge", "frequency", "positive")
 
 
-def stiffness(run: RecordedRun) -> Parameter:
-    """K in the unit of the run's load over a length."""
-    return replace(MACHINE["K"], kind=_STIFFNESS[run.load_unit])
-
-
 def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
     """A stiffness, which may be given over the load (``"0.003 1/um"``), in the unit of the run."""
-    over = over_load(value, label) if run.load_unit else None
-    return float(stiffness(run).check(value, label)) if over is None else over * run.W0
+    return _stiffness(value, run.load_unit, run.W0, label)
+
+
+def _stiffness(value: Any, load_unit: str, W0: float, label: str) -> float:
+    over = over_load(value, label) if load_unit else None
+    parameter = replace(MACHINE["K"], kind=_STIFFNESS[load_unit])
+    return float(parameter.check(value, label)) if over is None else over * W0
 
 
 def over_load(value: Any, label: str = "K") -> float | None:
@@ -132,22 +132,6 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
         if run.time.size < needed:
             advice = "free fewer or give a longer window"
             raise UnfittableLawError(run.name, rule, run.time.size, advice)
-
-
-def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
-    """Refuse priors of parameters that are not free, and of unknown names or runs.
-
-    Raises
-    ------
-    InputError
-    """
-    known = [unknown.name for unknown in unknowns]
-    # Names without a run stand for the parameter of each run.
-    shared = {name.partition("[")[0] for name in known}
-    for name in priors:
-        rule = f"be of free parameters ({', '.join(known)})"
-        advice = "free it, correct the name, or leave the prior out"
-        require(name in known or name in shared, "prior", rule, f"'{name}'", advice)
 
 
 def require_no_layer(free: Sequence[str]) -> None:
@@ -238,26 +222,47 @@ def free_stiffness(
     run: RecordedRun, name: str, start: Mapping[str, Any], priors: Mapping[str, Prior]
 ) -> Unknown:
     """The stiffness of a run as a free parameter."""
-    parameter = replace(stiffness(run), name=name)
+    parameter = replace(MACHINE["K"], kind=_STIFFNESS[run.load_unit], name=name)
     given = start.get(name, start.get("K"))
     usual = (USUAL_STIFFNESS[0] * run.W0, USUAL_STIFFNESS[1] * run.W0)
     return unknown_of(
         parameter,
         None if given is None else stiffness_in(run, given, f"start.{name}"),
-        _prior_in(run, priors.get(name, priors.get("K"))),
+        _prior_in(priors.get(name, priors.get("K")), run.stiffness_unit, run.W0, run.name),
         usual,
     )
 
 
-def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
-    """A prior of the stiffness in the unit of a run."""
-    if prior is None or prior.unit in ("", run.stiffness_unit):
+def _prior_in(prior: Prior | None, unit: str, W0: float, data: str) -> Prior | None:
+    """A prior of the stiffness of some data in its unit."""
+    if prior is None or prior.unit in ("", unit):
         return prior
     if prior.unit == "1/m":
-        return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
-    units = " or ".join(dict.fromkeys((run.stiffness_unit, "1/m")))
-    rule = f"be in {units} for {run.name}"
-    raise InputError(Argument("prior", "K"), rule, prior.unit, "convert it")
+        return Prior(prior.mean * W0, prior.sd * W0, prior.source, unit)
+    units = " or ".join(dict.fromkeys((unit, "1/m")))
+    raise InputError(Argument("prior", "K"), f"be in {units} for {data}", prior.unit, "convert it")
+
+
+def stiffness_of_table(
+    start: Mapping[str, Any], priors: Mapping[str, Prior], W0: Any
+) -> tuple[dict[str, Any], dict[str, Prior]]:
+    """Starts and priors with those of K in N/m, converted if they are given over the load W0.
+
+    Raises
+    ------
+    InputError
+        If the load is no single number, or the prior is of a stress.
+    """
+    loads, text, prior = np.unique(W0), start.get("K"), priors.get("K")
+    if over_load(text) is not None or (prior is not None and prior.unit == "1/m"):
+        rule, got = "come with one fixed W0", "several or none"
+        one = loads.size == 1 and bool(np.isfinite(loads[0]))
+        require(one, "K over the load", rule, got, "give K in N/m")
+    load = float(loads[0])
+    of_start = {} if text is None else {"K": _stiffness(text, "N", load, "start.K")}
+    in_newtons = _prior_in(prior, "N/m", load, "a table")
+    of_prior = {} if in_newtons is None else {"K": in_newtons}
+    return {**start, **of_start}, {**priors, **of_prior}
 
 
 def shared_stiffness(
