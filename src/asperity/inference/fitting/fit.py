@@ -28,7 +28,6 @@ from asperity.inference.fitting.inputs import (
 )
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.plausibility import (
-    contradicted_sharing,
     contradicted_stiffness,
     stiffness_that_describes,
     unusual_numbers,
@@ -242,11 +241,7 @@ def fit(
             starts=1,
             seed=seed,
         )
-        said += (
-            contradicted_sharing(result, freed, recordings)
-            if shared
-            else contradicted_stiffness(result, freed, recordings, given)
-        )
+        said += contradicted_stiffness(result, freed, recordings, given)
     return replace(result, warnings=(*said, *result.warnings))
 
 

@@ -30,76 +30,47 @@ _FAR_STIFFNESS = (1e2, 1e6)
 
 
 def contradicted_stiffness(
-    fit: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
+    fit: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any = None
 ) -> list[str]:
-    """Sentences on a fixed stiffness that recordings contradict.
+    """Sentences on a stiffness that recordings contradict: a fixed one, or one that they share.
 
     Parameters
     ----------
     fit, freed : Fit
-        Fits with the stiffness fixed and free.
+        Fits with the fixed or shared stiffness, and with a free one for each recording.
     runs : sequence of RecordedRun
-    given : str or float
-        The fixed stiffness.
+    given : str or float, optional
+        The fixed stiffness; None if the recordings share a free one.
     """
-    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
+    gain = fit.aicc - freed.aicc
+    if not freed.converged or gain < _CONTRADICTED_AICC:
         return []
-    said = []
-    for run in runs:
-        estimate = freed.parameters.get("K" if len(runs) == 1 else f"K[{run.name}]")
-        if estimate is None:
-            continue
-        fixed = stiffness_in(run, given)
-        low, high = estimate.interval_95
-        if low <= fixed <= high:
-            continue
-        said.append(
-            f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
-            f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
-            f"{fit.aicc - freed.aicc:.3g} with K free"
-            + _moved(fit, freed)
-            + "; leave K free, or give it a prior"
-        )
-    return said
-
-
-def contradicted_sharing(fit: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
-    """A sentence on a stiffness that recordings share although their stiffnesses differ.
-
-    Parameters
-    ----------
-    fit, freed : Fit
-        Fits with one stiffness for all recordings, and with one for each.
-    runs : sequence of RecordedRun
-    """
-    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
-        return []
-    shared = fit.parameters["K"]
-    own = []
-    for run in runs:
-        estimate = freed.parameters[f"K[{run.name}]"]
-        low, high = estimate.interval_95
-        own.append(
-            f"{run.name} has {estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %), "
-            f"{estimate.value / shared.value:.3g} times it"
-        )
-    return [
-        f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
-        + ", ".join(own)
-        + f"; AICc falls by {fit.aicc - freed.aicc:.3g} with a K for each"
-        + _moved(fit, freed)
-        + "; leave K out of the free parameters, so that each has its own"
-    ]
-
-
-def _moved(fit: Fit, freed: Fit) -> str:
-    """Parameters of the law with the stiffness free, and before, as text."""
     moved = ", ".join(
         f"{n} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
         if n in fit.values and n in freed.values
     )
-    return f", which gives {moved}" if moved else ""
+    moved = f", which gives {moved}" if moved else ""
+    own, said = [], []
+    for run in runs:
+        K = freed.parameters["K" if len(runs) == 1 else f"K[{run.name}]"]
+        low, high = K.interval_95
+        found = f"{run.name} has {K.value:.4g} ({low:.4g} to {high:.4g}, 95 %)"
+        if given is None:
+            own.append(f"{found}, {K.value / fit.values['K']:.3g} times it")
+        elif not low <= (fixed := stiffness_in(run, given)) <= high:
+            said.append(
+                f"the fixed K of {fixed:.4g} {K.unit} is contradicted: {found}; AICc falls by "
+                f"{gain:.3g} with K free{moved}; leave K free, or give it a prior"
+            )
+    if given is None:
+        shared = fit.parameters["K"]
+        said.append(
+            f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
+            f"{', '.join(own)}; AICc falls by {gain:.3g} with a K for each{moved}; leave K out of "
+            "the free parameters, so that each has its own"
+        )
+    return said
 
 
 def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
