@@ -20,6 +20,7 @@ from jax import Array
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
+from asperity.inference.tables.table import in_all_rows
 from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import typed
@@ -137,13 +138,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
         plain = [to_si(v, kind, label) for v in values] if texts else values
         arrays[column] = np.atleast_1d(np.asarray(obeying(plain, label, kind, rule), float))
     rows = max(a.size for a in arrays.values())
-    for column, array in arrays.items():
-        if array.ndim != 1 or array.size not in (1, rows):
-            raise InputError(
-                f"{name}.{column} must have one value or {rows}, got an array of shape "
-                f"{array.shape}; give columns of one length"
-            )
-        arrays[column] = np.broadcast_to(array, (rows,)).copy()
+    arrays = {n: in_all_rows(array, rows, f"{name}.{n}") for n, array in arrays.items()}
     K = arrays["K"] / arrays["W0"] if with_load else arrays["K"]
     return HealingTable(
         name, arrays["hold_time"], arrays[HEALING], arrays.get("healing_err"), arrays["V"], K

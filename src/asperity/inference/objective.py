@@ -278,6 +278,12 @@ class Objective:
         """Names of the free parameters, in the order of the coordinates."""
         return tuple(k.name for k in self.unknowns)
 
+    @property
+    def bounds(self) -> tuple[Float, Float]:
+        """Lower and upper bounds of the coordinates, each of shape (n,)."""
+        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
+        return low, high
+
     def named(self, u: Float) -> dict[str, float]:
         """Values by name at the coordinates u."""
         return {k.name: float(k.to_value(x)) for k, x in zip(self.unknowns, u, strict=True)}
@@ -310,7 +316,7 @@ class Objective:
         if any(moved[n] <= 0 and known[n].logarithmic for n in changed):
             return u
         result = self.coordinates(moved)
-        low, high = np.array([k.bounds for k in self.unknowns]).T
+        low, high = self.bounds
         return result if ((result >= low) & (result <= high)).all() else u
 
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
@@ -409,7 +415,7 @@ class Objective:
         point = np.array(u, float)
         for i, value in kept.items():
             point[i] = value
-        low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
+        low, high = (ends[moving] for ends in self.bounds)
         # The start is so far inside the bounds that SciPy does not move it.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
@@ -481,7 +487,7 @@ class Objective:
 
     def held(self, u: Float, gradient: Float) -> Bool:
         """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
-        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
+        low, high = self.bounds
         return np.asarray(np.where(gradient > 0, u - low, high - u) < _AT_BOUND)
 
     def terms_of(self, kind: type[T]) -> list[T]:

@@ -284,20 +284,26 @@ def unknown_of(
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
 
 
-def require_free_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
-    """Refuse priors of parameters that are not free, and of unknown names or runs.
+def require_free_names(
+    unknowns: Sequence[Unknown], start: Mapping[str, Any] | None, priors: Mapping[str, Prior]
+) -> None:
+    """Refuse starts and priors of parameters that are not free, and of unknown names or runs.
+
+    Nuisances may have a prior, but no start.
 
     Raises
     ------
     InputError
     """
-    known = [unknown.name for unknown in unknowns]
-    # Names without a run stand for the parameter of each run.
-    shared = {name.partition("[")[0] for name in known}
-    for name in priors:
-        rule = f"be of free parameters ({', '.join(known)})"
-        advice = "free it, correct the name, or leave the prior out"
-        require(name in known or name in shared, "prior", rule, f"'{name}'", advice)
+    interest = [unknown for unknown in unknowns if not unknown.nuisance]
+    for label, names, some in (("start", start or {}, interest), ("prior", priors, unknowns)):
+        known = [unknown.name for unknown in some]
+        # Names without a run stand for the parameter of each run.
+        shared = {name.partition("[")[0] for name in known}
+        for name in names:
+            rule = f"be of free parameters ({', '.join(known)})"
+            advice = f"free it, correct the name, or leave the {label} out"
+            require(name in known or name in shared, label, rule, f"'{name}'", advice)
 
 
 def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:

@@ -261,7 +261,7 @@ def test_readings_that_differ_are_joined(other):
     ("options", "said"),
     [
         ({"free": ("V0",)}, "free mu0 instead"),
-        ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
+        ({"free": ("alpha",), "start": {"alpha": 0.1}}, "must be parameters of elasto-plastic"),
         ({"free": ("A", "A")}, "'A' twice"),
         ({"free": ()}, "free must name a parameter of elasto-plastic, got none"),
         ({"free": ("A", "M")}, "'M', which has no influence without inertia; add inertia=True"),

@@ -58,6 +58,13 @@ def test_priors_of_what_no_run_has_are_refused(found):
         fit(run, "rice-ruina", FREE, prior={"K": prior}, fixed={"K": 8e10})
 
 
+@pytest.mark.parametrize("name", ["K[typo]", "gain", "step_time_1", "mu0"])
+def test_starts_of_what_no_run_has_and_of_nuisances_are_refused(name):
+    (run,) = runs_of(CASE, 1)
+    with pytest.raises(InputError, match=r"start must be of free parameters \(A, B, D0, K\), got"):
+        fit(run, "rice-ruina", FREE, prior={"gain": Prior(1.0, 0.02, "")}, start={name: 1.0})
+
+
 def test_minima_that_differ_in_the_times_of_steps_alone_are_one_answer(found):
     objective = found.objective
     u = objective.coordinates(found.values)

@@ -342,7 +342,7 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
     Two standard deviations away in a coordinate, with the other coordinates following, chi-squared
     should rise by four.
     """
-    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    low, high = objective.bounds
     sd = at.sd
     result = []
     for i, unknown in enumerate(objective.unknowns):
@@ -402,7 +402,7 @@ def _chi2_after_step(objective: Objective, u: Float, i: int) -> float:
     others = np.arange(u.size) != i
     step = np.zeros_like(u)
     step[others] = -np.linalg.lstsq(J[:, others], r, rcond=1e-10)[0]
-    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    low, high = objective.bounds
     trial = np.clip(u + step, low + 1e-10, high - 1e-10)
     return min(objective.chi2(trial), float(r @ r))
 

@@ -51,14 +51,14 @@ from asperity.inference.runs.assembly import (
 from asperity.inference.runs.blocks import coarser
 from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of
+from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import (
     Prior,
     material_priors,
-    require_free_priors,
+    require_free_names,
     unknowns_of,
 )
 from asperity.laws import Law, get_law
@@ -271,7 +271,7 @@ def _hold_objective(
     constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
     begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
     unknowns = unknowns_of(law, free, start=begun, priors=priors)
-    require_free_priors(unknowns, priors)
+    require_free_names(unknowns, given.start, priors)
     require_enough(table.name, table.rows, unknowns)
     term = HoldTerm(table, law, constants)
     return Objective((term,), law, unknowns, constants, tolerance=1e-9)
@@ -308,10 +308,11 @@ def _cycle_objective(
     K = first.loading_slope * first.W0 / first.V
     M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
     begun = {"K": K, "M": M} | start_values(law, names, given.start, given.material)
+    begun, priors = stiffness_of_table(begun, priors, [cycle.W0 for cycle in cycles])
     usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
     begun = {n: v for n, v in begun.items() if n in names}
     unknowns = unknowns_of(law, names, start=begun, priors=priors, usual=usual)
-    require_free_priors(unknowns, priors)
+    require_free_names(unknowns, given.start, priors)
     # A cycle needs a mass.
     unknowns = tuple(
         replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
@@ -359,9 +360,9 @@ def listed_data(
     data: Data | Iterable[Data], options: RunOptions
 ) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
     """Data as a list, with recordings as `RecordedRun`."""
-    of_its_own = LockInTable | HealingTable | AveragedCycle
-    several = [data] if isinstance(data, of_its_own | RecordedRun | Trace) else list(data)
-    ready = [d if isinstance(d, of_its_own) else run_of(d) for d in several]
+    of_its_own = LockInTable | HealingTable | AveragedCycle | RecordedRun
+    several = [data] if isinstance(data, of_its_own | Trace) else list(data)
+    ready = [d if isinstance(d, of_its_own) else recorded_run(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
     return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
@@ -394,13 +395,13 @@ def _objective(
         require_newtons(recordings)
     named = [name for name in free if not (name == "K" and recordings and table is None)]
     priors = given.priors(free)
-    begun = start_values(law, free, given.start, material, runs=recordings)
     assumed = {}
     if recordings and table is None:
         first = recordings[0]
         assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
     constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
     require_masses(free, constants, motion)
+    begun = start_values(law, free, given.start, material, runs=recordings)
     if table is not None and shared:
         begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
     if recordings:
@@ -453,7 +454,7 @@ def _objective(
         )
         terms += own
         unknowns += nuisances
-    require_free_priors(unknowns, priors)
+    require_free_names(unknowns, given.start, priors)
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )

@@ -88,12 +88,12 @@ def start_values(
     *,
     runs: Sequence[RecordedRun] = (),
 ) -> dict[str, Any]:
-    """Start values by name in SI, from the user and a material.
+    """Start values by name in SI, from the user and a material; K as it is given.
 
     Raises
     ------
     InputError
-        If a name is not free or a value is wrong.
+        If a value is wrong.
     """
     known = {
         name: material[name].si
@@ -102,10 +102,9 @@ def start_values(
         if material is not None and name in material and material[name].value is not None
     }
     for name, value in (start or {}).items():
-        rule, advice = "be of free parameters", "free it or leave it out"
-        require(name in free or (name.startswith("K") and runs), "start", rule, f"'{name}'", advice)
-        # A stiffness of a recording is converted with its run, which has the unit.
-        known[name] = value if name.startswith("K") else float(_checked(law, "start", name, value))
+        # K is converted with its data, which have the unit; `require_free_names` refuses others.
+        plain = name in free and name.partition("[")[0] not in ("K", GAIN)
+        known[name] = float(_checked(law, "start", name, value)) if plain else value
     return known
 
 

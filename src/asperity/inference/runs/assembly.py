@@ -18,15 +18,13 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.run import STIFFNESS, RecordedRun
 from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
 from asperity.parameters.arguments import at_least, number, typed
 
-#: Kind of quantity of K, by the unit of the load.
-_STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 #: Search range of the stiffness over the load (1/m): deformation apparatus and tribometers.
 USUAL_STIFFNESS = (5e2, 5e4)
 #: Smallest number of samples of a run per free parameter.
@@ -79,7 +77,7 @@ def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
 
 def _stiffness(value: Any, load_unit: str, W0: float, label: str) -> float:
     over = over_load(value, label) if load_unit else None
-    parameter = replace(MACHINE["K"], kind=_STIFFNESS[load_unit])
+    parameter = replace(MACHINE["K"], kind=STIFFNESS[load_unit])
     return float(parameter.check(value, label)) if over is None else over * W0
 
 
@@ -222,7 +220,7 @@ def free_stiffness(
     run: RecordedRun, name: str, start: Mapping[str, Any], priors: Mapping[str, Prior]
 ) -> Unknown:
     """The stiffness of a run as a free parameter."""
-    parameter = replace(MACHINE["K"], kind=_STIFFNESS[run.load_unit], name=name)
+    parameter = replace(MACHINE["K"], kind=STIFFNESS[run.load_unit], name=name)
     given = start.get(name, start.get("K"))
     usual = (USUAL_STIFFNESS[0] * run.W0, USUAL_STIFFNESS[1] * run.W0)
     return unknown_of(

@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.arrays import Bool, Float
 from asperity.errors import InputError, require
-from asperity.inference.runs.run import recorded_load
+from asperity.inference.runs.run import STIFFNESS, recorded_load
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
@@ -23,6 +23,7 @@ from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.readers import read
+from asperity.units import KINDS
 
 #: Smallest number of samples of a line; longer spans are averaged to the second number.
 _FEWEST, _MOST = 32, 2000
@@ -174,7 +175,7 @@ def measured_stiffness(
         over_load_se=error / mean,
         value=K,
         se=error,
-        unit={"N": "N/m", "Pa": "Pa/m"}.get(unit, "1/m"),
+        unit=KINDS[STIFFNESS[unit]].si,
         span=(float(columns[0, 0]), float(columns[-1, 0])),
         samples=count,
         bend=bend,
