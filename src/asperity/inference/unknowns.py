@@ -285,7 +285,7 @@ def unknown_of(
 
 
 def require_free_names(
-    unknowns: Sequence[Unknown], start: Mapping[str, Any] | None, priors: Mapping[str, Prior]
+    unknowns: Sequence[Unknown], start: Mapping[str, Any] | None, priors: Mapping[str, Any]
 ) -> None:
     """Refuse starts and priors of parameters that are not free, and of unknown names or runs.
 
