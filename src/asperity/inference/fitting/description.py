@@ -310,11 +310,9 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     and C the covariance of the coordinates.
     """
     values, slopes = objective.prior_residuals(at.u)
-    with_prior = [k for k in objective.unknowns if k.prior is not None]
+    with_prior = [(k, k.prior) for k in objective.unknowns if k.prior is not None]
     warnings = []
-    for unknown, r, j in zip(with_prior, values, slopes, strict=True):
-        prior = unknown.prior
-        assert prior is not None  # by the choice of unknowns
+    for (unknown, prior), r, j in zip(with_prior, values, slopes, strict=True):
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
             warnings.append(
@@ -370,7 +368,7 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
     stays within the 95 % limit. Parameters that change as much along the way are unbounded too.
     """
     result = []
-    best = objective.named(at.u)
+    best, interest = objective.named(at.u), [k for k in objective.unknowns if not k.nuisance]
     for name in bent:
         i = objective.names.index(name)
         for sign in (-1, 1):
@@ -380,18 +378,12 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
             there = objective.minimise(at.u, {i: x}, tolerance=1e-4)
             if there.chi2 - at.chi2 < _COMPARED_AT**2:
                 values = objective.named(there.u)
-                changed = [
-                    k.name
-                    for k in objective.unknowns
-                    if not k.nuisance and _differs(values[k.name], best[k.name])
-                ]
+                # Those that differ by more than a factor of e, or in their sign.
+                share = 1 - math.exp(-UNDETERMINED)
+                pairs = [(k.name, values[k.name], best[k.name]) for k in interest]
+                changed = [n for n, a, b in pairs if abs(a - b) > share * max(abs(a), abs(b))]
                 result += [name, *changed]
     return list(dict.fromkeys(result))
-
-
-def _differs(value: float, other: float) -> bool:
-    """Whether two values differ by more than a factor of e, or in their sign."""
-    return abs(value - other) > (1 - math.exp(-UNDETERMINED)) * max(abs(value), abs(other))
 
 
 def _chi2_after_step(objective: Objective, u: Float, i: int) -> float:

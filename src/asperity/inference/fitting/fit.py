@@ -454,7 +454,9 @@ def _objective(
         )
         terms += own
         unknowns += nuisances
-    require_free_names(unknowns, given.start, priors)
+    # The start of a K that is fixed has no influence.
+    of_free = {n: v for n, v in (given.start or {}).items() if not (n == "K" and recordings)}
+    require_free_names(unknowns, of_free, priors)
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )

@@ -294,10 +294,8 @@ def require_enough(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
     InputError
     """
     needed = sum(1 for u in unknowns if u.prior is None)
-    rule, advice = (
-        "hold more data than free parameters",
-        f"free fewer with {Argument('free')}, or measure more",
-    )
+    rule = "hold more data than free parameters"
+    advice = f"free fewer with {Argument('free')}, or measure more"
     got = f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})"
     require(not count < max(needed + (needed > 1), 1), name, rule, got, advice)
 

@@ -210,8 +210,7 @@ def recorded_run(
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
-    shown = name or str(trace.provenance.get("file", "") or "run")
-    shown = Path(shown).stem if name is None else name
+    shown = Path(str(trace.provenance.get("file") or "run")).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
     segments = constant_velocities(signals, shown, steps, velocities)
@@ -228,12 +227,10 @@ def recorded_run(
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
     # No recorder resolves 1e-9 of its range.
-    changes, value = (
-        np.ptp(friction) > 1e-9 * np.abs(friction).max(),
-        f"{friction[0]:.6g} throughout",
-    )
+    changes = bool(np.ptp(friction) > 1e-9 * np.abs(friction).max())
+    got = f"{friction[0]:.6g} throughout"
     advice = "it holds nothing to fit; name the channel of the shear force"
-    require(bool(changes), f"the friction of {shown}", "vary", value, advice)
+    require(changes, f"the friction of {shown}", "vary", got, advice)
     doubts += [finding.sentence for finding in signals.signs]
     doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)
