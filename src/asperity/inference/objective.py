@@ -278,6 +278,11 @@ class Objective:
         return tuple(k.name for k in self.unknowns)
 
     @property
+    def interest(self) -> tuple[Unknown, ...]:
+        """The free parameters that are no nuisances."""
+        return tuple(k for k in self.unknowns if not k.nuisance)
+
+    @property
     def bounds(self) -> tuple[Float, Float]:
         """Lower and upper bounds of the coordinates, each of shape (n,)."""
         low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T

@@ -368,7 +368,7 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
     stays within the 95 % limit. Parameters that change as much along the way are unbounded too.
     """
     result = []
-    best, interest = objective.named(at.u), [k for k in objective.unknowns if not k.nuisance]
+    best = objective.named(at.u)
     for name in bent:
         i = objective.names.index(name)
         for sign in (-1, 1):
@@ -380,7 +380,7 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
                 values = objective.named(there.u)
                 # Those that differ by more than a factor of e, or in their sign.
                 share = 1 - math.exp(-UNDETERMINED)
-                pairs = [(k.name, values[k.name], best[k.name]) for k in interest]
+                pairs = [(k.name, values[k.name], best[k.name]) for k in objective.interest]
                 changed = [n for n, a, b in pairs if abs(a - b) > share * max(abs(a), abs(b))]
                 result += [name, *changed]
     return list(dict.fromkeys(result))

@@ -227,7 +227,7 @@ def fit(
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
-        laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
+        laws = {k.name: result.values[k.name] for k in result.objective.interest}
         # The K of each recording begins at the fixed or shared one.
         begun = {**(start or {}), "K": given, **laws}
         others = {n: v for n, v in numbers.fixed.items() if n != "K"}

@@ -40,6 +40,8 @@ from asperity.units import KINDS, format_si, to_si
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
 
+#: Parameters that count with an option of the equation of motion.
+_OF_OPTIONS = {"M": "inertia", "eta": "radiation_damping"}
 #: Velocity (m/s) at which a free mu0 is reported, if no other is given.
 _REFERENCE_VELOCITY = 1e-6
 
@@ -220,12 +222,9 @@ def require_motion(
     ------
     InputError
     """
-    for name, option, word in (
-        ("M", "inertia", "inertia"),
-        ("eta", "radiation_damping", "radiation damping"),
-    ):
+    for name, option in _OF_OPTIONS.items():
         if name in names and not motion[option]:
-            got = f"'{name}', which has no influence without {word}"
+            got = f"'{name}', which has no influence without {option.replace('_', ' ')}"
             advice = f"add {Argument(option, value='True')} or leave it out"
             raise InputError(label, "be parameters that count", got, advice)
 
@@ -247,7 +246,7 @@ def require_masses(
     ------
     InputError
     """
-    for option, name in (("inertia", "M"), ("radiation_damping", "eta")):
+    for name, option in _OF_OPTIONS.items():
         known = name in free or np.all(np.asarray(constants.get(name, 0.0)) > 0)
         like = Argument("fixed", name, MACHINE[name].example)
         advice = f"add {like}, or name it in {Argument('free')}"

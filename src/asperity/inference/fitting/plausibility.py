@@ -118,47 +118,40 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     progress : callable, optional
         Called with the number of minimisations done and of all minimisations.
     """
-    freed = _freed(fit, progress)
-    if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
-        return ""
-    estimate, given = freed.parameters["K"], float(np.ravel(fit.objective.fixed["K"])[0])
-    low, high = estimate.interval_95
-    if low <= given <= high:
-        return ""
-    numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
-    return (
-        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
-        f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / given:.3g} "
-        f"times the given {given:.4g} N/m"
-        + (f", with {numbers}" if numbers else "")
-        + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "
-        "prior"
-    )
-
-
-def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
-    """The fit with K free; None if K is free already or the law describes the table."""
     objective = fit.objective
     given = np.unique(objective.fixed.get("K", ()))
     tables = objective.terms_of(LockInTerm)
     if not (tables and len(objective.terms) == 1 and given.size == 1 and fit.converged):
-        return None
+        return ""
     if fit.dof <= 0 or fit.p_value >= _FAILS:
-        return None
-    (term,) = tables
+        return ""
+    (term,), (K,) = tables, given.tolist()
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
-    largest = float(term.table.points["epsilon"].max())
-    start = {"K": float(given[0])}
-    (own,) = unknowns_of(objective.law, ["K"], largest_epsilon=largest, start=start, priors={})
-    freed = replace(
+    (own,) = unknowns_of(objective.law, ["K"], start={"K": K}, priors={})
+    free = replace(
         objective,
         terms=(LockInTerm(term.table, objective.law, fixed, **term.motion),),
         unknowns=(*objective.unknowns, own),
         fixed=fixed,
     )
     # Starts: special cases, random starts, and the estimate with the given stiffness.
-    minima = minima_of(freed, 0, progress, simpler=[{**fit.values, **start}])
-    return described_fit(freed, minima, profile=False) if minima else None
+    minima = minima_of(free, 0, progress, simpler=[{**fit.values, "K": K}])
+    freed = described_fit(free, minima, profile=False) if minima else None
+    if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
+        return ""
+    estimate = freed.parameters["K"]
+    low, high = estimate.interval_95
+    if low <= K <= high:
+        return ""
+    numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
+    return (
+        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
+        f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / K:.3g} "
+        f"times the given {K:.4g} N/m"
+        + (f", with {numbers}" if numbers else "")
+        + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "
+        "prior"
+    )
 
 
 def shift_of_estimates(

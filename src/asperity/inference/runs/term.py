@@ -124,7 +124,7 @@ class RunTerm(DataTerm):
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
-        self._columns = np.column_stack([_linear_columns(run, linear), _impulses(run)])
+        self._columns = _columns(run, linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
@@ -414,23 +414,19 @@ class RunTerm(DataTerm):
         return np.asarray(-np.linalg.solve(self._triangle, self.basis.T @ white))
 
 
-def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
+def _columns(run: RecordedRun, names: Sequence[str]) -> Float:
+    """Linear nuisances, the levels after jumps, and an impulse at each wrong sample."""
     known = {
         "offset": np.ones_like(run.slip),
         "trend": run.slip,
         "bend": run.slip * (run.slip - run.slip[-1]),
         "drift": run.time,
     }
-    columns = [known[n] for n in names] + [_behind(run, at) for at in run.jumps or ()]
-    return np.stack(columns, axis=1) if columns else np.zeros((run.time.size, 0))
-
-
-def _impulses(run: RecordedRun) -> Float:
-    """A column for each wrong sample, whose value is then free."""
-    rows = np.unique(run.rows_at(run.wrong or ()))
-    columns = np.zeros((run.time.size, rows.size))
-    columns[rows, np.arange(rows.size)] = 1.0
-    return columns
+    levels = [_behind(run, at) for at in run.jumps or ()]
+    wrong = np.unique(run.rows_at(run.wrong or ()))
+    impulses = np.zeros((run.time.size, wrong.size))
+    impulses[wrong, np.arange(wrong.size)] = 1.0
+    return np.column_stack([*(known[n] for n in names), *levels, impulses])
 
 
 def _behind(run: RecordedRun, at: float) -> Float:
