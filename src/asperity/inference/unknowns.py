@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -304,6 +304,12 @@ def require_free_names(
             rule = f"be of free parameters ({', '.join(known)})"
             advice = f"free it, correct the name, or leave the {label} out"
             require(name in known or name in shared, label, rule, f"'{name}'", advice)
+
+
+def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:
+    """Published values of a material, by name in SI."""
+    known = () if material is None else [n for n in names if n in material]
+    return {n: material[n].si for n in known if material[n].value is not None}  # type: ignore[index]
 
 
 def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:

@@ -1,5 +1,7 @@
 """Fits recover the truth, with intervals that cover it, and name what data cannot determine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -8,7 +10,7 @@ import asperity as asp
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.answers import answer_fit
-from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.inputs import fixed_values, free_by_default
 from asperity.inference.fitting.result import fit_record
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
@@ -311,6 +313,17 @@ def test_a_stiffness_over_the_load_of_a_table_is_one_of_the_table(readings, pmma
     assert shown.value == pytest.approx(with_prior[0].values["K"] / pmma.W0 * 1e-6)
     with pytest.raises(InputError, match=r"prior\['K'\] must be in N/m or 1/m for a table"):
         fit(table, "elasto-plastic", ("A", "K"), prior={"K": Prior(1, 1, "", "Pa/m")}, **given)
+
+
+def test_a_column_of_one_of_several_tables_counts_in_its_rows(readings, pmma):
+    """Where a table has no load, that of the material holds."""
+    first = readings(3)
+    with_load = replace(first, points={**first.points, "W0": np.full(first.rows, 5.0)})
+    other = replace(readings(4), name="other")
+    assert "W0" not in other.points
+    both, _ = joined([with_load, other])
+    fixed = fixed_values(get_law("elasto-plastic"), both, ["A"], {"eps_ratio": 0.5}, pmma)
+    np.testing.assert_array_equal(fixed["W0"], np.repeat([5.0, pmma.W0], [first.rows, other.rows]))
 
 
 def test_one_row_with_as_many_parameters_as_data_is_refused(pmma):

@@ -58,6 +58,7 @@ from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import (
     Prior,
     material_priors,
+    material_values,
     require_free_names,
     unknowns_of,
 )
@@ -405,12 +406,12 @@ def _objective(
     if table is not None and shared:
         begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
     if recordings:
-        published = material is not None and "mu0" in material and material["mu0"].value is not None
         require_calibrated(
             recordings,
             free,
             priors,
-            mu0_given=published or "mu0" in (*free, *fixed) or table is not None,
+            mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
+            or table is not None,
             beside_table=table is not None,
         )
         # Its prior makes it free.

@@ -22,6 +22,7 @@ from asperity.inference.unknowns import (
     UnfittableLawError,
     Unknown,
     material_priors,
+    material_values,
     require_fittable,
 )
 from asperity.laws import Law, registered
@@ -97,12 +98,9 @@ def start_values(
     InputError
         If a value is wrong.
     """
-    known = {
-        name: material[name].si
-        for name in free
-        if not (name == "K" and runs)
-        if material is not None and name in material and material[name].value is not None
-    }
+    known: dict[str, Any] = {**material_values(material, free)}
+    if runs:
+        known.pop("K", None)
     for name, value in (start or {}).items():
         # K is converted with its data, which have the unit; `require_free_names` refuses others.
         plain = name in free and name.partition("[")[0] not in ("K", GAIN)
@@ -138,7 +136,9 @@ def fixed_values(
         known = {
             n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
         }
-    assumed = {**({"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}), **(assumed or {})}
+    elsewhere = {n: p.default for n, p in known.items() if p.default is not None}
+    elsewhere |= {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
+    elsewhere |= {**(assumed or {}), **material_values(material, known)}
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
         require(name not in free, name, "be free or fixed", "both", "leave one out")
@@ -148,22 +148,22 @@ def fixed_values(
         require(name in known or name == "eps_ratio", "fixed", rule, f"'{name}'", advice)
     result: dict[str, Any] = {}
     missing = []
-    for name, parameter in known.items():
+    for name in known:
         if name in free or name == "inertia":
             continue
+        column = points.get(name, np.nan)
         if name in given:
             over = over_load(given[name]) if name == "K" else None
             result[name] = _checked(law, "fixed", name, given[name]) if over is None else over
-        elif name in points and np.isfinite(points[name]).all():
-            result[name] = points[name]
-        elif material is not None and name in material and material[name].value is not None:
-            result[name] = material[name].si
-        elif name in assumed:
-            result[name] = assumed[name]
-        elif parameter.default is not None:
-            result[name] = parameter.default
-        else:
+        elif np.isfinite(column).all():
+            result[name] = column
+        elif name not in elsewhere:
             missing.append(name)
+        elif np.isfinite(column).any():
+            # One of several tables has this column.
+            result[name] = np.where(np.isfinite(column), column, elsewhere[name])
+        else:
+            result[name] = elsewhere[name]
     if missing:
         raise UnfittableLawError(
             law.name,
