@@ -11,7 +11,7 @@ from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.answers import answer_fit
 from asperity.inference.fitting.inputs import fixed_values, free_by_default
-from asperity.inference.fitting.result import fit_record
+from asperity.inference.fitting.result import Optimum, fit_record
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
 from asperity.questions.fit import Fit
@@ -402,3 +402,16 @@ def test_a_window_of_a_table_is_refused(tmp_path) -> None:
     question = Fit(data=({"file": file, "window": (0, 1)},), material="bureau2000")
     with pytest.raises(InputError, match="window must go with a recording, got a table"):
         answer_fit(question)
+
+
+def test_the_rate_dependence_with_one_of_A_and_B_fixed(readings, pmma):
+    """A - B is as uncertain as A; another minimum, which has no B either, may change its sign."""
+    found = fit(readings(3), "elasto-plastic", ("A", "eps_ratio"), material=pmma, starts=1)
+    difference, A = found.rate_dependence, found.parameters["A"]
+    assert difference.value == pytest.approx(A.value - pmma.B)
+    assert difference.error == pytest.approx(A.se)
+    assert difference.meaning == "velocity weakening"
+    other = Optimum(found.chi2 + 1, {"A": 2 * pmma.B, "eps_ratio": 0.5})
+    assert replace(found, optima=(other,)).rate_dependence.meaning == "its sign is not determined"
+    rows = replace(found.objective, fixed={**found.objective.fixed, "B": np.array([0.02, 0.03])})
+    assert replace(found, objective=rows).rate_dependence is None
