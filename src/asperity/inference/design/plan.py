@@ -29,7 +29,7 @@ from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import number, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Noise, Range
 from asperity.questions.record import require_unit as with_unit, units_required
@@ -355,10 +355,8 @@ def _uncertainties(
         label = f"uncertainty.{name}"
         holds, rule = name in known and name in truth.names, "be of free parameters"
         require(holds, "uncertainty", rule, f"'{name}'", "free it or leave it out")
-        with_unit(value, known[name].kind, label)
-        given[name] = float(to_si(value, known[name].kind, label))
-        if given[name] < 0:
-            raise InputError(label, "not be negative", f"{given[name]:g}", "change it")
+        kind = known[name].kind
+        given[name] = number(with_unit(value, kind, label), label, kind, "not negative")
     for name in truth.names:
         if material is not None and name in material and material[name].uncertainty:
             given.setdefault(name, float(material[name].si_uncertainty or 0.0))
