@@ -643,3 +643,10 @@ def test_basalt():
     # What the record shows by eye: steady friction rises by less than 1e-3 from 3 to 10 um/s.
     assert abs(found.values["A"] - found.values["B"]) < 1e-3
     assert found.parameters["D0"].se > 1.5 * white.parameters["D0"].se
+
+
+def test_a_stiffness_that_is_not_determined_is_not_so_over_the_load_either(found):
+    lines = replace(found, undetermined=("K",)).summary()[1]
+    said = {line[0]: line[1] for line in lines}
+    assert said["K"] == said["K/W0"] == "not determined"
+    assert said["A"] != "not determined"

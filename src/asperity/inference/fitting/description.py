@@ -508,16 +508,13 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
     (term,) = objective.terms_of(LockInTerm)
     u = at.u
 
+    rows = np.concatenate([at.data[0].row, np.full(at.priors, -1)])
+
     def whole(u: Float) -> Residuals | None:
-        data = objective.data_residuals(u)
-        if data is None:
+        values, slopes = objective.residuals(u)
+        if not np.isfinite(values).all():
             return None
-        values, slopes = objective.prior_residuals(u)
-        return data[0]._replace(
-            values=np.concatenate([data[0].values, values]),
-            jacobian=np.vstack([data[0].jacobian, slopes]),
-            row=np.concatenate([data[0].row, np.full(values.size, -1)]),
-        )
+        return at.data[0]._replace(values=values, jacobian=slopes, row=rows)
 
     def refit(weights: Float) -> Residuals | None:
         nonlocal u

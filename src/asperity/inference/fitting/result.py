@@ -304,7 +304,7 @@ class Fit(Drawn):
             difference = self.rate_dependence
             lines.append(SummaryLine("A - B", difference.shown, difference.meaning))
         for name, p in {**self.parameters, **self.over_load}.items():
-            if name in self.undetermined:
+            if name.removesuffix("/W0") in self.undetermined:
                 lines.append(SummaryLine(name, NOT_DETERMINED, "by these data"))
                 continue
             shown = Shown.of(p.value, p.se, p.unit)
