@@ -289,14 +289,15 @@ def require_free_names(
 ) -> None:
     """Refuse starts and priors of parameters that are not free, and of unknown names or runs.
 
-    Nuisances may have a prior, but no start.
+    A gain has a prior, but no start; delays and initial states have their own.
 
     Raises
     ------
     InputError
     """
     interest = [unknown for unknown in unknowns if not unknown.nuisance]
-    for label, names, some in (("start", start or {}, interest), ("prior", priors, unknowns)):
+    with_prior = [unknown for unknown in unknowns if unknown.logarithmic or not unknown.nuisance]
+    for label, names, some in (("start", start or {}, interest), ("prior", priors, with_prior)):
         known = [unknown.name for unknown in some]
         # Names without a run stand for the parameter of each run.
         shared = {name.partition("[")[0] for name in known}

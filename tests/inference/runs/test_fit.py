@@ -56,6 +56,16 @@ def test_priors_of_what_no_run_has_are_refused(found):
         fit(run, "rice-ruina", FREE, prior={"K[typo]": prior})
     with pytest.raises(InputError, match=r"got 'K'; free it"):
         fit(run, "rice-ruina", FREE, prior={"K": prior}, fixed={"K": 8e10})
+    # The delay of a step has a prior by the sampling.
+    with pytest.raises(InputError, match=r"\(A, B, D0, K\), got 'step_time_1'"):
+        fit(run, "rice-ruina", FREE, prior={"step_time_1": Prior(0.0, 1.0, "")})
+
+
+def test_a_recording_of_few_samples_is_refused_with_a_free_mass_too():
+    run = next(runs_of(replace(CASE, rate=0.3), 1))
+    for free, motion in ((FREE, False), ([*FREE, "M"], True)):
+        with pytest.raises(InputError, match=r"must have at least .* samples for"):
+            fit(run, "rice-ruina", free, inertia=motion)
 
 
 @pytest.mark.parametrize("name", ["K[typo]", "gain", "step_time_1", "mu0"])
