@@ -24,6 +24,7 @@ from asperity.inference.fitting.inputs import (
     require_enough,
     require_masses,
     require_motion,
+    require_some,
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
@@ -171,9 +172,8 @@ def fit(
         if some and len(some) < len(several):
             advice = "fit them one after the other, with the first as the prior of the second"
             raise InputError("data", f"be {what} alone or other data", "both", advice)
-    rule = f"name a parameter of {chosen.name}"
-    fitted = names or recordings or (free is None if cycles else bare)
-    require(fitted, "free", rule, "none", "free one, such as A or eps_ratio")
+    if not (recordings or cycles or bare):
+        require_some(chosen, names)
     numbers = _Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
@@ -291,6 +291,7 @@ def _cycle_objective(
     level = float(np.mean(first.values[:-1]))
     fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
     names = [n for n in (*numbers, "K", "M") if n not in fixed] if free is None else list(free)
+    require_some(law, names)
     advice = "leave it out: a constant friction is fitted in each cycle"
     require("mu0" not in names, "free", "be what the shape of a cycle shows", "'mu0'", advice)
     unseen = [c.name for c in cycles if not c.resolved]

@@ -204,6 +204,17 @@ def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
         raise error.about(Argument(field, key=name)) from None
 
 
+def require_some(law: type[Law], free: Sequence[str]) -> None:
+    """Refuse a fit without free parameters.
+
+    Raises
+    ------
+    InputError
+    """
+    rule = f"name a parameter of {law.name}"
+    require(free, "free", rule, "none", "free one, such as A or eps_ratio")
+
+
 def require_motion(
     names: Collection[str], motion: Mapping[str, bool], *, label: str = "free"
 ) -> None:
