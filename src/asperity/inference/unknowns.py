@@ -252,13 +252,16 @@ def unknown_of(
     Raises
     ------
     InputError
-        If the parameter has no range of starts, or its prior contradicts its rule.
+        If the parameter has no range of starts, or its prior contradicts its rule or its unit.
     """
     name = parameter.name
     positive = parameter.rule == "positive"
     if prior is not None and positive and prior.mean <= 0:
         rule = "have a positive mean"
         raise InputError(Argument("prior", name), rule, f"{prior.mean:g}", "correct it")
+    if prior is not None and prior.unit not in ("", parameter.unit):
+        rule = f"be in {parameter.unit or 'no unit'}, as all numbers of a prior are SI"
+        raise InputError(Argument("prior", name), rule, prior.unit, "convert it")
     middle = given if given else prior.mean if prior else None
     if usual is not None:
         low, high = usual

@@ -273,6 +273,7 @@ def test_readings_that_differ_are_joined(other):
             {"free": ("A",), "prior": {"A": Prior(-1.0, 0.1, "")}},
             "must have a positive mean, got -1",
         ),
+        ({"free": ("D0",), "prior": {"D0": Prior(0.5, 0.1, "", "um")}}, "must be in m, as all"),
         ({"free": ("A",), "fixed": {"A": 0.01}}, "free or fixed"),
         ({"free": ("A",), "fixed": {"alpha": 0.1}}, "fixed must be parameters"),
         ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),
