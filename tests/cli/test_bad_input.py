@@ -72,7 +72,7 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
     refused(fit("--free", "a,b"), "got none for D_c;")
     refused(fit("--free", "a,b,x"), "--free must be", "choose one of a, b, D_c, k, M, sigma_n")
     refused(fit("--free", "a,b", "--fix", "Dc=-2 um"), "--fix D_c must be positive, got -2e-06 m")
-    refused(fit("--law", "two-state", "--free", "a", "--start", "b_2=1"), "got 'b_2'; free it")
+    refused(fit("--free", "a,b,D_c", "--start", "sigma_n=7 N"), "got 'sigma_n'; free it")
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.inference import Prior
 from asperity.inference.answers import read_data
 from asperity.inference.cycles import CycleTerm, averaged_cycle
 from asperity.inference.fitting.fit import fit
@@ -184,3 +185,14 @@ def test_a_fit_gives_the_truth_within_its_intervals():
     for name in ("B", "D0"):
         low, high = result.parameters[name].interval_95
         assert low < TRUTH[name] < high
+
+
+def test_a_stiffness_over_the_load_is_one_of_the_cycle():
+    """Twice the load, stiffness and mass: the same friction."""
+    cycle = replace(averaged_cycle(measured(4)), W0=2.0)
+    prior = Prior(300.0, 3.0, "unloading", "1/m")
+    ask = {"fixed": {**LAW, "M": 0.6}, "start": {"K": "590 N/m"}, "starts": 0}
+    result = fit(cycle, "rice-ruina", ["K"], prior={"K": prior}, **ask)
+    assert result.values["K"] == pytest.approx(600.0, rel=0.03)
+    with pytest.raises(InputError, match=r"prior\['K'\] must be in N/m or 1/m"):
+        fit(cycle, "rice-ruina", ["K"], prior={"K": replace(prior, unit="Pa/m")}, **ask)

@@ -20,6 +20,7 @@ from jax import Array
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
+from asperity.inference.tables.table import in_all_rows
 from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import typed
@@ -137,13 +138,7 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
         plain = [to_si(v, kind, label) for v in values] if texts else values
         arrays[column] = np.atleast_1d(np.asarray(obeying(plain, label, kind, rule), float))
     rows = max(a.size for a in arrays.values())
-    for column, array in arrays.items():
-        if array.ndim != 1 or array.size not in (1, rows):
-            raise InputError(
-                f"{name}.{column} must have one value or {rows}, got an array of shape "
-                f"{array.shape}; give columns of one length"
-            )
-        arrays[column] = np.broadcast_to(array, (rows,)).copy()
+    arrays = {n: in_all_rows(array, rows, f"{name}.{n}") for n, array in arrays.items()}
     K = arrays["K"] / arrays["W0"] if with_load else arrays["K"]
     return HealingTable(
         name, arrays["hold_time"], arrays[HEALING], arrays.get("healing_err"), arrays["V"], K
@@ -164,17 +159,9 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
         rule = "be given for all tables of holds or for none"
         advice = "one error is estimated for all rows that have none"
         raise InputError("healing_err", rule, f"it for {sum(known)} of {len(known)}", advice)
-    if len(tables) == 1:
-        return tables[0]
-
-    def stacked(field: str) -> Float:
-        return np.concatenate([getattr(t, field) for t in tables])
-
-    errors = stacked("errors") if all(known) else None
-    name = ", ".join(t.name for t in tables)
-    return HealingTable(
-        name, stacked("hold_time"), stacked("healing"), errors, stacked("V"), stacked("K")
-    )
+    names = ["hold_time", "healing", "V", "K", *(["errors"] if all(known) else [])]
+    columns: dict[str, Any] = {n: np.concatenate([getattr(t, n) for t in tables]) for n in names}
+    return HealingTable(", ".join(t.name for t in tables), **{"errors": None, **columns})
 
 
 #: Tables are padded to a multiple of this many holds.
@@ -220,12 +207,11 @@ class HoldTerm(DataTerm):
     @property
     def noise(self) -> Mapping[str, Any]:
         """Independent normal errors, as given or estimated."""
-        if self.profiled:
-            model = "independent, normal, one error for all holds, estimated from the residuals"
-        else:
-            model = "independent, normal, as given"
-        more = {"error": self.error} if self.profiled else {}
-        return {"model": model, "effective_samples": self.table.rows, **more}
+        rows = {"effective_samples": self.table.rows}
+        if not self.profiled:
+            return {"model": "independent, normal, as given", **rows}
+        model = "independent, normal, one error for all holds, estimated from the residuals"
+        return {"model": model, **rows, "error": self.error}
 
     def estimate_error(self, values: Mapping[str, float], parameters: int) -> None:
         """Set the error by the residuals at an estimate of so many parameters."""

@@ -7,7 +7,6 @@ likelihood is the product over the terms; priors are normal in the parameter its
 
 from __future__ import annotations
 
-import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -278,6 +277,17 @@ class Objective:
         """Names of the free parameters, in the order of the coordinates."""
         return tuple(k.name for k in self.unknowns)
 
+    @property
+    def interest(self) -> tuple[Unknown, ...]:
+        """The free parameters that are no nuisances."""
+        return tuple(k for k in self.unknowns if not k.nuisance)
+
+    @property
+    def bounds(self) -> tuple[Float, Float]:
+        """Lower and upper bounds of the coordinates, each of shape (n,)."""
+        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
+        return low, high
+
     def named(self, u: Float) -> dict[str, float]:
         """Values by name at the coordinates u."""
         return {k.name: float(k.to_value(x)) for k, x in zip(self.unknowns, u, strict=True)}
@@ -310,7 +320,7 @@ class Objective:
         if any(moved[n] <= 0 and known[n].logarithmic for n in changed):
             return u
         result = self.coordinates(moved)
-        low, high = np.array([k.bounds for k in self.unknowns]).T
+        low, high = self.bounds
         return result if ((result >= low) & (result <= high)).all() else u
 
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
@@ -345,12 +355,9 @@ class Objective:
 
     def prior_residuals(self, u: Float) -> tuple[Float, Float]:
         """(value - mean) / standard deviation of each prior, and the Jacobian."""
-        rows = [i for i, k in enumerate(self.unknowns) if k.prior is not None]
-        values, jacobian = np.zeros(len(rows)), np.zeros((len(rows), len(self.unknowns)))
-        for row, i in enumerate(rows):
-            unknown = self.unknowns[i]
-            prior = unknown.prior
-            assert prior is not None  # by the choice of rows
+        known = [(i, k, k.prior) for i, k in enumerate(self.unknowns) if k.prior is not None]
+        values, jacobian = np.zeros(len(known)), np.zeros((len(known), len(self.unknowns)))
+        for row, (i, unknown, prior) in enumerate(known):
             x = float(unknown.to_value(u[i]))
             values[row] = (x - prior.mean) / prior.sd
             jacobian[row, i] = unknown.slope(x) / prior.sd
@@ -409,7 +416,7 @@ class Objective:
         point = np.array(u, float)
         for i, value in kept.items():
             point[i] = value
-        low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
+        low, high = (ends[moving] for ends in self.bounds)
         # The start is so far inside the bounds that SciPy does not move it.
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = np.clip(point[moving], low + inset[0], high - inset[1])
@@ -420,46 +427,36 @@ class Objective:
             self.unsolved += ahead.unsolved
             if self.chi2(near.u) <= self.chi2(point):
                 point = near.u
-        inside = point[moving]
         if not moving or not math.isfinite(self.chi2(point)):
             return Minimum(point, self.chi2(point))
 
-        def whole(part: Float) -> Float:
-            full = point.copy()
-            full[moving] = part
-            return full
-
-        if self.curved:
-
-            def of_moving(part: Float) -> tuple[Float, Float]:
-                r, jacobian = self.residuals(whole(part))
-                return r, jacobian[:, moving]
-
-            end = whole(levenberg_marquardt.minimised(of_moving, inside, low, high, evaluations))
-            return Minimum(end, self.chi2(end))
-
-        # SciPy evaluates the Jacobian at the point at which it has just evaluated the residuals.
-        @functools.lru_cache(1)
-        def triangle_of(part: bytes) -> Float:
-            r, jacobian = self.residuals(whole(np.frombuffer(part)))
-            return compressed(np.column_stack([jacobian[:, moving], r]))
+        def of_moving(part: Float) -> tuple[Float, Float]:
+            whole = point.copy()
+            whole[moving] = part
+            r, jacobian = self.residuals(whole)
+            return r, jacobian[:, moving]
 
         def triangle(part: Float) -> Float:
-            return triangle_of(part.tobytes())
+            r, jacobian = of_moving(part)
+            return compressed(np.column_stack([jacobian, r]))
 
-        result = least_squares(
-            lambda part: triangle(part)[:, -1],
-            inside,
-            jac=lambda part: triangle(part)[:, :-1],
-            bounds=(low, high),
-            x_scale="jac",
-            xtol=tolerance,
-            ftol=1e-2 * tolerance,
-            gtol=tolerance,
-            max_nfev=evaluations,
-        )
-        found = whole(result.x)
-        return Minimum(found, self.chi2(found))
+        begin = point[moving]
+        if self.curved:
+            end = levenberg_marquardt.minimised(of_moving, begin, low, high, evaluations)
+        else:
+            end = least_squares(
+                lambda part: triangle(part)[:, -1],
+                begin,
+                jac=lambda part: triangle(part)[:, :-1],
+                bounds=(low, high),
+                x_scale="jac",
+                xtol=tolerance,
+                ftol=1e-2 * tolerance,
+                gtol=tolerance,
+                max_nfev=evaluations,
+            ).x
+        point[moving] = end
+        return Minimum(point, self.chi2(point))
 
     def coarser(self) -> Objective:
         """The objective of `DataTerm.coarser` data; itself without a coarser model."""
@@ -481,7 +478,7 @@ class Objective:
 
     def held(self, u: Float, gradient: Float) -> Bool:
         """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
-        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
+        low, high = self.bounds
         return np.asarray(np.where(gradient > 0, u - low, high - u) < _AT_BOUND)
 
     def terms_of(self, kind: type[T]) -> list[T]:

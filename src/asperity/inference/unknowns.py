@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -205,7 +205,7 @@ def unknowns_of(
     law: type[Law],
     free: Sequence[str],
     *,
-    largest_epsilon: float,
+    largest_epsilon: float = 0.0,
     start: Mapping[str, float],
     priors: Mapping[str, Prior],
     usual: Mapping[str, tuple[float, float]] | None = None,
@@ -252,13 +252,16 @@ def unknown_of(
     Raises
     ------
     InputError
-        If the parameter has no range of starts, or its prior contradicts its rule.
+        If the parameter has no range of starts, or its prior contradicts its rule or its unit.
     """
     name = parameter.name
     positive = parameter.rule == "positive"
     if prior is not None and positive and prior.mean <= 0:
         rule = "have a positive mean"
         raise InputError(Argument("prior", name), rule, f"{prior.mean:g}", "correct it")
+    if prior is not None and prior.unit not in ("", parameter.unit):
+        rule = f"be in {parameter.unit or 'no unit'}, as all numbers of a prior are SI"
+        raise InputError(Argument("prior", name), rule, prior.unit, "convert it")
     middle = given if given else prior.mean if prior else None
     if usual is not None:
         low, high = usual
@@ -282,6 +285,35 @@ def unknown_of(
     scale = 1.0 if positive else max(abs(middle or typical), _LEAST_SCALE * typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
+
+
+def require_free_names(
+    unknowns: Sequence[Unknown], start: Mapping[str, Any] | None, priors: Mapping[str, Any]
+) -> None:
+    """Refuse starts and priors of parameters that are not free, and of unknown names or runs.
+
+    A gain has a prior, but no start; delays and initial states have their own.
+
+    Raises
+    ------
+    InputError
+    """
+    interest = [unknown for unknown in unknowns if not unknown.nuisance]
+    with_prior = [unknown for unknown in unknowns if unknown.logarithmic or not unknown.nuisance]
+    for label, names, some in (("start", start or {}, interest), ("prior", priors, with_prior)):
+        known = [unknown.name for unknown in some]
+        # Names without a run stand for the parameter of each run.
+        shared = {name.partition("[")[0] for name in known}
+        for name in names:
+            rule = f"be of free parameters ({', '.join(known)})"
+            advice = f"free it, correct the name, or leave the {label} out"
+            require(name in known or name in shared, label, rule, f"'{name}'", advice)
+
+
+def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:
+    """Published values of a material, by name in SI."""
+    known = () if material is None else [n for n in names if n in material]
+    return {n: material[n].si for n in known if material[n].value is not None}  # type: ignore[index]
 
 
 def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:

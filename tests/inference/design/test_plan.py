@@ -50,6 +50,14 @@ def test_a_plan_is_read_in_SI():
     assert plan.noise["mu1"].at(np.array(1e-3)) == pytest.approx(np.hypot(2e-5, 1e-5))
 
 
+def test_a_prior_of_the_stiffness_may_be_over_the_load():
+    """7 N on a spring of 0.2 N/um."""
+    free = {"free": ["lambda", "K"], "fixed": {"eps_ratio": 0.5}, "values": {"K": "0.2 N/um"}}
+    plan = plan_of(changed(**free, prior=["K=0.03+-0.001 1/um"]), require_unit=True)
+    (prior,) = (u.prior for u in plan.truth.unknowns if u.name == "K")
+    assert (prior.mean, prior.sd) == pytest.approx((2.1e5, 7e3))
+
+
 def test_time_is_spent_on_settling_and_reading():
     plan = plan_of(changed(points=None, time="1 h", settling_slip="20 um", integration="10 s"))
     np.testing.assert_allclose(plan.cost(np.array([1e-6, 1e-5])), [30, 12])
@@ -116,6 +124,7 @@ def test_time_is_spent_on_settling_and_reading():
         ({"draws": 4, "uncertainty": {"Q": 1}}, "uncertainty must be of free parameters, got 'Q'"),
         ({"draws": 4, "uncertainty": {"A": 0.001}}, "of free parameters, got 'A'"),
         ({"prior": 3}, "prior must be materials or priors by name"),
+        ({"prior": ["A=0.01+-0.001"]}, "prior must be of free parameters (lambda, eps_ratio)"),
         ({"material": None}, "got none for lambda"),
         ({"inertia": "yes"}, "true or false"),
         (

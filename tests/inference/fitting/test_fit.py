@@ -1,5 +1,7 @@
 """Fits recover the truth, with intervals that cover it, and name what data cannot determine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -8,8 +10,8 @@ import asperity as asp
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.answers import answer_fit
-from asperity.inference.fitting.inputs import free_by_default
-from asperity.inference.fitting.result import fit_record
+from asperity.inference.fitting.inputs import fixed_values, free_by_default
+from asperity.inference.fitting.result import Optimum, fit_record
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
 from asperity.questions.fit import Fit
@@ -261,7 +263,7 @@ def test_readings_that_differ_are_joined(other):
     ("options", "said"),
     [
         ({"free": ("V0",)}, "free mu0 instead"),
-        ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
+        ({"free": ("alpha",), "start": {"alpha": 0.1}}, "must be parameters of elasto-plastic"),
         ({"free": ("A", "A")}, "'A' twice"),
         ({"free": ()}, "free must name a parameter of elasto-plastic, got none"),
         ({"free": ("A", "M")}, "'M', which has no influence without inertia; add inertia=True"),
@@ -271,6 +273,7 @@ def test_readings_that_differ_are_joined(other):
             {"free": ("A",), "prior": {"A": Prior(-1.0, 0.1, "")}},
             "must have a positive mean, got -1",
         ),
+        ({"free": ("D0",), "prior": {"D0": Prior(0.5, 0.1, "", "um")}}, "must be in m, as all"),
         ({"free": ("A",), "fixed": {"A": 0.01}}, "free or fixed"),
         ({"free": ("A",), "fixed": {"alpha": 0.1}}, "fixed must be parameters"),
         ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),
@@ -311,6 +314,17 @@ def test_a_stiffness_over_the_load_of_a_table_is_one_of_the_table(readings, pmma
     assert shown.value == pytest.approx(with_prior[0].values["K"] / pmma.W0 * 1e-6)
     with pytest.raises(InputError, match=r"prior\['K'\] must be in N/m or 1/m for a table"):
         fit(table, "elasto-plastic", ("A", "K"), prior={"K": Prior(1, 1, "", "Pa/m")}, **given)
+
+
+def test_a_column_of_one_of_several_tables_counts_in_its_rows(readings, pmma):
+    """Where a table has no load, that of the material holds."""
+    first = readings(3)
+    with_load = replace(first, points={**first.points, "W0": np.full(first.rows, 5.0)})
+    other = replace(readings(4), name="other")
+    assert "W0" not in other.points
+    both, _ = joined([with_load, other])
+    fixed = fixed_values(get_law("elasto-plastic"), both, ["A"], {"eps_ratio": 0.5}, pmma)
+    np.testing.assert_array_equal(fixed["W0"], np.repeat([5.0, pmma.W0], [first.rows, other.rows]))
 
 
 def test_one_row_with_as_many_parameters_as_data_is_refused(pmma):
@@ -389,3 +403,16 @@ def test_a_window_of_a_table_is_refused(tmp_path) -> None:
     question = Fit(data=({"file": file, "window": (0, 1)},), material="bureau2000")
     with pytest.raises(InputError, match="window must go with a recording, got a table"):
         answer_fit(question)
+
+
+def test_the_rate_dependence_with_one_of_A_and_B_fixed(readings, pmma):
+    """A - B is as uncertain as A; another minimum, which has no B either, may change its sign."""
+    found = fit(readings(3), "elasto-plastic", ("A", "eps_ratio"), material=pmma, starts=1)
+    difference, A = found.rate_dependence, found.parameters["A"]
+    assert difference.value == pytest.approx(A.value - pmma.B)
+    assert difference.error == pytest.approx(A.se)
+    assert difference.meaning == "velocity weakening"
+    other = Optimum(found.chi2 + 1, {"A": 2 * pmma.B, "eps_ratio": 0.5})
+    assert replace(found, optima=(other,)).rate_dependence.meaning == "its sign is not determined"
+    rows = replace(found.objective, fixed={**found.objective.fixed, "B": np.array([0.02, 0.03])})
+    assert replace(found, objective=rows).rate_dependence is None

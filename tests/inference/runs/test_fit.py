@@ -14,7 +14,6 @@ from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import (
-    contradicted_sharing,
     contradicted_stiffness,
     unusual_numbers,
 )
@@ -57,6 +56,23 @@ def test_priors_of_what_no_run_has_are_refused(found):
         fit(run, "rice-ruina", FREE, prior={"K[typo]": prior})
     with pytest.raises(InputError, match=r"got 'K'; free it"):
         fit(run, "rice-ruina", FREE, prior={"K": prior}, fixed={"K": 8e10})
+    # The delay of a step has a prior by the sampling.
+    with pytest.raises(InputError, match=r"\(A, B, D0, K\), got 'step_time_1'"):
+        fit(run, "rice-ruina", FREE, prior={"step_time_1": Prior(0.0, 1.0, "")})
+
+
+def test_a_recording_of_few_samples_is_refused_with_a_free_mass_too():
+    run = next(runs_of(replace(CASE, rate=0.3), 1))
+    for free, motion in ((FREE, False), ([*FREE, "M"], True)):
+        with pytest.raises(InputError, match=r"must have at least .* samples for"):
+            fit(run, "rice-ruina", free, inertia=motion)
+
+
+@pytest.mark.parametrize("name", ["K[typo]", "gain", "step_time_1", "mu0"])
+def test_starts_of_what_no_run_has_and_of_nuisances_are_refused(name):
+    (run,) = runs_of(CASE, 1)
+    with pytest.raises(InputError, match=r"start must be of free parameters \(A, B, D0, K\), got"):
+        fit(run, "rice-ruina", FREE, prior={"gain": Prior(1.0, 0.02, "")}, start={name: 1.0})
 
 
 def test_minima_that_differ_in_the_times_of_steps_alone_are_one_answer(found):
@@ -331,7 +347,6 @@ def test_a_wrong_sample_costs_as_much_as_the_largest_departure_of_noise(found):
         term.fixed,
         linear=term.linear,
         nuisances=term.nuisances,
-        own={f"step_time_{k}": f"shift_{edge}" for k, edge in enumerate(term.run.cuts, 1)},
     )
     without.models = term.models
     without._prepare()
@@ -392,7 +407,7 @@ def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():
     (run,) = runs_of(CASE, 1)
     wrong = fit(run, "rice-ruina", FREE, fixed={"K": 2 * TRUE["K"]}, start=TRUE, starts=1)
     (said,) = (w for w in wrong.warnings if "the fixed K" in w)
-    assert "contradicted by run" in said
+    assert "contradicted: run has" in said
     assert "D0" in said
     # Without a gain in AICc nothing is contradicted.
     assert contradicted_stiffness(wrong, wrong, [run], 2 * TRUE["K"]) == []
@@ -405,7 +420,7 @@ def test_a_shared_stiffness_that_the_recordings_contradict_is_named(monkeypatch)
     (other,) = runs_of(CASE, 1, seed=1)
     pair = [first, replace(other, name="stiffer")]
     both = fit(pair, "rice-ruina", [*FREE, "K"], start=begin, starts=1)
-    assert contradicted_sharing(both, both, pair) == []
+    assert contradicted_stiffness(both, both, pair) == []
     (said,) = (w for w in both.warnings if "share" in w)
     for name, factor in (("run", 1.0), ("stiffer", 1.8)):
         low, high = (
@@ -454,6 +469,26 @@ def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, f
     given = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0, **fixed}
     with pytest.raises(InputError, match=r"K must be in Pa/m for .*, got that of a table in N/m"):
         fit([readings(), term.run], "rice-ruina", free, fixed=given)
+
+
+def test_a_stiffness_that_readings_share_may_be_given_over_the_load(found):
+    (term,) = found.objective.terms
+    run = replace(term.run, load_unit="N", W0=1000.0)
+    both = fit(
+        [readings(), run],
+        "rice-ruina",
+        [*FREE, "K"],
+        fixed={"mu0": 0.6, "V0": 1e-6, "W0": 1000.0},
+        prior={"K": Prior(coverage.STIFFNESS, 0.001 * coverage.STIFFNESS, "unloading", "1/m")},
+        start={
+            "K": f"{1e-6 * coverage.STIFFNESS} 1/um",
+            **{name: found.values[name] for name in FREE},
+        },
+        starts=1,
+    )
+    K = both.parameters["K"]
+    assert K.unit == "N/m"
+    assert K.value == pytest.approx(1000.0 * coverage.STIFFNESS, rel=0.01)
 
 
 @pytest.mark.parametrize(("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7)])
@@ -618,3 +653,10 @@ def test_basalt():
     # What the record shows by eye: steady friction rises by less than 1e-3 from 3 to 10 um/s.
     assert abs(found.values["A"] - found.values["B"]) < 1e-3
     assert found.parameters["D0"].se > 1.5 * white.parameters["D0"].se
+
+
+def test_a_stiffness_that_is_not_determined_is_not_so_over_the_load_either(found):
+    lines = replace(found, undetermined=("K",)).summary()[1]
+    said = {line[0]: line[1] for line in lines}
+    assert said["K"] == said["K/W0"] == "not determined"
+    assert said["A"] != "not determined"

@@ -123,24 +123,20 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
 
     Values that break the rule of their parameter are replaced by the next values of the sequence.
     """
-    count, names, expected = (
-        plan.question.draws,
-        list(plan.uncertainty),
-        expected_values(plan.truth),
-    )
+    count, expected = plan.question.draws, expected_values(plan.truth)
     if not count:
         return ()
     rules = {u.name: RULES[u.parameter.rule] for u in plan.truth.unknowns}
     # Imported here: slow to load.
     from scipy.stats.qmc import Sobol
 
-    sequence = Sobol(len(names), seed=plan.question.seed)
+    sequence = Sobol(len(plan.uncertainty), seed=plan.question.seed)
     result: list[dict[str, float]] = []
     while len(result) < count:
         for row in ndtri(sequence.random(max(8, 1 << (count - 1).bit_length()))):
             drawn = {
-                n: expected[n] + plan.uncertainty[n] * float(z)
-                for n, z in zip(names, row, strict=True)
+                n: expected[n] + sd * float(z)
+                for (n, sd), z in zip(plan.uncertainty.items(), row, strict=True)
             }
             if all(bool(rules[n].holds(x)) for n, x in drawn.items()):
                 result.append({**expected, **drawn})

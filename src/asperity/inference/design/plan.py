@@ -22,13 +22,14 @@ from asperity.inference.fitting.inputs import (
     start_values,
 )
 from asperity.inference.objective import Objective
+from asperity.inference.runs.assembly import stiffness_of_table
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
-from asperity.inference.unknowns import EPS_RATIO, unknowns_of
+from asperity.inference.unknowns import EPS_RATIO, require_free_names, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import number, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Noise, Range
 from asperity.questions.record import require_unit as with_unit, units_required
@@ -183,6 +184,8 @@ def _checked(question: Design, name: str) -> DesignPlan:
         holds = rival_law is not law or not set(truth.names) <= set(rival.names)
         rule, got = "differ from the law", f"{law.name} with the same free parameters"
         require(holds, "rival", rule, got, "name another law, or leave one out in rival_free")
+    known_to_both = (*truth.unknowns, *(rival.unknowns if rival else ()))
+    require_free_names(known_to_both, None, {n: p for n, p in question.prior.items() if p})
     noise = _noise(question)
     uncertainty = _uncertainties(question, known, material, truth)
     plan = DesignPlan(name, question, axes, noise, truth, rival, uncertainty)
@@ -333,14 +336,10 @@ def _hypothesis(
     got = f"none for {', '.join(missing)}"
     require(not missing, "values", rule, got, "a design is made for values that are expected")
     constants = fixed_values(law, table, free, fixed, material)
+    load, largest = constants.get("W0", math.nan), float(table.points["epsilon"].max())
+    start, priors = stiffness_of_table(start, priors_of(question.prior, free), load)
+    unknowns = unknowns_of(law, free, largest_epsilon=largest, start=start, priors=priors)
     constants = {n: float(v) for n, v in constants.items() if n not in table.points}
-    unknowns = unknowns_of(
-        law,
-        free,
-        largest_epsilon=float(table.points["epsilon"].max()),
-        start=start,
-        priors=priors_of(question.prior, free),
-    )
     return Objective((), law, unknowns, constants)
 
 
@@ -356,10 +355,8 @@ def _uncertainties(
         label = f"uncertainty.{name}"
         holds, rule = name in known and name in truth.names, "be of free parameters"
         require(holds, "uncertainty", rule, f"'{name}'", "free it or leave it out")
-        with_unit(value, known[name].kind, label)
-        given[name] = float(to_si(value, known[name].kind, label))
-        if given[name] < 0:
-            raise InputError(label, "not be negative", f"{given[name]:g}", "change it")
+        kind = known[name].kind
+        given[name] = number(with_unit(value, kind, label), label, kind, "not negative")
     for name in truth.names:
         if material is not None and name in material and material[name].uncertainty:
             given.setdefault(name, float(material[name].si_uncertainty or 0.0))

@@ -194,7 +194,6 @@ _ROUNDS = 200
 _NEGLIGIBLE = 1e-5
 #: Number of candidates that join the support in one round.
 _JOINING = 3
-_MULTIPLICATIVE_STEPS = 20
 #: Sweeps of exchanges of whole readings.
 _SWEEPS = 30
 
@@ -259,15 +258,11 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
 
 def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     """Optimal shares of a few candidates."""
-    # Multiplicative steps always improve slowly; the quadratic method then converges quickly.
-    shares = start
-    for _ in range(_MULTIPLICATIVE_STEPS):
-        shares = _multiplied(criterion, readings, shares)
     result = minimize(
         lambda s: -criterion.value(s * readings),
-        shares,
+        start,
         jac=lambda s: -criterion.gradient(s * readings) * readings,
-        bounds=[(0.0, 1.0)] * shares.size,
+        bounds=[(0.0, 1.0)] * start.size,
         constraints=[
             {"type": "eq", "fun": lambda s: s.sum() - 1, "jac": lambda s: np.ones_like(s)}
         ],
@@ -276,14 +271,7 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     )
     improved = np.clip(result.x, 0.0, None)
     improved /= improved.sum()
-    return max(shares, improved, key=lambda s: criterion.value(s * readings))
-
-
-def _multiplied(criterion: Criterion, readings: Float, shares: Float) -> Float:
-    """A multiplicative step (Silvey, Titterington and Torsney, 1978)."""
-    slope = np.maximum(criterion.gradient(shares * readings) * readings, 0.0)
-    grown = shares * np.sqrt(slope)
-    return grown / grown.sum() if grown.sum() > 0 else shares
+    return max(start, improved, key=lambda s: criterion.value(s * readings))
 
 
 def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Float) -> Whole:

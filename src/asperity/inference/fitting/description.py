@@ -319,11 +319,9 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     and C the covariance of the coordinates.
     """
     values, slopes = objective.prior_residuals(at.u)
-    with_prior = [k for k in objective.unknowns if k.prior is not None]
+    with_prior = [(k, k.prior) for k in objective.unknowns if k.prior is not None]
     warnings = []
-    for unknown, r, j in zip(with_prior, values, slopes, strict=True):
-        prior = unknown.prior
-        assert prior is not None  # by the choice of unknowns
+    for (unknown, prior), r, j in zip(with_prior, values, slopes, strict=True):
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
             warnings.append(
@@ -351,7 +349,7 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
     Two standard deviations away in a coordinate, with the other coordinates following, chi-squared
     should rise by four.
     """
-    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    low, high = objective.bounds
     sd = at.sd
     result = []
     for i, unknown in enumerate(objective.unknowns):
@@ -389,18 +387,12 @@ def _open_ended(objective: Objective, at: Parabola, bent: Sequence[str]) -> list
             there = objective.minimise(at.u, {i: x}, tolerance=1e-4)
             if there.chi2 - at.chi2 < _COMPARED_AT**2:
                 values = objective.named(there.u)
-                changed = [
-                    k.name
-                    for k in objective.unknowns
-                    if not k.nuisance and _differs(values[k.name], best[k.name])
-                ]
+                # Those that differ by more than a factor of e, or in their sign.
+                share = 1 - math.exp(-UNDETERMINED)
+                pairs = [(k.name, values[k.name], best[k.name]) for k in objective.interest]
+                changed = [n for n, a, b in pairs if abs(a - b) > share * max(abs(a), abs(b))]
                 result += [name, *changed]
     return list(dict.fromkeys(result))
-
-
-def _differs(value: float, other: float) -> bool:
-    """Whether two values differ by more than a factor of e, or in their sign."""
-    return abs(value - other) > (1 - math.exp(-UNDETERMINED)) * max(abs(value), abs(other))
 
 
 def _chi2_after_step(objective: Objective, u: Float, i: int) -> float:
@@ -411,7 +403,7 @@ def _chi2_after_step(objective: Objective, u: Float, i: int) -> float:
     others = np.arange(u.size) != i
     step = np.zeros_like(u)
     step[others] = -np.linalg.lstsq(J[:, others], r, rcond=1e-10)[0]
-    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    low, high = objective.bounds
     trial = np.clip(u + step, low + 1e-10, high - 1e-10)
     return min(objective.chi2(trial), float(r @ r))
 
@@ -524,16 +516,13 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
         return tuple(outlying_rows(data[tables[0]])) if data else (), None
     u = at.u
 
+    rows = np.concatenate([at.data[0].row, np.full(at.priors, -1)])
+
     def whole(objective: Objective) -> Residuals | None:
-        data = objective.data_residuals(u)
-        if data is None:
+        values, slopes = objective.residuals(u)
+        if not np.isfinite(values).all():
             return None
-        values, slopes = objective.prior_residuals(u)
-        return data[0]._replace(
-            values=np.concatenate([data[0].values, values]),
-            jacobian=np.vstack([data[0].jacobian, slopes]),
-            row=np.concatenate([data[0].row, np.full(values.size, -1)]),
-        )
+        return at.data[0]._replace(values=values, jacobian=slopes, row=rows)
 
     def refit(objective: Objective, weights: Float) -> Residuals | None:
         nonlocal u

@@ -13,7 +13,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
@@ -21,18 +20,15 @@ from asperity.inference.fitting.estimated_noise import under_drift, with_noise
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
-    of_the_table,
     require_counted,
     require_enough,
-    require_free,
     require_masses,
     require_motion,
-    require_rows,
+    require_some,
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.plausibility import (
-    contradicted_sharing,
     contradicted_stiffness,
     stiffness_that_describes,
     unusual_numbers,
@@ -46,22 +42,27 @@ from asperity.inference.runs.assembly import (
     require_calibrated,
     require_newtons,
     require_no_layer,
-    require_own_priors,
     require_own_samples,
     require_seen,
     run_terms,
     shared_stiffness,
-    stiffness_in,
+    stiffness_of_table,
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser
 from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of
+from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import LockInTerm
-from asperity.inference.unknowns import Prior, material_priors, unknowns_of
+from asperity.inference.unknowns import (
+    Prior,
+    material_priors,
+    material_values,
+    require_free_names,
+    unknowns_of,
+)
 from asperity.laws import Law, get_law
 from asperity.materials import Material
 from asperity.parameters import MACHINE, law_parameters
@@ -70,7 +71,8 @@ from asperity.recording import Trace
 
 #: Largest number of rounds of searching for wrong samples and fitting without them.
 _CLEANINGS = 4
-#: Assumed mu0 (dimensionless) and V0 (m/s) for data that are measured relative to sliding.
+#: Assumed mu0 (dimensionless) and V0 (m/s) for healing: it is measured relative to sliding, so that
+#: mu0 has no influence.
 _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 
 Data = LockInTable | HealingTable | AveragedCycle | RecordedRun | Trace
@@ -170,13 +172,13 @@ def fit(
         if some and len(some) < len(several):
             advice = "fit them one after the other, with the first as the prior of the second"
             raise InputError("data", f"be {what} alone or other data", "both", advice)
+    if not (recordings or cycles or bare):
+        require_some(chosen, names)
     numbers = _Given(fixed or {}, material, prior, start)
     motion: dict[str, Any] = {"inertia": inertia, "radiation_damping": radiation_damping}
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
-        return _objective(
-            chosen, table, recordings, names, numbers, options=options, motion=motion, bare=bare
-        )
+        return _objective(chosen, table, recordings, names, numbers, options=options, motion=motion)
 
     if cycles:
         # A cycle needs a mass.
@@ -184,7 +186,7 @@ def fit(
         objective = _cycle_objective(chosen, cycles, free, numbers)
     elif holds:
         require_counted(numbers.fixed, motion, (), "a table of holds")
-        objective = _hold_objective(chosen, joined_holds(holds), names, numbers, bare=bare)
+        objective = _hold_objective(chosen, joined_holds(holds), names, numbers)
     else:
         objective = compared(recordings)
     steps = _Steps(progress, len(objective.unknowns))
@@ -200,18 +202,21 @@ def fit(
         minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
         return with_noise(objective, minima, searched) if minima and recordings else (minima, True)
 
-    minima, agreed = minima_under(objective, recordings)
     cleaner = recordings
-    for _ in range(_CLEANINGS):
+    for left in reversed(range(_CLEANINGS + 1)):
+        minima, agreed = minima_under(objective, cleaner)
         if not minima or not math.isfinite(minima[0].chi2):
-            break
-        before, cleaner = cleaner, _without_wrong_samples(objective, minima[0].u, recordings)
-        if [(r.wrong or (), r.doubts) for r in before] == [(r.wrong, r.doubts) for r in cleaner]:
+            return failed_fit(objective)
+        # Samples that neither the motion nor noise explains are left out of the next fit.
+        values, terms = objective.named(minima[0].u), objective.terms_of(RunTerm)
+        before = [(run.wrong or (), run.doubts) for run in cleaner]
+        cleaner = [
+            with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
+            for run, term in zip(recordings, terms, strict=True)
+        ]
+        if not left or before == [(run.wrong, run.doubts) for run in cleaner]:
             break
         objective = compared(cleaner)
-        minima, agreed = minima_under(objective, cleaner)
-    if not minima or not math.isfinite(minima[0].chi2):
-        return failed_fit(objective)
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
         minima = _with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
@@ -223,7 +228,9 @@ def fit(
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
-        begun = {**(start or {}), **_begun(result, recordings, given)}
+        laws = {k.name: result.values[k.name] for k in result.objective.interest}
+        # The K of each recording begins at the fixed or shared one.
+        begun = {**(start or {}), "K": given, **laws}
         others = {n: v for n, v in numbers.fixed.items() if n != "K"}
         freed = fit(
             recordings,
@@ -235,26 +242,8 @@ def fit(
             starts=1,
             seed=seed,
         )
-        said += (
-            contradicted_sharing(result, freed, recordings)
-            if shared
-            else contradicted_stiffness(result, freed, recordings, given)
-        )
+        said += contradicted_stiffness(result, freed, recordings, given)
     return replace(result, warnings=(*said, *result.warnings))
-
-
-def _without_wrong_samples(
-    objective: Objective, u: Float, recordings: Sequence[RecordedRun]
-) -> list[RecordedRun]:
-    """Recordings without wrong samples: those that neither the motion at u nor noise explains.
-
-    Recordings whose spikes the user has named are unchanged.
-    """
-    values, terms = objective.named(u), objective.terms_of(RunTerm)
-    return [
-        with_wrong_samples(run, term.wrong_samples(values) if run.wrong is None else run.wrong)
-        for run, term in zip(recordings, terms, strict=True)
-    ]
 
 
 class _Given(NamedTuple):
@@ -272,30 +261,19 @@ class _Given(NamedTuple):
 
 
 def _hold_objective(
-    law: type[Law],
-    table: HealingTable,
-    free: list[str],
-    given: _Given,
-    *,
-    bare: bool,
+    law: type[Law], table: HealingTable, free: list[str], given: _Given
 ) -> Objective:
     """The function to minimise for a table of holds; all inputs are checked."""
     numbers = law_parameters(law)
     for name in free:
         holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
         require(holds, "free", f"be parameters of {law.name} with holds", f"'{name}'", advice)
-    priors = given.priors(free)
-    require_free(law, free, priors, bare=bare)
-    # Healing is measured relative to sliding, so that mu0 has no influence.
-    assumed = {n: v for n, v in _OF_THE_LEVEL.items() if n in numbers and n not in free}
-    material = given.material
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
-    known = {n for n in assumed if material is not None and n in material} | set(fixed)
-    fixed |= {n: v for n, v in assumed.items() if n not in known}
-    constants = fixed_values(law, None, free, fixed, material)
-    begun = start_values(law, free, given.start, material)
-    unknowns = unknowns_of(law, free, largest_epsilon=0.0, start=begun, priors=priors)
-    require_rows(table.name, table.rows, unknowns)
+    constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
+    begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
+    unknowns = unknowns_of(law, free, start=begun, priors=priors)
+    require_free_names(unknowns, given.start, priors)
+    require_enough(table.name, table.rows, unknowns)
     term = HoldTerm(table, law, constants)
     return Objective((term,), law, unknowns, constants, tolerance=1e-9)
 
@@ -313,6 +291,7 @@ def _cycle_objective(
     level = float(np.mean(first.values[:-1]))
     fixed = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | fixed
     names = [n for n in (*numbers, "K", "M") if n not in fixed] if free is None else list(free)
+    require_some(law, names)
     advice = "leave it out: a constant friction is fitted in each cycle"
     require("mu0" not in names, "free", "be what the shape of a cycle shows", "'mu0'", advice)
     unseen = [c.name for c in cycles if not c.resolved]
@@ -327,16 +306,15 @@ def _cycle_objective(
         advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
         raise InputError(f"{missing[0]}", "be free or fixed for a fit of cycles", "neither", advice)
     priors = given.priors(names)
-    require_free(law, names, priors, bare=False)
     # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
     K = first.loading_slope * first.W0 / first.V
     M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
     begun = {"K": K, "M": M} | start_values(law, names, given.start, given.material)
+    begun, priors = stiffness_of_table(begun, priors, [cycle.W0 for cycle in cycles])
     usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
-    unknowns = unknowns_of(
-        law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
-        priors=priors, usual=usual,
-    )  # fmt: skip
+    begun = {n: v for n, v in begun.items() if n in names}
+    unknowns = unknowns_of(law, names, start=begun, priors=priors, usual=usual)
+    require_free_names(unknowns, given.start, priors)
     # A cycle needs a mass.
     unknowns = tuple(
         replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
@@ -380,25 +358,13 @@ class _Steps:
         self._report(self._total + done, self._total + total)
 
 
-def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
-    """Start of a fit with a stiffness for each recording: a fit with a fixed or shared one."""
-    laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
-    several = len(recordings) > 1
-    return laws | {
-        f"K[{run.name}]" if several else "K": (
-            laws["K"] if given is None else stiffness_in(run, given)
-        )
-        for run in recordings
-    }
-
-
 def listed_data(
     data: Data | Iterable[Data], options: RunOptions
 ) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
     """Data as a list, with recordings as `RecordedRun`."""
-    of_its_own = LockInTable | HealingTable | AveragedCycle
-    several = [data] if isinstance(data, of_its_own | RecordedRun | Trace) else list(data)
-    ready = [d if isinstance(d, of_its_own) else run_of(d) for d in several]
+    of_its_own = LockInTable | HealingTable | AveragedCycle | RecordedRun
+    several = [data] if isinstance(data, of_its_own | Trace) else list(data)
+    ready = [d if isinstance(d, of_its_own) else recorded_run(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
     return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
@@ -413,7 +379,6 @@ def _objective(
     *,
     options: RunOptions,
     motion: Mapping[str, bool],
-    bare: bool,
 ) -> Objective:
     """The function to minimise; all inputs are checked before anything is computed."""
     fixed, material = given.fixed, given.material
@@ -432,18 +397,22 @@ def _objective(
         require_newtons(recordings)
     named = [name for name in free if not (name == "K" and recordings and table is None)]
     priors = given.priors(free)
-    begun = start_values(law, free, given.start, material, runs=recordings)
-    constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    assumed = {}
+    if recordings and table is None:
+        first = recordings[0]
+        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    constants = fixed_values(law, table, free, fixed, material, assumed=assumed)
     require_masses(free, constants, motion)
-    if table is not None and not recordings:
-        begun, priors = of_the_table(begun, priors, constants)
+    begun = start_values(law, free, given.start, material, runs=recordings)
+    if table is not None and shared:
+        begun, priors = stiffness_of_table(begun, priors, constants.get("W0", math.nan))
     if recordings:
-        published = material is not None and "mu0" in material and material["mu0"].value is not None
         require_calibrated(
             recordings,
             free,
             priors,
-            mu0_given=published or "mu0" in (*free, *fixed) or table is not None,
+            mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
+            or table is not None,
             beside_table=table is not None,
         )
         # Its prior makes it free.
@@ -464,10 +433,9 @@ def _objective(
         )
     )
     terms: list[DataTerm] = []
-    if table is not None and not recordings:
-        require_free(law, free, priors, bare=bare)
     if table is not None:
-        require_enough(table, unknowns)
+        count = sum(int(np.isfinite(v).sum()) for v in table.values.values())
+        require_enough(table.name, count, unknowns)
         terms.append(LockInTerm(table, law, constants, **motion))
     if recordings:
         if shared and table is None:
@@ -484,11 +452,13 @@ def _objective(
             start=begun,
             priors=priors,
             options=options,
-            **motion,
+            motion=motion,
         )
         terms += own
         unknowns += nuisances
-        require_own_priors(unknowns, priors)
+    # The start of a K that is fixed has no influence.
+    of_free = {n: v for n, v in (given.start or {}).items() if not (n == "K" and recordings)}
+    require_free_names(unknowns, of_free, priors)
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -23,6 +22,7 @@ from asperity.inference.unknowns import (
     UnfittableLawError,
     Unknown,
     material_priors,
+    material_values,
     require_fittable,
 )
 from asperity.laws import Law, registered
@@ -41,6 +41,8 @@ from asperity.units import KINDS, format_si, to_si
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
 
+#: Parameters that count with an option of the equation of motion.
+_OF_OPTIONS = {"M": "inertia", "eta": "radiation_damping"}
 #: Velocity (m/s) at which a free mu0 is reported, if no other is given.
 _REFERENCE_VELOCITY = 1e-6
 
@@ -89,53 +91,21 @@ def start_values(
     *,
     runs: Sequence[RecordedRun] = (),
 ) -> dict[str, Any]:
-    """Start values by name in SI, from the user and a material.
+    """Start values by name in SI, from the user and a material; K as it is given.
 
     Raises
     ------
     InputError
-        If a name is not free or a value is wrong.
+        If a value is wrong.
     """
-    known = {
-        name: material[name].si
-        for name in free
-        if not (name == "K" and runs)
-        if material is not None and name in material and material[name].value is not None
-    }
+    known: dict[str, Any] = {**material_values(material, free)}
+    if runs:
+        known.pop("K", None)
     for name, value in (start or {}).items():
-        rule, advice = "be of free parameters", "free it or leave it out"
-        require(name in free or (name.startswith("K") and runs), "start", rule, f"'{name}'", advice)
-        # A stiffness of a recording is converted with its run, which has the unit.
-        known[name] = value if name.startswith("K") else float(_checked(law, "start", name, value))
+        # K is converted with its data, which have the unit; `require_free_names` refuses others.
+        plain = name in free and name.partition("[")[0] not in ("K", GAIN)
+        known[name] = float(_checked(law, "start", name, value)) if plain else value
     return known
-
-
-def of_the_table(
-    start: Mapping[str, Any], priors: Mapping[str, Prior], constants: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, Prior]]:
-    """Start and prior of K in N/m, converted if they are given over the load.
-
-    Raises
-    ------
-    InputError
-        If the load is no single number, or the prior is of a stress.
-    """
-    start, priors = dict(start), dict(priors)
-    prior, text = priors.get("K"), start.get("K")
-    load = np.unique(constants.get("W0", math.nan))
-    over = over_load(text)
-    elsewhere = prior is not None and prior.unit not in ("", "N/m")
-    if (over is not None or elsewhere) and not (load.size == 1 and math.isfinite(load[0])):
-        rule = "come with one fixed W0"
-        raise InputError("K over the load", rule, "several or none", "give K in N/m")
-    if text is not None:
-        start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
-    if prior is not None and elsewhere:
-        rule = "be in N/m or 1/m for a table"
-        require(prior.unit == "1/m", Argument("prior", "K"), rule, prior.unit, "convert it")
-        W0 = float(load[0])
-        priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
-    return start, priors
 
 
 def fixed_values(
@@ -145,13 +115,13 @@ def fixed_values(
     fixed: Mapping[str, Any] | None,
     material: Material | None,
     *,
-    runs: Sequence[RecordedRun] = (),
+    assumed: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Values of all parameters that are not free, by name in SI.
 
-    Without a table, parameters of operating points are left out, and the runs supply load, mu0 (the
-    first friction) and V0 (the first velocity). If mu0 is free and V0 is not given, V0 is 1 um/s:
-    the velocity at which mu0 is reported.
+    Without a table, parameters of operating points are left out. Numbers that are given nowhere are
+    those in `assumed`. If mu0 is free and V0 is not given, V0 is 1 um/s: the velocity at which mu0
+    is reported.
 
     Raises
     ------
@@ -166,10 +136,9 @@ def fixed_values(
         known = {
             n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
         }
-    assumed = {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
-    if runs and table is None:
-        first = runs[0]
-        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    elsewhere = {n: p.default for n, p in known.items() if p.default is not None}
+    elsewhere |= {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
+    elsewhere |= {**(assumed or {}), **material_values(material, known)}
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
         require(name not in free, name, "be free or fixed", "both", "leave one out")
@@ -179,22 +148,22 @@ def fixed_values(
         require(name in known or name == "eps_ratio", "fixed", rule, f"'{name}'", advice)
     result: dict[str, Any] = {}
     missing = []
-    for name, parameter in known.items():
+    for name in known:
         if name in free or name == "inertia":
             continue
+        column = points.get(name, np.nan)
         if name in given:
             over = over_load(given[name]) if name == "K" else None
             result[name] = _checked(law, "fixed", name, given[name]) if over is None else over
-        elif name in points and np.isfinite(points[name]).all():
-            result[name] = points[name]
-        elif material is not None and name in material and material[name].value is not None:
-            result[name] = material[name].si
-        elif name in assumed:
-            result[name] = assumed[name]
-        elif parameter.default is not None:
-            result[name] = parameter.default
-        else:
+        elif np.isfinite(column).all():
+            result[name] = column
+        elif name not in elsewhere:
             missing.append(name)
+        elif np.isfinite(column).any():
+            # One of several tables has this column.
+            result[name] = np.where(np.isfinite(column), column, elsewhere[name])
+        else:
+            result[name] = elsewhere[name]
     if missing:
         raise UnfittableLawError(
             law.name,
@@ -235,20 +204,15 @@ def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
         raise error.about(Argument(field, key=name)) from None
 
 
-def require_free(
-    law: type[Law], free: Sequence[str], priors: Mapping[str, Prior], *, bare: bool
-) -> None:
-    """Refuse a fit to tables without free parameters unless `bare`, and priors of fixed parameters.
+def require_some(law: type[Law], free: Sequence[str]) -> None:
+    """Refuse a fit without free parameters.
 
     Raises
     ------
     InputError
     """
     rule = f"name a parameter of {law.name}"
-    require(free or bare, "free", rule, "none", "free one, such as A or eps_ratio")
-    for name in priors:
-        rule = "be of free parameters"
-        require(name in free, "prior", rule, f"'{name}'", "free it or leave the prior out")
+    require(free, "free", rule, "none", "free one, such as A or eps_ratio")
 
 
 def require_motion(
@@ -269,12 +233,9 @@ def require_motion(
     ------
     InputError
     """
-    for name, option, word in (
-        ("M", "inertia", "inertia"),
-        ("eta", "radiation_damping", "radiation damping"),
-    ):
+    for name, option in _OF_OPTIONS.items():
         if name in names and not motion[option]:
-            got = f"'{name}', which has no influence without {word}"
+            got = f"'{name}', which has no influence without {option.replace('_', ' ')}"
             advice = f"add {Argument(option, value='True')} or leave it out"
             raise InputError(label, "be parameters that count", got, advice)
 
@@ -296,7 +257,7 @@ def require_masses(
     ------
     InputError
     """
-    for option, name in (("inertia", "M"), ("radiation_damping", "eta")):
+    for name, option in _OF_OPTIONS.items():
         known = name in free or np.all(np.asarray(constants.get(name, 0.0)) > 0)
         like = Argument("fixed", name, MACHINE[name].example)
         advice = f"add {like}, or name it in {Argument('free')}"
@@ -331,27 +292,20 @@ def require_counted(
         require(not given, Argument("fixed", name), rule, f"it with {data}", advice)
 
 
-def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
-    """Refuse a table unless it has more data than free parameters; one each is an inversion.
+def require_enough(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
+    """Refuse a table of `count` data unless it has more of them than free parameters.
 
-    With equally many data and parameters, the minima form a valley if some parameters have no
-    influence, and no degree of freedom is left to judge the law.
+    With one datum for the only parameter, the fit is an inversion. With equally many data and
+    parameters, the minima form a valley if some parameters have no influence, and no degree of
+    freedom is left to judge the law.
 
     Raises
     ------
     InputError
     """
-    count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
-    require_rows(table.name, count, unknowns)
-
-
-def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
-    """Refuse `count` data unless they are more than the free parameters."""
     needed = sum(1 for u in unknowns if u.prior is None)
-    rule, advice = (
-        "hold more data than free parameters",
-        f"free fewer with {Argument('free')}, or measure more",
-    )
+    rule = "hold more data than free parameters"
+    advice = f"free fewer with {Argument('free')}, or measure more"
     got = f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})"
     require(not count < max(needed + (needed > 1), 1), name, rule, got, advice)
 

@@ -229,7 +229,7 @@ def _known_at_bound(objective: Objective, u: Float) -> Bool:
 
     A stiffness at its bound is not among them, because the data bound it on the other side.
     """
-    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    low, high = objective.bounds
     linear = np.array([k.nuisance and not k.logarithmic for k in objective.unknowns], bool)
     room = np.where(np.isfinite(high - low), high - low, 1.0)
     return np.asarray(linear & (np.minimum(u - low, high - u) < _AT_BOUND * room))
@@ -243,7 +243,7 @@ def _gradient_at_bounds(
     The gradient of other coordinates is zero at the exact minimum. In a nearly flat valley a
     minimisation leaves a small gradient, which says nothing about the position of the minimum.
     """
-    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    low, high = objective.bounds
     sd = np.sqrt(np.diag(covariance))
     at_low = (gradient > 0) & (u - low < _NEAR_BOUND * sd)
     at_high = (gradient < 0) & (high - u < _NEAR_BOUND * sd)

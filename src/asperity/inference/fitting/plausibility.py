@@ -30,76 +30,47 @@ _FAR_STIFFNESS = (1e2, 1e6)
 
 
 def contradicted_stiffness(
-    fit: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
+    fit: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any = None
 ) -> list[str]:
-    """Sentences on a fixed stiffness that recordings contradict.
+    """Sentences on a stiffness that recordings contradict: a fixed one, or one that they share.
 
     Parameters
     ----------
     fit, freed : Fit
-        Fits with the stiffness fixed and free.
+        Fits with the fixed or shared stiffness, and with a free one for each recording.
     runs : sequence of RecordedRun
-    given : str or float
-        The fixed stiffness.
+    given : str or float, optional
+        The fixed stiffness; None if the recordings share a free one.
     """
-    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
+    gain = fit.aicc - freed.aicc
+    if not freed.converged or gain < _CONTRADICTED_AICC:
         return []
-    said = []
-    for run in runs:
-        estimate = freed.parameters.get("K" if len(runs) == 1 else f"K[{run.name}]")
-        if estimate is None:
-            continue
-        fixed = stiffness_in(run, given)
-        low, high = estimate.interval_95
-        if low <= fixed <= high:
-            continue
-        said.append(
-            f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
-            f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
-            f"{fit.aicc - freed.aicc:.3g} with K free"
-            + _moved(fit, freed)
-            + "; leave K free, or give it a prior"
-        )
-    return said
-
-
-def contradicted_sharing(fit: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
-    """A sentence on a stiffness that recordings share although their stiffnesses differ.
-
-    Parameters
-    ----------
-    fit, freed : Fit
-        Fits with one stiffness for all recordings, and with one for each.
-    runs : sequence of RecordedRun
-    """
-    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
-        return []
-    shared = fit.parameters["K"]
-    own = []
-    for run in runs:
-        estimate = freed.parameters[f"K[{run.name}]"]
-        low, high = estimate.interval_95
-        own.append(
-            f"{run.name} has {estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %), "
-            f"{estimate.value / shared.value:.3g} times it"
-        )
-    return [
-        f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
-        + ", ".join(own)
-        + f"; AICc falls by {fit.aicc - freed.aicc:.3g} with a K for each"
-        + _moved(fit, freed)
-        + "; leave K out of the free parameters, so that each has its own"
-    ]
-
-
-def _moved(fit: Fit, freed: Fit) -> str:
-    """Parameters of the law with the stiffness free, and before, as text."""
     moved = ", ".join(
         f"{n} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
         if n in fit.values and n in freed.values
     )
-    return f", which gives {moved}" if moved else ""
+    moved = f", which gives {moved}" if moved else ""
+    own, said = [], []
+    for run in runs:
+        K = freed.parameters["K" if len(runs) == 1 else f"K[{run.name}]"]
+        low, high = K.interval_95
+        found = f"{run.name} has {K.value:.4g} ({low:.4g} to {high:.4g}, 95 %)"
+        if given is None:
+            own.append(f"{found}, {K.value / fit.values['K']:.3g} times it")
+        elif not low <= (fixed := stiffness_in(run, given)) <= high:
+            said.append(
+                f"the fixed K of {fixed:.4g} {K.unit} is contradicted: {found}; AICc falls by "
+                f"{gain:.3g} with K free{moved}; leave K free, or give it a prior"
+            )
+    if given is None:
+        shared = fit.parameters["K"]
+        said.append(
+            f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
+            f"{', '.join(own)}; AICc falls by {gain:.3g} with a K for each{moved}; leave K out of "
+            "the free parameters, so that each has its own"
+        )
+    return said
 
 
 def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
@@ -147,47 +118,40 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     progress : callable, optional
         Called with the number of minimisations done and of all minimisations.
     """
-    freed = _freed(fit, progress)
-    if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
-        return ""
-    estimate, given = freed.parameters["K"], float(np.ravel(fit.objective.fixed["K"])[0])
-    low, high = estimate.interval_95
-    if low <= given <= high:
-        return ""
-    numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
-    return (
-        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
-        f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / given:.3g} "
-        f"times the given {given:.4g} N/m"
-        + (f", with {numbers}" if numbers else "")
-        + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "
-        "prior"
-    )
-
-
-def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
-    """The fit with K free; None if K is free already or the law describes the table."""
     objective = fit.objective
     given = np.unique(objective.fixed.get("K", ()))
     tables = objective.terms_of(LockInTerm)
     if not (tables and len(objective.terms) == 1 and given.size == 1 and fit.converged):
-        return None
+        return ""
     if fit.dof <= 0 or fit.p_value >= _FAILS:
-        return None
-    (term,) = tables
+        return ""
+    (term,), (K,) = tables, given.tolist()
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
-    largest = float(term.table.points["epsilon"].max())
-    start = {"K": float(given[0])}
-    (own,) = unknowns_of(objective.law, ["K"], largest_epsilon=largest, start=start, priors={})
-    freed = replace(
+    (own,) = unknowns_of(objective.law, ["K"], start={"K": K}, priors={})
+    free = replace(
         objective,
         terms=(LockInTerm(term.table, objective.law, fixed, **term.motion),),
         unknowns=(*objective.unknowns, own),
         fixed=fixed,
     )
     # Starts: special cases, random starts, and the estimate with the given stiffness.
-    minima = minima_of(freed, 0, progress, simpler=[{**fit.values, **start}])
-    return described_fit(freed, minima, profile=False) if minima else None
+    minima = minima_of(free, 0, progress, simpler=[{**fit.values, "K": K}])
+    freed = described_fit(free, minima, profile=False) if minima else None
+    if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
+        return ""
+    estimate = freed.parameters["K"]
+    low, high = estimate.interval_95
+    if low <= K <= high:
+        return ""
+    numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
+    return (
+        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
+        f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / K:.3g} "
+        f"times the given {K:.4g} N/m"
+        + (f", with {numbers}" if numbers else "")
+        + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "
+        "prior"
+    )
 
 
 def shift_of_estimates(

@@ -215,30 +215,28 @@ class Fit(Drawn):
 
     @property
     def rate_dependence(self) -> RateDependence | None:
-        """A - B; None where the law has no A and B, or one of them is not determined."""
-        known = {*self.parameters, *self.objective.fixed} - {*self.undetermined}
-        if not {"A", "B"} <= known:
-            return None
+        """A - B; None where the law has no A and B, or one of them is not determined.
+
+        None too if one of them is fixed to several values, one for each row of a table.
+        """
         signs = {"A": 1.0, "B": -1.0}
-        value = sum(
-            sign * (self.values[n] if n in self.parameters else float(self.objective.fixed[n]))
-            for n, sign in signs.items()
-        )
+        fixed = {n: np.unique(self.objective.fixed.get(n, ())) for n in signs}
+        known = {n: float(v[0]) for n, v in fixed.items() if v.size == 1} | self.values
         free = [i for i, name in enumerate(self.parameters) if name in signs]
-        if not free:
+        if not free or not signs.keys() <= known.keys() - {*self.undetermined}:
             return None
+        value = known["A"] - known["B"]
         errors = np.array([signs[n] * p.se for n, p in self.parameters.items() if n in signs])
         variance = float(errors @ self.correlation[np.ix_(free, free)] @ errors)
         if not math.isfinite(variance):
             return None
         error = math.sqrt(max(variance, 0.0))
         # Another minimum that the data allow may have the opposite sign.
-        others = [
-            other.values["A"] - other.values["B"]
-            for other in self.optima
-            if other.chi2 - self.chi2 < _KNOWN_SIGN**2
-        ]
-        known_sign = abs(value) > _KNOWN_SIGN * error and all(value * o > 0 for o in others)
+        near = [o.values for o in self.optima if o.chi2 - self.chi2 < _KNOWN_SIGN**2]
+        others = [{**known, **values} for values in near]
+        known_sign = abs(value) > _KNOWN_SIGN * error and all(
+            value * (other["A"] - other["B"]) > 0 for other in others
+        )
         kind = "velocity weakening" if value < 0 else "velocity strengthening"
         return RateDependence(value, error, kind if known_sign else "its sign is not determined")
 
@@ -306,7 +304,7 @@ class Fit(Drawn):
             difference = self.rate_dependence
             lines.append(SummaryLine("A - B", difference.shown, difference.meaning))
         for name, p in {**self.parameters, **self.over_load}.items():
-            if name in self.undetermined:
+            if name.removesuffix("/W0") in self.undetermined:
                 lines.append(SummaryLine(name, NOT_DETERMINED, "by these data"))
                 continue
             shown = Shown.of(p.value, p.se, p.unit)

@@ -153,7 +153,7 @@ def fit_windows(
     fits = [fit(first, law, free, **options)]
     advance(1)
     if fits[0].converged:
-        start = {k.name: fits[0].values[k.name] for k in _without_nuisances(fits[0])}
+        start = {k.name: fits[0].values[k.name] for k in fits[0].objective.interest}
         options = {"starts": _STARTS, **options, "start": start}
         if free is None:
             free = [name for name in law_parameters(fits[0].objective.law) if name in start]
@@ -165,7 +165,7 @@ def fit_windows(
     usable = [result for result in fits if result.converged]
     estimates: dict[str, WindowEstimate] = {}
     undetermined = []
-    for unknown in _without_nuisances(usable[0]) if usable else []:
+    for unknown in usable[0].objective.interest if usable else ():
         estimates[unknown.name], known = _window_estimate(unknown, fits)
         far_off = disagreeing(unknown, estimates[unknown.name], spans)
         if far_off or not known:
@@ -183,10 +183,6 @@ def fit_windows(
 
 def _shown(span: tuple[float, float]) -> str:
     return f"window {span[0]:.6g} to {span[1]:.6g} s"
-
-
-def _without_nuisances(result: Fit) -> list[Any]:
-    return [k for k in result.objective.unknowns if not k.nuisance]
 
 
 def _automatic_windows(run: RecordedRun) -> tuple[tuple[float, float], ...]:

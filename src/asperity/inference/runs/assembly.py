@@ -18,15 +18,13 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.run import STIFFNESS, RecordedRun
 from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
 from asperity.laws import Law
 from asperity.parameters import MACHINE, Parameter
 from asperity.parameters.arguments import at_least, number, typed
 
-#: Kind of quantity of K, by the unit of the load.
-_STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 #: Search range of the stiffness over the load (1/m): deformation apparatus and tribometers.
 USUAL_STIFFNESS = (5e2, 5e4)
 #: Smallest number of samples of a run per free parameter.
@@ -72,15 +70,15 @@ class RunOptions:
             number(self.gauge[1], "gauge", "frequency", "positive")
 
 
-def stiffness(run: RecordedRun) -> Parameter:
-    """K in the unit of the run's load over a length."""
-    return replace(MACHINE["K"], kind=_STIFFNESS[run.load_unit])
-
-
 def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
     """A stiffness, which may be given over the load (``"0.003 1/um"``), in the unit of the run."""
-    over = over_load(value, label) if run.load_unit else None
-    return float(stiffness(run).check(value, label)) if over is None else over * run.W0
+    return _stiffness(value, run.load_unit, run.W0, label)
+
+
+def _stiffness(value: Any, load_unit: str, W0: float, label: str) -> float:
+    over = over_load(value, label) if load_unit else None
+    parameter = replace(MACHINE["K"], kind=STIFFNESS[load_unit])
+    return float(parameter.check(value, label)) if over is None else over * W0
 
 
 def over_load(value: Any, label: str = "K") -> float | None:
@@ -119,9 +117,7 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
         rule, got = "be seen in a change of the load", f"a constant load in {names}"
         advice = f"fix {name}, or add a recording with load steps or a modulated load"
         require(name not in free or any(run.load_varies for run in runs), name, rule, got, advice)
-    if "M" in free:
-        return
-    for name in ("A", "B", "D0", "K"):
+    for name in ("A", "B", "D0", "K") if "M" not in free else ():
         holds = name not in free or any(run.cuts or run.load_varies for run in runs)
         rule = "be seen in a change of the velocity or of the load"
         advice = "add a recording with velocity steps or holds, or give the steps"
@@ -132,22 +128,6 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
         if run.time.size < needed:
             advice = "free fewer or give a longer window"
             raise UnfittableLawError(run.name, rule, run.time.size, advice)
-
-
-def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
-    """Refuse priors of parameters that are not free, and of unknown names or runs.
-
-    Raises
-    ------
-    InputError
-    """
-    known = [unknown.name for unknown in unknowns]
-    # Names without a run stand for the parameter of each run.
-    shared = {name.partition("[")[0] for name in known}
-    for name in priors:
-        rule = f"be of free parameters ({', '.join(known)})"
-        advice = "free it, correct the name, or leave the prior out"
-        require(name in known or name in shared, "prior", rule, f"'{name}'", advice)
 
 
 def require_no_layer(free: Sequence[str]) -> None:
@@ -179,8 +159,7 @@ def run_terms(
     start: Mapping[str, Any],
     priors: Mapping[str, Prior],
     options: RunOptions,
-    inertia: bool,
-    radiation_damping: bool,
+    motion: Mapping[str, bool],
 ) -> tuple[list[RunTerm], list[Unknown]]:
     """Terms of the runs, and free parameters of single runs.
 
@@ -199,7 +178,8 @@ def run_terms(
     start, priors : mapping
         Start values and priors, by names of the nuisances; K stands for the K of each run.
     options : RunOptions
-    inertia, radiation_damping : bool
+    motion : mapping of str to bool
+        ``inertia`` and ``radiation_damping``.
     """
     if len({run.name for run in runs}) < len(runs):
         twice = [run.name for run in runs]
@@ -208,36 +188,29 @@ def run_terms(
     terms, unknowns = [], []
     for run in runs:
         suffix = f"[{run.name}]" if len(runs) > 1 or beside_table else ""
-        nuisances, own = cut_delays(run, suffix)
+        nuisances = cut_delays(run, suffix)
         fixed = {name: value for name, value in constants.items() if name != "K"}
         if fixed_stiffness is not None:
             fixed["K"] = stiffness_in(run, fixed_stiffness)
         elif not shared_stiffness:
-            K = free_stiffness(run, f"K{suffix}", start, priors)
-            nuisances += (K,)
-            own[K.name] = "K"
-        if (gain := gain_of(suffix, priors)) is not None:
-            nuisances += (gain,)
-            own[gain.name] = GAIN
+            nuisances.append(free_stiffness(run, f"K{suffix}", start, priors))
+        nuisances += _gain(suffix, priors)
         if options.initial == "free":
-            begin, names = _initial(run, law, suffix)
-            nuisances += begin
-            own |= names
+            nuisances += _initial(law, suffix)
         terms.append(
             RunTerm(
                 run,
                 law,
                 fixed,
                 linear=options.linear,
-                nuisances=nuisances,
-                own=own,
+                nuisances=tuple(nuisances),
+                suffix=suffix,
                 gauge=options.gauge,
-                inertia=inertia,
-                radiation_damping=radiation_damping,
                 order=options.order,
+                **motion,
             )
         )
-        unknowns += list(nuisances)
+        unknowns += nuisances
     return terms, unknowns
 
 
@@ -245,26 +218,47 @@ def free_stiffness(
     run: RecordedRun, name: str, start: Mapping[str, Any], priors: Mapping[str, Prior]
 ) -> Unknown:
     """The stiffness of a run as a free parameter."""
-    parameter = replace(stiffness(run), name=name)
+    parameter = replace(MACHINE["K"], kind=STIFFNESS[run.load_unit], name=name)
     given = start.get(name, start.get("K"))
     usual = (USUAL_STIFFNESS[0] * run.W0, USUAL_STIFFNESS[1] * run.W0)
     return unknown_of(
         parameter,
         None if given is None else stiffness_in(run, given, f"start.{name}"),
-        _prior_in(run, priors.get(name, priors.get("K"))),
+        _prior_in(priors.get(name, priors.get("K")), run.stiffness_unit, run.W0, run.name),
         usual,
     )
 
 
-def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
-    """A prior of the stiffness in the unit of a run."""
-    if prior is None or prior.unit in ("", run.stiffness_unit):
+def _prior_in(prior: Prior | None, unit: str, W0: float, data: str) -> Prior | None:
+    """A prior of the stiffness of some data in its unit."""
+    if prior is None or prior.unit in ("", unit):
         return prior
     if prior.unit == "1/m":
-        return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
-    units = " or ".join(dict.fromkeys((run.stiffness_unit, "1/m")))
-    rule = f"be in {units} for {run.name}"
-    raise InputError(Argument("prior", "K"), rule, prior.unit, "convert it")
+        return Prior(prior.mean * W0, prior.sd * W0, prior.source, unit)
+    units = " or ".join(dict.fromkeys((unit, "1/m")))
+    raise InputError(Argument("prior", "K"), f"be in {units} for {data}", prior.unit, "convert it")
+
+
+def stiffness_of_table(
+    start: Mapping[str, Any], priors: Mapping[str, Prior], W0: Any
+) -> tuple[dict[str, Any], dict[str, Prior]]:
+    """Starts and priors with those of K in N/m, converted if they are given over the load W0.
+
+    Raises
+    ------
+    InputError
+        If the load is no single number, or the prior is of a stress.
+    """
+    loads, text, prior = np.unique(W0), start.get("K"), priors.get("K")
+    if over_load(text) is not None or (prior is not None and prior.unit == "1/m"):
+        rule, got = "come with one fixed W0", "several or none"
+        one = loads.size == 1 and bool(np.isfinite(loads[0]))
+        require(one, "K over the load", rule, got, "give K in N/m")
+    load = float(loads[0])
+    of_start = {} if text is None else {"K": _stiffness(text, "N", load, "start.K")}
+    in_newtons = _prior_in(prior, "N/m", load, "a table")
+    of_prior = {} if in_newtons is None else {"K": in_newtons}
+    return {**start, **of_start}, {**priors, **of_prior}
 
 
 def shared_stiffness(
@@ -300,19 +294,20 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
             )
 
 
-def _initial(
-    run: RecordedRun, law: type[Law], suffix: str
-) -> tuple[tuple[Unknown, ...], dict[str, str]]:
-    result, own = [], {}
+def _initial(law: type[Law], suffix: str) -> list[Unknown]:
+    """Departures of the initial force and states from steady sliding, as free parameters."""
     places = [("start_force", _START_FORCE)]
     places += [(f"start_state_{i}", _START_STATE) for i in range(len(law.state_names))]
-    for inner, sd in places:
-        name = inner + suffix
-        meaning = "departure of the initial state from steady sliding"
-        parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
-        result.append(about_zero(parameter, sd, 10 * sd, "wide"))
-        own[name] = inner
-    return tuple(result), own
+    meaning = "departure of the initial state from steady sliding"
+    return [
+        about_zero(
+            Parameter(name + suffix, "dimensionless", "finite", meaning, place="drive"),
+            sd,
+            10 * sd,
+            "wide",
+        )
+        for name, sd in places
+    ]
 
 
 PARAMETER = Parameter(
@@ -320,8 +315,8 @@ PARAMETER = Parameter(
 )
 
 
-def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
-    """The gain of a run as a free parameter; None without a prior.
+def _gain(suffix: str, priors: Mapping[str, Prior]) -> list[Unknown]:
+    """The gain of a run as a free parameter; none without a prior.
 
     Parameters
     ----------
@@ -333,8 +328,8 @@ def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
     name = GAIN + suffix
     prior = priors.get(name, priors.get(GAIN))
     if prior is None:
-        return None
-    return unknown_of(replace(PARAMETER, name=name), prior.mean, prior, None, nuisance=True)
+        return []
+    return [unknown_of(replace(PARAMETER, name=name), prior.mean, prior, None, nuisance=True)]
 
 
 def require_calibrated(

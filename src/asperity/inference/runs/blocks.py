@@ -73,7 +73,13 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
         return run
     length = None if asked is None else 1 / asked
     if length is not None:
-        _require_blocks(run, length)
+        shortest = min(
+            step * (b - a) for step, (a, b) in zip(_intervals(run), run.stretches, strict=True)
+        )
+        rule, got = f"leave {_SHORTEST} means or more of {run.name}", f"{1 / length:.4g} Hz"
+        advice = f"give {_SHORTEST / shortest:.4g} Hz or more"
+        enough = not length > shortest / _SHORTEST
+        require(enough, "fit_rate", rule, f"{got} for {shortest:.4g} s", advice)
         if all(q == 1 for q in _counts(run, length)):
             return run
     clean, lines = _without_lines(run)
@@ -90,15 +96,6 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
     if short.blocks is None:
         return run  # every sample is needed
     return replace(short, doubts=tuple(doubts), blocks=replace(short.blocks, lines=lines))
-
-
-def _require_blocks(run: RecordedRun, length: float) -> None:
-    shortest = min(
-        step * (b - a) for step, (a, b) in zip(_intervals(run), run.stretches, strict=True)
-    )
-    holds, got = not length > shortest / _SHORTEST, f"{1 / length:.4g} Hz for {shortest:.4g} s"
-    rule = f"leave {_SHORTEST} means or more of {run.name}"
-    require(holds, "fit_rate", rule, got, f"give {_SHORTEST / shortest:.4g} Hz or more")
 
 
 def coarser(runs: Sequence[RecordedRun]) -> list[RecordedRun]:

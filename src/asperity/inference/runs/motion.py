@@ -188,24 +188,14 @@ def _recorded(
     reading: Reading,
 ) -> Array:
     """F/W as the gauge records it."""
-    shown = _averaged if reading.means else _observed
-    changed, moved = with_values(motion, values), shifted(drive, values)
-    friction = shown(changed, moved, values, curve, steps, reading.times)
+    motion, drive, times = with_values(motion, values), shifted(drive, values), reading.times
+    if reading.means:
+        friction = _averaged(motion, drive, values, curve, steps, times)
+    else:
+        i = _step_of(curve, steps, times)
+        share = (times - curve.begin[i]) / curve.length[i]
+        friction = _friction(motion, drive, values, curve, i, share, times)
     return values[GAIN] * reading.recorded(friction)
-
-
-def _observed(
-    motion: Motion,
-    drive: Drive,
-    values: Mapping[str, Array],
-    curve: Curve,
-    steps: Array,
-    times: Array,
-) -> Array:
-    """F/W at the samples."""
-    i = _step_of(curve, steps, times)
-    share = (times - curve.begin[i]) / curve.length[i]
-    return _friction(motion, drive, values, curve, i, share, times)
 
 
 def _averaged(

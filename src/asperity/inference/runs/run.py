@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -26,8 +25,10 @@ from asperity.recording import Trace
 from asperity.recording.defects.levels import coarsely_rounded, saturated
 from asperity.recording.defects.sampling import even_times, rate_stretches
 from asperity.recording.readers import read
-from asperity.units import quantity_text
+from asperity.units import KINDS, quantity_text
 
+#: Kind of quantity of a stiffness, by the unit of the load.
+STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 #: A load that varies by less than this share of its mean is taken as constant.
 _CONSTANT_LOAD = 1e-3
 #: The piecewise linear load follows the recorded load to this many standard deviations of its
@@ -160,7 +161,7 @@ class RecordedRun:
     @property
     def stiffness_unit(self) -> str:
         """Unit of K: the unit of the load over a length."""
-        return {"N": "N/m", "Pa": "Pa/m"}.get(self.load_unit, "1/m")
+        return KINDS[STIFFNESS[self.load_unit]].si
 
 
 @typed
@@ -209,8 +210,7 @@ def recorded_run(
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
-    shown = name or str(trace.provenance.get("file", "") or "run")
-    shown = Path(shown).stem if name is None else name
+    shown = Path(str(trace.provenance.get("file") or "run")).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
     segments = constant_velocities(signals, shown, steps, velocities)
@@ -227,12 +227,10 @@ def recorded_run(
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
     # No recorder resolves 1e-9 of its range.
-    changes, value = (
-        np.ptp(friction) > 1e-9 * np.abs(friction).max(),
-        f"{friction[0]:.6g} throughout",
-    )
+    changes = bool(np.ptp(friction) > 1e-9 * np.abs(friction).max())
+    got = f"{friction[0]:.6g} throughout"
     advice = "it holds nothing to fit; name the channel of the shear force"
-    require(bool(changes), f"the friction of {shown}", "vary", value, advice)
+    require(changes, f"the friction of {shown}", "vary", got, advice)
     doubts += [finding.sentence for finding in signals.signs]
     doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)
@@ -560,8 +558,3 @@ def _drive(
     slope = np.diff(at_edges) / np.diff(edges)
     cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
     return Drive(edges, pull, at_edges[:-1], slope), cuts
-
-
-def run_of(data: Any) -> RecordedRun:
-    """A run from a run, a trace or a path."""
-    return data if isinstance(data, RecordedRun) else recorded_run(data)

@@ -128,7 +128,7 @@ def integrated(
 
     def first_states(x: Array) -> Array:
         values = free.values(given, x)
-        return _first_states(with_values(motion, values), values)
+        return with_values(motion, values).steady() + values[START]
 
     x, drawn = free.numbers(given), shifted(drive, given)
     taken, curve, steps, done = _steps_taken(with_values(motion, given), drawn, given, room)
@@ -224,11 +224,6 @@ class _Step(NamedTuple):
     states: Array
 
 
-def _first_states(motion: Motion, values: Mapping[str, Array]) -> Array:
-    """Initial states: steady sliding plus the departures from it."""
-    return motion.steady() + values[START]
-
-
 def _stepped(
     motion: Motion,
     drive: Drive,
@@ -273,7 +268,7 @@ def _steps_taken(
 ) -> tuple[_Step, Curve, Array, Array]:
     """The steps, the motion at them, their number, and whether the end was reached."""
     pieces = drive.pull.shape[0]
-    y0 = _first_states(motion, values)
+    y0 = motion.steady() + values[START]
     end = drive.edges[-1]
 
     def body(carry: Any) -> Any:

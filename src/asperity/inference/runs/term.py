@@ -70,7 +70,10 @@ class RunTerm(DataTerm):
         Linear nuisances: "offset", "trend" (over slip), "bend" (over the square of the slip),
         "drift" (over time).
     nuisances : tuple of Unknown
-        Delays of the velocity changes, the gain of the gauge, and departures of the initial states.
+        Delays of the velocity changes, the stiffness, the gain of the gauge, and departures of the
+        initial states.
+    suffix : str
+        End of the names of the nuisances, which tells those of several runs apart.
     gauge : (int, float), optional
         Order and corner frequency (Hz) of the low-pass of the force gauge.
     inertia, radiation_damping : bool
@@ -99,7 +102,7 @@ class RunTerm(DataTerm):
         *,
         linear: tuple[str, ...] = ("offset", "trend"),
         nuisances: tuple[Unknown, ...] = (),
-        own: Mapping[str, str] | None = None,
+        suffix: str = "",
         gauge: tuple[int, float] | None = None,
         inertia: bool = False,
         radiation_damping: bool = False,
@@ -110,7 +113,10 @@ class RunTerm(DataTerm):
         self._known |= {"eta"} if radiation_damping else set()
         self.fixed = {n: v for n, v in fixed.items() if n in self._known} | {"W0": run.W0}
         self.linear, self.nuisances = linear, nuisances
-        self._own = dict(own or {})
+        # Names of the nuisances in the motion.
+        shifts = {f"step_time_{k}": f"shift_{edge}" for k, edge in enumerate(run.cuts, start=1)}
+        inner = {u.name: u.name.removesuffix(suffix) for u in nuisances}
+        self._own = {name: shifts.get(inside, inside) for name, inside in inner.items()}
         self._order = order
         # In a list that copies share: the number of steps does not depend on the noise.
         self._room = [room_for(run.drive)]
@@ -118,7 +124,7 @@ class RunTerm(DataTerm):
             law, run.velocity, self.fixed, inertia=inertia, radiation_damping=radiation_damping
         )
         self.reading = reading_at(run.at, gauge)
-        self._columns = np.column_stack([_linear_columns(run, linear), _impulses(run)])
+        self._columns = _columns(run, linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
@@ -408,23 +414,19 @@ class RunTerm(DataTerm):
         return np.asarray(-np.linalg.solve(self._triangle, self.basis.T @ white))
 
 
-def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
+def _columns(run: RecordedRun, names: Sequence[str]) -> Float:
+    """Linear nuisances, the levels after jumps, and an impulse at each wrong sample."""
     known = {
         "offset": np.ones_like(run.slip),
         "trend": run.slip,
         "bend": run.slip * (run.slip - run.slip[-1]),
         "drift": run.time,
     }
-    columns = [known[n] for n in names] + [_behind(run, at) for at in run.jumps or ()]
-    return np.stack(columns, axis=1) if columns else np.zeros((run.time.size, 0))
-
-
-def _impulses(run: RecordedRun) -> Float:
-    """A column for each wrong sample, whose value is then free."""
-    rows = np.unique(run.rows_at(run.wrong or ()))
-    columns = np.zeros((run.time.size, rows.size))
-    columns[rows, np.arange(rows.size)] = 1.0
-    return columns
+    levels = [_behind(run, at) for at in run.jumps or ()]
+    wrong = np.unique(run.rows_at(run.wrong or ()))
+    impulses = np.zeros((run.time.size, wrong.size))
+    impulses[wrong, np.arange(wrong.size)] = 1.0
+    return np.column_stack([*(known[n] for n in names), *levels, impulses])
 
 
 def _behind(run: RecordedRun, at: float) -> Float:
@@ -435,9 +437,9 @@ def _behind(run: RecordedRun, at: float) -> Float:
     return np.asarray(np.clip((end - at) / (end - begin), 0.0, 1.0))
 
 
-def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict[str, str]]:
-    """Delays of the velocity changes as nuisances, and their names in the motion."""
-    result, own = [], {}
+def cut_delays(run: RecordedRun, suffix: str) -> list[Unknown]:
+    """Delays of the velocity changes as nuisances."""
+    result = []
     for k, (edge, sd) in enumerate(zip(run.cuts, run.cut_uncertainty, strict=True), start=1):
         name = f"step_time_{k}{suffix}"
         sd = _CUT_INTERVALS * sd
@@ -445,8 +447,7 @@ def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict
         limit = min(20 * sd, 0.9 * float(near))
         parameter = Parameter(name, "time", "finite", "delay of a velocity change", place="drive")
         result.append(about_zero(parameter, sd, limit, "sampling interval"))
-        own[name] = f"shift_{edge}"
-    return tuple(result), own
+    return result
 
 
 def about_zero(parameter: Parameter, sd: float, limit: float, source: str) -> Unknown:

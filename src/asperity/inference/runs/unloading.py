@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.arrays import Bool, Float
 from asperity.errors import InputError, require
-from asperity.inference.runs.run import recorded_load
+from asperity.inference.runs.run import STIFFNESS, recorded_load
 from asperity.inference.unknowns import Prior
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
@@ -23,6 +23,7 @@ from asperity.recording import Trace
 from asperity.recording.defects.autoregression import fitted
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.readers import read
+from asperity.units import KINDS
 
 #: Smallest number of samples of a line; longer spans are averaged to the second number.
 _FEWEST, _MOST = 32, 2000
@@ -174,7 +175,7 @@ def measured_stiffness(
         over_load_se=error / mean,
         value=K,
         se=error,
-        unit={"N": "N/m", "Pa": "Pa/m"}.get(unit, "1/m"),
+        unit=KINDS[STIFFNESS[unit]].si,
         span=(float(columns[0, 0]), float(columns[-1, 0])),
         samples=count,
         bend=bend,
@@ -199,35 +200,30 @@ def _bend(
     InputError
         If the force is no line over the displacement, or a different line on the way back.
     """
-    line = np.stack([np.ones_like(u), u], axis=1)
-    square = np.column_stack([line, u * u])
+    square = np.stack([np.ones_like(u), u, u * u], axis=1)
     coefficients, covariance = _least_squares(square, F)
     bend, bend_se = 4 * coefficients[2] / slope, 4 * math.sqrt(covariance[2, 2]) / slope
-    if abs(bend) > min(max(_BENT * bend_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
-        raise InputError(
-            "span",
-            "have one slope of the force over the displacement",
-            f"one that changes by {abs(bend):.1%} ({bend_se:.1%} standard error) from {low:g} to "
-            f"{high:g} s: the contact slides in a part of it",
-            "give a shorter span",
-        )
+    rule = "have one slope of the force over the displacement"
+    _require_straight(bend, bend_se, rule, "one that changes by {:.1%}", low, high)
     clock = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     own = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
     if own.std() > _INDEPENDENT_SHARE * clock.std():
         coefficients, covariance = _least_squares(np.column_stack([square, own]), F)
-        apart, apart_se = (
-            abs(v) * float(np.ptp(own)) / (2 * slope)
-            for v in (coefficients[3], math.sqrt(covariance[3, 3]))
+        scale = float(np.ptp(own)) / (2 * slope)
+        apart, apart_se = scale * coefficients[3], scale * math.sqrt(covariance[3, 3])
+        rule = "have one line of the force on the ways back and forth"
+        _require_straight(
+            apart, apart_se, rule, "lines that are {:.1%} of the force apart", low, high
         )
-        if apart > min(max(_BENT * apart_se, _BENT_SHARE), _BENT_AT_ANY_NOISE):
-            raise InputError(
-                "span",
-                "have one line of the force on the ways back and forth",
-                f"lines that are {apart:.1%} of the force apart ({apart_se:.1%} standard error) "
-                f"from {low:g} to {high:g} s: the contact slides in a part of it",
-                "give a shorter span",
-            )
     return float(bend), float(bend_se)
+
+
+def _require_straight(bend: float, se: float, rule: str, got: str, low: float, high: float) -> None:
+    """Refuse a departure of the force from a line that is significant, or large at any noise."""
+    straight = abs(bend) <= min(max(_BENT * se, _BENT_SHARE), _BENT_AT_ANY_NOISE)
+    got = f"{got.format(abs(bend))} ({se:.1%} standard error) from {low:g} to {high:g} s"
+    got += ": the contact slides in a part of it"
+    require(straight, "span", rule, got, "give a shorter span")
 
 
 def _least_squares(columns: Float, y: Float) -> tuple[Float, Float]:

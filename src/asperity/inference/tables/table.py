@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,10 @@ from asperity.units import to_radians, to_si
 OBSERVABLES = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
 #: Columns of a table of responses that say nothing about the measurement.
 _OF_RESPONSES = ("floquet_max", "stable", "converged", "result", "law")
+#: The two observables, in the order above, of each column of covariances.
+_PAIRS = {
+    f"{a}_{b}_cov": pair for pair in combinations(OBSERVABLES, 2) for a, b in (pair, pair[::-1])
+}
 _OPERATING = ("V", "epsilon", "frequency")
 #: Columns of the standard uncertainty of epsilon.
 _OF_EPSILON = ("epsilon_err", "epsilon_uncertainty")
@@ -202,7 +207,7 @@ def read_table(
         if path.suffix.lower() == ".json":
             text = content.decode("utf-8-sig")
             return table_of(_given(_reading(shown, text), given), name=shown)
-    csv = sheet(path, _has_numbers, content=content)
+    csv = sheet(path, lambda n: _is_read(n) and n not in _TEXTS, content=content)
     cells = list(csv.rows())
     texts, units = _columns(shown, csv.heading, cells)
     blank = np.full(len(cells), "")
@@ -257,10 +262,6 @@ def _is_read(name: str) -> bool:
     """Whether the reader knows a column; other columns are ignored."""
     said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
     return name in (*_TEXTS, *_OF_EPSILON) or (bool(said) and name not in _OF_RESPONSES)
-
-
-def _has_numbers(name: str) -> bool:
-    return _is_read(name) and name not in _TEXTS
 
 
 def _unit_in_si(shown: str, name: str, unit: str) -> float:
@@ -375,14 +376,8 @@ def table_of(
     covariances: dict[tuple[str, str], Float] = {}
     of_epsilon: dict[str, Float] = {}
     for key, column in arrays.items():
-        if column.ndim != 1 or column.size not in (1, rows):
-            raise InputError(
-                f"{name}.{key} must have one value or {rows}, got an array of shape "
-                f"{column.shape}; give columns of one length"
-            )
-        column = np.broadcast_to(column, (rows,)).copy()
+        column = in_all_rows(column, rows, f"{name}.{key}")
         parameter = canonical_name(key, known)
-        pair = _pair_of(key)
         if parameter in MODULATION:
             # An empty cell means 0: a harmonic load.
             rule = "be 0, since fits are to a harmonic load"
@@ -392,8 +387,8 @@ def table_of(
             advice = "fill the cell in or leave the row out"
             _require(np.isfinite(column), name, parameter, column, "be a finite number", advice)
             points[parameter] = np.asarray(known[parameter].check(column, f"{name}.{parameter}"))
-        elif pair is not None:
-            covariances[pair] = column
+        elif key in _PAIRS:
+            covariances[_PAIRS[key]] = column
         elif key.endswith("_cov") and key.startswith(OBSERVABLES):
             raise InputError(
                 f"{name}.{key} must name two observables as <name>_<name>_cov, of "
@@ -430,6 +425,20 @@ def table_of(
     return _without_copies(table)
 
 
+def in_all_rows(column: Float, rows: int, label: str) -> Float:
+    """A column with a value in each row, from one value or from so many.
+
+    Raises
+    ------
+    InputError
+        If it has another shape.
+    """
+    if column.ndim != 1 or column.size not in (1, rows):
+        rule, got = f"have one value or {rows}", f"an array of shape {column.shape}"
+        raise InputError(label, rule, got, "give columns of one length")
+    return np.broadcast_to(column, (rows,)).copy()
+
+
 def _fill_frequency(arrays: dict[str, Float]) -> None:
     """Set a frequency in rows without modulation, which has no influence."""
     names = {canonical_name(key, _known()): key for key in arrays}
@@ -447,18 +456,6 @@ def _observable_of(column: str) -> str | None:
     if stem not in OBSERVABLES:
         return None
     return stem if stem == column else f"{stem}_err"
-
-
-def _pair_of(column: str) -> tuple[str, str] | None:
-    """The two observables of a column of covariances, in the order of `OBSERVABLES`."""
-    if not column.endswith("_cov"):
-        return None
-    stem = column.removesuffix("_cov")
-    for i, first in enumerate(OBSERVABLES):
-        for second in OBSERVABLES[i + 1 :]:
-            if stem in (f"{first}_{second}", f"{second}_{first}"):
-                return first, second
-    return None
 
 
 def _known() -> Mapping[str, Any]:
