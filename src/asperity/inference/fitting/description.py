@@ -515,7 +515,6 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
         data = objective.data_residuals(at.u)
         return tuple(outlying_rows(data[tables[0]])) if data else (), None
     u = at.u
-
     rows = np.concatenate([at.data[0].row, np.full(at.priors, -1)])
 
     def whole(objective: Objective) -> Residuals | None:

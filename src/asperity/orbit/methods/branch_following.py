@@ -35,8 +35,8 @@ from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Branches that are followed in a call; the last few, which may need by far the most steps, take the
-#: smaller number, in half of the time.
+#: Branches that are followed in a call; one or two, which may need by far the most steps, take half
+#: of the time in a smaller call.
 CHUNK = (8, 2)
 
 
