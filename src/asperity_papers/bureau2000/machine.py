@@ -13,9 +13,9 @@ from functools import cache, cached_property
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from asperity import Slider, periodic_response, perturbation_response
+from asperity import Slider, periodic_response
 from asperity.air import AirLayer, effective_modulation
 from asperity.ledger import Paper
 from asperity.materials import Material, load
@@ -370,9 +370,3 @@ def relative(values: Pair) -> float:
 def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
     """Numbers at the two velocities by their names, with a prefix such as ``"mu1, "``."""
     return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
-
-
-def steady_multiplier(slider: Slider, V: ArrayLike, frequency: float | Float) -> Float:
-    """Growth of a perturbation of steady sliding over one period 1/frequency (Hz)."""
-    response = perturbation_response(slider, velocity=V, frequency=frequency)
-    return np.exp(np.asarray(response.eigenvalues)[..., 0].real / frequency)

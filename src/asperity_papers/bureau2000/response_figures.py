@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,11 +10,9 @@ from asperity.figures import COLOURS
 from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import (
     APPLIED,
-    BORNE,
     WORDS,
     CurveFigure,
     FigureCurve,
-    curve_figure,
     elastic_curves,
     speed_curves,
     with_inertia,
@@ -23,8 +21,6 @@ from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, STRONGEST, Flo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Numbers = dict[str, float]
 
 #: Velocities per decade in figure 3.
 _PER_DECADE = 12
@@ -47,25 +43,21 @@ def curves_2(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-@curve_figure("figure-02", curves_2)
-def figure_2(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Change of the mean against eps at 120 Hz."""
-    slope, intercept, departure = _straight_line(read, machine.numbers.epsilon_onset)
-    return {
-        "slope": slope,
-        "intercept": intercept,
-        "departure_from_line": departure,
-        "transmission_air": machine.borne(machine.numbers.frequency, machine.air_layer()),
-    }, {}
-
-
-def _straight_line(read: FigureNumbers, onset: float) -> tuple[float, float, float]:
-    """Slope, intercept and largest departure of the line through the slow curve above `onset`."""
+def _straight_line(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """The line through the slow curve above the onset, and the largest departure from it."""
     slow = read.curve(SLOW)
-    line = slow[slow[APPLIED] >= onset]
+    line = slow[slow[APPLIED] >= machine.numbers.epsilon_onset]
     slope, intercept = np.polyfit(line[APPLIED], line["delta_mu"], 1)
     departure = line["delta_mu"] - slope * line[APPLIED] - intercept
-    return float(slope), float(intercept), float(np.abs(departure).max())
+    return {
+        "line_slope": slope,
+        "line_intercept": intercept,
+        "line_departure": np.abs(departure).max(),
+    }
+
+
+#: Change of the mean against eps at 120 Hz.
+figure_2 = CurveFigure("figure-02", curves_2, _straight_line)
 
 
 # --- Figure 3: mean against V for four amplitudes ------------------------------------------------
@@ -84,13 +76,18 @@ def curves_3(machine: Machine) -> list[FigureCurve]:
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
 
 
-@curve_figure("figure-03", curves_3)
-def figure_3(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Mean against V for four amplitudes."""
-    return {
-        f"slope_{eps:g}": float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
-        for eps, rows in read.data.groupby(APPLIED, sort=False)
-    }, {}
+def _slope(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """Slope of a line over ln V."""
+
+    def slope(curve: str) -> float:
+        rows = read.curve(curve)
+        return float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
+
+    return {"slope": slope}
+
+
+#: Mean against V for four amplitudes.
+figure_3 = CurveFigure("figure-03", curves_3, _slope)
 
 
 def draw_3(numbers: FigureNumbers) -> Figure:
@@ -152,22 +149,14 @@ figure_5 = CurveFigure("figure-05", curves_5)
 # --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
 
 
-def curves_6(machine: Machine) -> list[FigureCurve]:
-    """Both velocities, all of the load borne by the contacts."""
-    return speed_curves(machine, RR, machine.applied_amplitudes())
-
-
 #: Rice-Ruina: change of the mean against eps.
-figure_6 = CurveFigure("figure-06", curves_6)
-
-
-def curves_7(machine: Machine) -> list[FigureCurve]:
-    """The slow velocity."""
-    return curves_6(machine)[:1]
+figure_6 = CurveFigure(
+    "figure-06", lambda machine: speed_curves(machine, RR, machine.applied_amplitudes())
+)
 
 
 #: Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop.
-figure_7 = CurveFigure("figure-07", curves_7)
+figure_7 = CurveFigure("figure-07", lambda machine: figure_6.curves(machine)[:1])
 
 
 def draw_7(numbers: FigureNumbers) -> Figure:
@@ -180,22 +169,17 @@ def draw_7(numbers: FigureNumbers) -> Figure:
     return figure
 
 
-def curves_4(machine: Machine) -> list[FigureCurve]:
-    """The elasto-plastic law against eps."""
-    return elastic_curves(machine, machine.applied_amplitudes(), machine.share)
-
-
 #: Harmonics against eps at 120 Hz.
-figure_4 = CurveFigure("figure-04", curves_4)
-
-
-def curves_8(machine: Machine) -> list[FigureCurve]:
-    """Rice-Ruina at both velocities."""
-    return speed_curves(machine, RR, machine.borne_amplitudes())
+figure_4 = CurveFigure(
+    "figure-04",
+    lambda machine: elastic_curves(machine, machine.applied_amplitudes(), machine.share),
+)
 
 
 #: Rice-Ruina: harmonics against eps_eff.
-figure_8 = CurveFigure("figure-08", curves_8)
+figure_8 = CurveFigure(
+    "figure-08", lambda machine: speed_curves(machine, RR, machine.borne_amplitudes())
+)
 
 
 def curves_9(machine: Machine) -> list[FigureCurve]:
@@ -212,13 +196,10 @@ def curves_9(machine: Machine) -> list[FigureCurve]:
 figure_9 = CurveFigure("figure-09", curves_9)
 
 
-def curves_11(machine: Machine) -> list[FigureCurve]:
-    """The elasto-plastic law against eps_eff."""
-    return elastic_curves(machine, machine.borne_amplitudes())
-
-
 #: The elasto-plastic law, what the uncertainties make of it, and inertia.
-figure_11 = CurveFigure("figure-11", curves_11)
+figure_11 = CurveFigure(
+    "figure-11", lambda machine: elastic_curves(machine, machine.borne_amplitudes())
+)
 
 
 def law_curves(machine: Machine) -> list[FigureCurve]:
@@ -242,14 +223,6 @@ def phase_curves(machine: Machine) -> list[FigureCurve]:
     return [*law_curves(machine), *moving]
 
 
-@curve_figure("figure-14", phase_curves)
-def phase_figure(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Phases against eps_eff, by law and velocity.
-
-    The paper measures amplitudes with a lock-in amplifier, which gives the phases as well.
-    """
-    return {
-        f"{column} {curve}": float(np.degrees(read.at(curve, column, machine.strongest, BORNE)))
-        for curve in read.data["curve"].unique()
-        for column in ("phase1", "phase2")
-    }, {}
+#: Phases against eps_eff, by law and velocity: the paper measures amplitudes with a lock-in
+#: amplifier, which gives the phases as well.
+phase_figure = CurveFigure("figure-14", phase_curves)

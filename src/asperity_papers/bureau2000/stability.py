@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from scipy.optimize import elementwise
 
 import asperity as asp
 from asperity.ledger import FigureNumbers
-from asperity_papers.bureau2000.curves import BORNE, FigureCurve, curve_figure, speed_curves
-from asperity_papers.bureau2000.machine import (
-    EXT,
-    LD,
-    RR,
-    SPEEDS,
-    Float,
-    Machine,
-    steady_multiplier,
-)
+from asperity_papers.bureau2000.curves import BORNE, CurveFigure, FigureCurve, speed_curves
+from asperity_papers.bureau2000.machine import EXT, LD, RR, SPEEDS, Float, Machine
 
 
 def variants(machine: Machine) -> dict[str, tuple[str, dict[str, float]]]:
@@ -75,24 +69,19 @@ def floquet_curves(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-@curve_figure("figure-12", floquet_curves)
-def floquet_figure(
-    machine: Machine, read: FigureNumbers
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Stability against eps_eff, by law and velocity, with the thresholds."""
-    V, rigid = np.array(machine.velocities), machine.slider(RR)
-    scalars = {"K_over_Kc": machine.stiffness_ratio}
-    for speed in V:
-        steady = steady_multiplier(rigid, speed, machine.numbers.frequency)
-        scalars[f"steady {speed:.0e}"] = float(steady)
+def _threshold(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """Amplitude at which modulation makes sliding stable, by curve."""
+    crossed: dict[str, float] = {}
     for variant in variants(machine):
-        low, high = np.array([_bracket(read.curve(f"{variant}, {name}")) for name in SPEEDS]).T
-        crossed = thresholds(machine, variant, V, (low, high))
-        for name, value in zip(SPEEDS, crossed, strict=True):
-            scalars[f"threshold {variant}, {name}"] = float(value)
-    start = read.data.drop_duplicates("curve")
-    starts = zip(start["curve"], start["floquet_max"], strict=True)
-    return scalars, {f"start {curve}": float(value) for curve, value in starts}
+        curves = [f"{variant}, {speed}" for speed in SPEEDS]
+        low, high = np.array([_bracket(read.curve(curve)) for curve in curves]).T
+        found = thresholds(machine, variant, np.array(machine.velocities), (low, high))
+        crossed |= dict(zip(curves, found, strict=True))
+    return {"threshold": crossed.__getitem__}
+
+
+#: Stability against eps_eff, by law and velocity, with the thresholds.
+floquet_figure = CurveFigure("figure-12", floquet_curves, _threshold)
 
 
 def _bracket(rows: pd.DataFrame) -> tuple[float, float]:

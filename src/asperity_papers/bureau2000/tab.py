@@ -164,12 +164,10 @@ print({call})
 
 
 def _python(figure: str, changes: Mapping[str, float]) -> str:
-    curves = CURVES[figure]
     return _PYTHON.format(
-        imports="from asperity_papers.bureau2000.curves import solve_curves\n"
-        f"from {curves.__module__} import {curves.__name__}",
+        imports="from asperity_papers.bureau2000.figures import NUMBERS",
         changes=dict(changes),
-        call=f"solve_curves(machine, {curves.__name__}(machine))",
+        call=f'NUMBERS["{figure}"](machine).data',
     )
 
 

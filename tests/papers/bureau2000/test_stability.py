@@ -11,14 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from asperity.slider import Slider
+from asperity import Slider, periodic_response
 from asperity_papers.bureau2000 import stability
-from asperity_papers.bureau2000.machine import (
-    EXT,
-    RR,
-    Machine,
-    steady_multiplier,
-)
+from asperity_papers.bureau2000.machine import EXT, RR, Machine
 
 MU0, A, B, D0, V0, W0, K = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0, 2e5
 PERIOD = 1 / 120
@@ -84,6 +79,11 @@ class Equations:
             if np.abs(step).max() < 1e-11:
                 return np.abs(np.linalg.eigvals(monodromy)).max()
         raise AssertionError("the reference integration found no periodic solution")
+
+
+def steady_multiplier(slider, V, frequency):
+    """Of unmodulated sliding, over one period."""
+    return float(periodic_response(slider, velocity=V, epsilon=0, frequency=frequency).floquet_max)
 
 
 @pytest.fixture
