@@ -171,7 +171,7 @@ class CurveFigure:
     """
 
     name: str
-    curves: Callable[[Machine], Iterable[FigureCurve]]
+    curves: Callable[[Machine], list[FigureCurve]]
     terms: Callable[[Machine, FigureNumbers], dict[str, Any]] = lambda machine, read: {}
 
     def __call__(self, machine: Machine) -> FigureNumbers:
