@@ -344,7 +344,7 @@ def computed_numbers(
         return checks[entry.id](model)
     printed, terms = printed_numbers(numbers), getattr(model, "terms", {})
     return {
-        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms)
+        name: float(rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms))
         for name, formula in entry.values.items()
     }
 

@@ -159,8 +159,10 @@ def formula_value(
     numbers: Mapping[str, float],
     place: str,
     terms: Mapping[str, Any] | None = None,
-) -> float:
+) -> Any:
     """The value of a formula with + - * / **, sqrt, ln, abs, pi and the paper's numbers.
+
+    It is a number, or what the operators make of the results of `terms`.
 
     Parameters
     ----------
@@ -201,7 +203,7 @@ def formula_value(
 
     rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
     with code_of_others(place, rule, advice, f"'{formula}'"):
-        return float(value(ast.parse(formula, mode="eval").body))
+        return value(ast.parse(formula, mode="eval").body)
 
 
 #: Rules that claims.toml may name; their arguments are the numbers of a rule.

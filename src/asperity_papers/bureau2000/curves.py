@@ -177,7 +177,8 @@ class CurveFigure:
     def __call__(self, machine: Machine) -> FigureNumbers:
         """Solve the curves, and read the numbers off them."""
         data = solve_curves(machine, self.curves(machine))
-        return figure_numbers(machine, self.name, data, terms=self.terms)
+        terms = self.terms(machine, FigureNumbers(self.name, data))
+        return figure_numbers(machine, self.name, data, terms=terms)
 
 
 def figure_numbers(
@@ -186,9 +187,8 @@ def figure_numbers(
     data: pd.DataFrame,
     scalars: Mapping[str, float] | None = None,
     *,
-    quoted: Mapping[str, float] | None = None,
     points: pd.DataFrame | None = None,
-    terms: Callable[[Machine, FigureNumbers], dict[str, Any]] = lambda machine, read: {},
+    terms: Mapping[str, Any] | None = None,
 ) -> FigureNumbers:
     """A figure with the numbers of its formulas, further ones, and what the text states."""
     stated = {
@@ -199,12 +199,9 @@ def figure_numbers(
     }
     for quantity, pair in machine.stated().items():
         stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
-    read = FigureNumbers(name, data)
-    known = {**machine.terms, **_terms(machine, read), **terms(machine, read)}
+    known = {**machine.terms, **_terms(machine, FigureNumbers(name, data)), **(terms or {})}
     formulas, further = WORDS.figures[name].values(machine.numbers, known)
-    return FigureNumbers(
-        name, data, formulas | dict(scalars or {}), stated | further | dict(quoted or {}), points
-    )
+    return FigureNumbers(name, data, dict(scalars or {}) | formulas, stated | further, points)
 
 
 def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
@@ -229,9 +226,6 @@ def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
         ),
         "late_over_early": lambda curve, name: late_over_early_slope(read, curve, name),
         "degrees": np.degrees,
-        "mu": machine.mu_ss,
-        "strongest": machine.strongest,
-        "elastic_slope": machine.elastic_slope,
     }
 
 
