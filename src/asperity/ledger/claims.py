@@ -338,15 +338,16 @@ def computed_numbers(
 ) -> Computed:
     """The numbers of a claim, by its formulas or by its check.
 
-    A model may have ``terms``, further names of its formulas.
+    A formula may name the values before it. A model may have ``terms``, further names.
     """
     if not entry.values:
         return checks[entry.id](model)
     printed, terms = printed_numbers(numbers), getattr(model, "terms", {})
-    return {
-        name: float(rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms))
-        for name, formula in entry.values.items()
-    }
+    values: dict[str, float] = {}
+    for name, formula in entry.values.items():
+        place = f"{entry.id}.values.{name}"
+        values[name] = float(rules.formula_value(formula, values | printed, place, terms))
+    return values
 
 
 def _text(end: Mapping[str, float]) -> str:

@@ -10,14 +10,14 @@ import numpy as np
 from scipy.optimize import brentq
 
 from asperity.air import NormalContact
-from asperity.ledger import check
+from asperity.ledger import altered, check
 from asperity.orbit import PeriodicResponse
 from asperity.theory import closed_forms as cf
+from asperity.units import from_si
 from asperity_papers.bureau2000.machine import (
     APPLIED,
     EXT,
     LD,
-    READ,
     RR,
     SPEEDS,
     STRONGEST,
@@ -26,7 +26,6 @@ from asperity_papers.bureau2000.machine import (
     Pair,
     at,
     by_speed,
-    relative,
 )
 
 Numbers = dict[str, float]
@@ -35,27 +34,11 @@ Numbers = dict[str, float]
 # --- II.A: the machine, and the steadiness of sliding --------------------------------------------
 
 
-@check("away-from-resonance")
-def away_from_resonance(machine: Machine) -> Numbers:
-    p = machine.numbers
-    stiffness = {"spring": p.K, "tangential": p.W0 / p.lambda_, "normal": p.W0 / p.lambda_z}
-    hertz = {name: float(np.sqrt(k / p.M) / (2 * np.pi)) for name, k in stiffness.items()}
-    distance = {
-        f"{f:g} Hz": min(abs(f / resonance - 1) for resonance in hertz.values())
-        for f in (p.frequency, p.frequency_vacuum)
-    }
-    return distance | hertz
-
-
 @check("no-stick-slip-under-modulation")
 def no_stick_slip(machine: Machine) -> Numbers:
     Kc = float(cf.critical_stiffness(machine.small_modulation(machine.velocities[0])))
-    K = machine.numbers["K"].model_copy(
-        update={"value": Kc, "unit": machine.numbers["K"].si_unit, "uncertainty": None}
-    )
-    critical = Machine(
-        machine.numbers.model_copy(update={"numbers": {**machine.numbers.numbers, "K": K}})
-    )
+    K = from_si(Kc, machine.numbers["K"].unit, "stiffness")
+    critical = Machine(altered(machine.numbers, {"K": float(K)}))
     multiplier = critical.curve(EXT).floquet_max
     worst = {
         name: max(at(multiplier, eps)[k] for eps in APPLIED if eps <= STRONGEST)
@@ -104,50 +87,6 @@ def drop_not_through_zero(machine: Machine) -> Numbers:
     slope, intercept, residual = _line(machine)
     excess = by_speed(-intercept / np.abs(residual).max(1))
     return excess | by_speed(-intercept / slope, "zero, ")
-
-
-@check("drop-velocity-independent")
-def drop_velocity_independent(machine: Machine) -> Numbers:
-    r = machine.curve(EXT)
-    amplitudes = [e for e in machine.numbers["epsilon_figure3"].si_values or () if e > 0]
-    changes = {f"eps = {e:g}": relative(at(r.delta_mu, e)) for e in amplitudes}
-    # The slope of the mean with V is that of steady sliding and what the drop adds to it.
-    slopes = {
-        f"slope, eps = {e:g}": relative_slope(at(r.mu_ss), at(r.delta_mu, e)) for e in amplitudes
-    }
-    return changes | slopes
-
-
-def relative_slope(mu_ss: Pair, delta_mu: Pair) -> float:
-    """Relative change of d mu/d ln V by the modulation, between the two velocities."""
-    return (delta_mu[1] - delta_mu[0]) / (mu_ss[1] - mu_ss[0])
-
-
-# --- II.B.2: the harmonics -----------------------------------------------------------------------
-
-
-@check("mu2-over-mu1")
-def weakly_anharmonic(machine: Machine) -> Numbers:
-    r = machine.curve(EXT)
-    ratios = {
-        f"eps = {e:g}, {name}": at(r.mu2 / r.mu1, e)[k]
-        for k, name in enumerate(SPEEDS)
-        for e in READ
-    }
-    return ratios | {"largest": max(at(r.mu2 / r.mu1, e)[1] for e in READ)}
-
-
-@check("mu1-monotonic", "mu1")
-@check("mu2-monotonic", "mu2")
-def monotonic(machine: Machine, name: str) -> Numbers:
-    return by_speed(np.diff(getattr(machine.curve(EXT), name), axis=1).min(1))
-
-
-@check("mu1-velocity-independent", "mu1")
-@check("mu2-lower-when-slow", "mu2")
-def change_with_velocity(machine: Machine, name: str) -> Numbers:
-    values = getattr(machine.curve(EXT), name)
-    return {f"eps = {e:g}": relative(at(values, e)) for e in READ}
 
 
 # --- II.B.3: the air under the slider, and the control experiment in vacuo -----------------------

@@ -10,7 +10,6 @@ from asperity_papers.bureau2000.machine import (
     EXT,
     LD,
     RR,
-    SPEEDS,
     STRONGEST,
     Machine,
     at,
@@ -64,35 +63,32 @@ def alpha_upper_limit(machine: Machine) -> Numbers:
     p = machine.numbers
     needed = _share_for_the_drop(machine, LD, np.linspace(STRONGEST, 1.0, 11))
     measured = p.transmission_air_over_vacuum * machine.borne(p.frequency_vacuum, None)
-    loss = 1 - machine.outputs(LD, alpha=p.alpha_low).delta_mu[0] / machine.outputs(RR).delta_mu[0]
-    return {"1 um/s": needed / measured, "needed": needed, "measured": measured, "loss": loss}
+    low, none = (
+        at(r.delta_mu)[0] for r in (machine.curve(LD, alpha=p.alpha_low), machine.curve(RR))
+    )
+    return {
+        "1 um/s": needed / measured,
+        "needed": needed,
+        "measured": measured,
+        "loss": 1 - low / none,
+    }
 
 
 # --- III.C: the elasto-plastic extension ---------------------------------------------------------
 
 
-@check("elastic-length-order")
-def elastic_length_order(machine: Machine) -> Mixed:
-    p = machine.numbers
-    return {
-        "quasi-static": p.lambda_quasi_static,
-        "fitted": p.lambda_,
-        "measured length": str(p["lambda_quasi_static"]),
-        "fitted length": str(p["lambda"]),
-    }
-
-
 @check("extended-equation")
 def extended_equation(machine: Machine) -> Numbers:
     """The fast solver against Eq. (29), written out and integrated in time."""
-    p, r = machine.numbers, machine.outputs(EXT)
+    p, r = machine.numbers, machine.curve(EXT)
     gaps: Numbers = {}
-    for i, V in enumerate(machine.velocities):
+    quantities = map(at, (r.delta_mu, r.mu1, r.mu2))
+    for (name, V), drop, mu1, mu2 in zip(machine.speeds, *quantities, strict=True):
         point = machine.operating_point(V, lambda_=p.lambda_)
-        orbit = machine.orbit(point, machine.strongest, r.delta_mu[i])
-        gaps[f"drop, {SPEEDS[i]}"] = r.delta_mu[i] / orbit.delta_mu - 1
-        gaps[f"mu1, {SPEEDS[i]}"] = r.mu1[i] / abs(orbit.c1) - 1
-        gaps[f"mu2, {SPEEDS[i]}"] = r.mu2[i] / abs(orbit.c2) - 1
+        orbit = machine.orbit(point, machine.strongest, drop)
+        gaps[f"drop, {name}"] = drop / orbit.delta_mu - 1
+        gaps[f"mu1, {name}"] = mu1 / abs(orbit.c1) - 1
+        gaps[f"mu2, {name}"] = mu2 / abs(orbit.c2) - 1
     return gaps | {"worst": max(abs(gap) for gap in gaps.values())}
 
 

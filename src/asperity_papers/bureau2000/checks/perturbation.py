@@ -6,9 +6,9 @@ import numpy as np
 
 from asperity import Slider, perturbation_response
 from asperity.ledger import check
-from asperity.theory import ageing_response, closed_forms as cf
+from asperity.theory import closed_forms as cf
 from asperity_papers.bureau2000.integration import IntegratedOrbit
-from asperity_papers.bureau2000.machine import RR, SPEEDS, Machine
+from asperity_papers.bureau2000.machine import RR, Machine
 
 Numbers = dict[str, float]
 
@@ -49,20 +49,6 @@ def determinant_limit(machine: Machine) -> Numbers:
     point = machine.small_modulation(V, M=p.M)
     limit = float(point.omega) ** 2 * p.A * p.W0 / V
     return {"10 um/s": float(abs(cf.determinant(point))) / limit}
-
-
-@check("inertia-negligible-linear")
-def inertia_negligible(machine: Machine) -> Numbers:
-    _, top = machine.range_of("V_range")
-    velocities = dict(zip(SPEEDS, machine.velocities, strict=True)) | {"100 um/s": top}
-    changes: Numbers = {}
-    for name, V in velocities.items():
-        heavy, light = (
-            abs(ageing_response(machine.small_modulation(V, M=M)).transfer)
-            for M in (machine.numbers.M, 0.0)
-        )
-        changes[name] = float(heavy / light) - 1
-    return changes
 
 
 # --- Formulas, as printed and as derived, against an integration ---------------------------------
