@@ -346,7 +346,7 @@ def computed_numbers(
     values: dict[str, float] = {}
     for name, formula in entry.values.items():
         place = f"{entry.id}.values.{name}"
-        values[name] = float(rules.formula_value(formula, values | printed, place, terms))
+        values[name] = rules.formula_value(formula, values | printed, place, terms)
     return values
 
 

@@ -184,10 +184,7 @@ class FigureWords(Record):
         """
         printed = printed_numbers(numbers)
         return tuple(
-            {
-                n: float(formula_value(f, printed, f"figures.{n}", terms))
-                for n, f in formulas.items()
-            }
+            {n: formula_value(f, printed, f"figures.{n}", terms) for n, f in formulas.items()}
             for formulas in (self.scalars, self.quoted)
         )
 

@@ -165,11 +165,10 @@ def formula_value(
     numbers: Mapping[str, float],
     place: str,
     terms: Mapping[str, Any] | None = None,
-) -> Any:
+) -> float:
     """The value of a formula of the paper's numbers with + - * / ** and pi.
 
-    Functions are sqrt, ln, abs, min and max, and real and imag of a complex number. The value is
-    a number, or what the operators make of the results of `terms`.
+    Functions are sqrt, ln, abs, min and max, and real and imag of a complex number.
 
     Parameters
     ----------
@@ -210,7 +209,7 @@ def formula_value(
 
     rule, advice = "be a formula of the paper's numbers", "write it like 'W0/Sigma0'"
     with code_of_others(place, rule, advice, f"'{formula}'"):
-        return value(ast.parse(formula, mode="eval").body)
+        return float(value(ast.parse(formula, mode="eval").body))
 
 
 #: Rules that claims.toml may name; their arguments are the numbers of a rule.

@@ -214,7 +214,7 @@ def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
         "slow": SLOW,
         "fast": FAST,
         **{name: name for name in read.data.columns if name not in machine.numbers.numbers},
-        "first": lambda curve, name: column(curve, name)[0],
+        "nth": lambda curve, name, n: column(curve, name)[int(n)],
         "last": read.last,
         "least": lambda curve, name: column(curve, name).min(),
         "largest": lambda curve, name: column(curve, name).max(),

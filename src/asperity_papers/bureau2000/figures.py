@@ -39,11 +39,6 @@ NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
 }
 #: Lines of each figure of the paper.
 CURVES = {figure.name: figure.curves for figure in _OF_THE_PAPER}
-#: Figures with more than their plot.
-DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
-    "figure-03": curves.draw_3,
-    "figure-07": curves.draw_7,
-}
 #: Figures without numbers.
 SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
     name: partial(schematics.draw, name) for name in ("figure-01", "figure-10")
@@ -55,11 +50,6 @@ def sections() -> Iterator[Sequence[Section]]:
     """The report's sections; the virtual experiment is computed while the first one is."""
     with experiment_in_background() as readings:
         yield _of_the_paper(), _of_the_experiment(readings)
-
-
-def draw(numbers: FigureNumbers) -> Figure:
-    """The picture of a figure; the style must be active."""
-    return DRAWN.get(numbers.name, WORDS.figures[numbers.name].draw)(numbers)
 
 
 def _of_the_paper() -> Section:
@@ -91,7 +81,7 @@ def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
         "read off the curves:",
         *(f"  {name} = {value:.12g}" for name, value in numbers.scalars.items()),
     ]
-    return WORDS.figure(numbers, {numbers.name: (numbers.data, head)}, draw)
+    return WORDS.figure(numbers, {numbers.name: (numbers.data, head)})
 
 
 def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:

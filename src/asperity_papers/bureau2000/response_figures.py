@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from asperity.figures import COLOURS
 from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import (
     APPLIED,
-    WORDS,
     CurveFigure,
     FigureCurve,
     elastic_curves,
     speed_curves,
     with_inertia,
 )
-from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, STRONGEST, Float, Machine
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, Float, Machine
 
 #: Velocities per decade in figure 3.
 _PER_DECADE = 12
-#: Degrees that a line is tilted in figure 3 as printed, for a slope of 1 in ln V.
-_TILT = 1180.0
 #: Curves of figure 5, with what bears the load.
 VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
 
@@ -76,42 +69,21 @@ def curves_3(machine: Machine) -> list[FigureCurve]:
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
 
 
-def _slope(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
-    """Slope of a line over ln V."""
+def _over_velocity(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """A line over ln V: its slope, and its mean friction at a velocity (m/s)."""
 
-    def slope(curve: str) -> float:
+    def line(curve: str) -> tuple[Float, Float]:
         rows = read.curve(curve)
-        return float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
+        return np.log(rows["V"].to_numpy()), rows["mean_friction"].to_numpy()
 
-    return {"slope": slope}
+    return {
+        "slope": lambda curve: np.polyfit(*line(curve), 1)[0],
+        "at_velocity": lambda curve, V: np.interp(np.log(V), *line(curve)),
+    }
 
 
 #: Mean against V for four amplitudes.
-figure_3 = CurveFigure("figure-03", curves_3, _slope)
-
-
-def draw_3(numbers: FigureNumbers) -> Figure:
-    """The lines, each with its slope along it, and the stated slope."""
-    figure = WORDS.figures["figure-03"].draw(numbers)
-    axis = figure.axes[0]
-    names = list(numbers.data["curve"].unique())
-    for name in names:
-        rows, eps = numbers.curve(name), name.removeprefix("eps = ")
-        slope = numbers.scalars[f"slope_{eps}"]
-        # The strongest one has its name below: the stated slope lies above it.
-        below = name == names[-1]
-        axis.text(
-            1e6 * rows["V"].iloc[2], rows["mean_friction"].iloc[2] + (-0.004 if below else 0.003),
-            rf"$\epsilon={eps}$,  slope ${slope:.4f}$", rotation=_TILT * slope,
-            rotation_mode="anchor", va="top" if below else "bottom", fontsize=10,
-        )  # fmt: skip
-    # The slope without modulation, through the strongest modulation at 1 um/s.
-    strongest = numbers.curve(names[-1])
-    V, mean = 1e6 * strongest["V"].to_numpy(), strongest["mean_friction"].to_numpy()
-    through = float(np.interp(0.0, np.log(V), mean))
-    line = through + numbers.scalars["slope_0"] * np.log(V)
-    axis.plot(V, line, linewidth=1.1, color=COLOURS["stated"])
-    return figure
+figure_3 = CurveFigure("figure-03", curves_3, _over_velocity)
 
 
 # --- Figure 5: air and vacuum at 200 Hz ----------------------------------------------------------
@@ -157,16 +129,6 @@ figure_6 = CurveFigure(
 
 #: Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop.
 figure_7 = CurveFigure("figure-07", lambda machine: figure_6.curves(machine)[:1])
-
-
-def draw_7(numbers: FigureNumbers) -> Figure:
-    """An arrow from the applied amplitude of the stated drop to the scaled one."""
-    figure = WORDS.figures["figure-07"].draw(numbers)
-    drop, left = numbers.quoted["stated drop 1"], numbers.quoted["epsilon_eff at 0.5"]
-    arrow = {"arrowstyle": "-|>", "color": COLOURS["stated"], "linewidth": 1.2}
-    ends = (left + 0.022, drop), (STRONGEST - 0.02, drop)
-    figure.axes[0].annotate("", xy=ends[0], xytext=ends[1], arrowprops=arrow)
-    return figure
 
 
 #: Harmonics against eps at 120 Hz.

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -176,8 +177,11 @@ def _figure(
     terms, printed = _terms(series, points), printed_numbers(PRINTED.numbers)
     recovered = []
     for formula, what, stated in recovered_words()[name]:
-        read = formula_value(formula, printed, f"recovered.{name}", PRINTED.terms | terms)
-        recovered.append(RecoveredQuantity(what, read.value, read.uncertainty, read.model, stated))
+        value, uncertainty, true_value = (
+            formula_value(f"{part}({formula})", printed, f"recovered.{name}", PRINTED.terms | terms)
+            for part in Read._fields
+        )
+        recovered.append(RecoveredQuantity(what, value, uncertainty, true_value, stated))
     scalars = {
         f"{quantity.what}, {part}": getattr(quantity, part)
         for quantity in recovered
@@ -205,9 +209,8 @@ def _terms(series: tuple[Series, ...], points: pd.DataFrame) -> dict[str, Any]:
         "slope_of": lambda epsilon: _slope(points[points["epsilon_set"] == epsilon]),
         "factor": factor,
         "share_of": shares.get,
-        "value": lambda number: number.value,
+        **{part: attrgetter(part) for part in Read._fields},
         "bar": lambda number: NORMAL * number.uncertainty,
-        "model": lambda number: number.model,
     }
 
 

@@ -6,12 +6,15 @@ import pytest
 from asperity.figures.style import style
 from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import WORDS, late_over_early_slope, variations
-from asperity_papers.bureau2000.figures import draw
 from asperity_papers.bureau2000.machine import Machine
 
 pytestmark = pytest.mark.slow
 
 SLOW, FAST = "1 um/s", "10 um/s"
+
+
+def draw(numbers):
+    return WORDS.figures[numbers.name].draw(numbers)
 
 
 def end(figure, curve, column):

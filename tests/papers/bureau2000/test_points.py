@@ -19,7 +19,7 @@ from asperity.ledger.points import (
     with_curves,
 )
 from asperity_papers.bureau2000.curves import WORDS
-from asperity_papers.bureau2000.figures import CURVES, draw
+from asperity_papers.bureau2000.figures import CURVES
 
 pytestmark = pytest.mark.slow
 
@@ -116,6 +116,10 @@ def test_points_are_drawn_where_their_axes_have_them(figures):
         draw_points(figure, rows[rows["figure"] == "figure-03"], OBSERVABLES["figure-03"])
     (bars,) = figure.axes[0].containers
     np.testing.assert_allclose(bars[0].get_xdata(orig=False), [0.3, 3, 30], rtol=1e-12)
+
+
+def draw(numbers):
+    return WORDS.figures[numbers.name].draw(numbers)
 
 
 def write(folder, **changes):

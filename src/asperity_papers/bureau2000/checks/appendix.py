@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from asperity.air import (
-    NormalContact,
     bessel_ratio,
     shear_viscosity_ratio,
 )
@@ -26,10 +25,6 @@ def only_fitting_parameter(machine: Machine) -> Mixed:
     p = machine.numbers
     fitted = [n for n in ("A", "B", "D0", "lambda", "transmission") if p[n].kind == "fitted"]
     return {"fitted": len(fitted), "names": " and ".join(fitted)}
-
-
-def _contact(machine: Machine) -> NormalContact:
-    return NormalContact(W0=machine.numbers.W0, lambda_z=machine.numbers.lambda_z)
 
 
 # --- The formulas of the air layer, Eqs. (35) to (40) --------------------------------------------
