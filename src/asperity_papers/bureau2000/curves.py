@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from asperity import periodic_response
+from asperity import Slider, periodic_response
 from asperity.ledger import FigureNumbers, figure_words
 from asperity_papers.bureau2000.machine import (
     EXT,
@@ -86,17 +86,20 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
     return pd.concat([_solve(machine, curve, options) for curve in curves], ignore_index=True)
 
 
-def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
+def operating_points(machine: Machine, curve: FigureCurve) -> tuple[Slider, Float, Float, Float]:
+    """Slider, velocity, applied amplitude and frequency at each point of a curve, in SI."""
     f = machine.numbers.frequency if curve.frequency is None else curve.frequency
-    varied: dict[str, Float] = {
-        name: np.asarray(x, float) for name, x in curve.overrides.items() if np.ndim(x)
-    }
-    inputs = [curve.V, curve.applied, f, *varied.values()]
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in inputs))
-    V, applied, frequency = arrays[:3]
-    slider = machine.slider(
-        curve.law, **{**curve.overrides, **dict(zip(varied, arrays[3:], strict=True))}
+    varied = {name: x for name, x in curve.overrides.items() if np.ndim(x)}
+    inputs = (curve.V, curve.applied, f, *varied.values())
+    V, applied, frequency, *arrays = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(x, float)) for x in inputs)
     )
+    overrides = {**curve.overrides, **dict(zip(varied, arrays, strict=True))}
+    return machine.slider(curve.law, **overrides), V, applied, frequency
+
+
+def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
+    slider, V, applied, frequency = operating_points(machine, curve)
     law: Any = slider.law
     response = periodic_response(
         slider,
@@ -140,6 +143,18 @@ def speed_curves(
     return [
         FigureCurve(f"{case}, {name}" if case else name, law, V, applied, share, **others)
         for name, V in machine.speeds
+    ]
+
+
+def curves_of_laws(
+    machine: Machine, laws: Mapping[str, tuple[str, Mapping[str, float]]]
+) -> list[FigureCurve]:
+    """Laws with parameters that replace the paper's against eps_eff, at both velocities."""
+    eps = machine.borne_amplitudes()
+    return [
+        curve
+        for name, (law, overrides) in laws.items()
+        for curve in speed_curves(machine, law, eps, case=name, overrides=overrides)
     ]
 
 
@@ -224,6 +239,13 @@ def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
         "amplitude": lambda curve, name, value: np.interp(
             -value, -column(curve, name), column(curve, BORNE)
         ),
+        "along": lambda curve, name, x, value: read.at(curve, name, value, x),
+        "along_log": lambda curve, name, x, value: np.interp(
+            np.log(value), np.log(column(curve, x)), column(curve, name)
+        ),
+        "slope_in_log": lambda curve, name, x: np.polyfit(
+            np.log(column(curve, x)), column(curve, name), 1
+        )[0],
         "late_over_early": lambda curve, name: late_over_early_slope(read, curve, name),
         "degrees": np.degrees,
     }

@@ -135,12 +135,6 @@ class Machine:
         return float(self.slider(RR).law.mu_ss(velocity))
 
     @property
-    def stiffness_ratio(self) -> float:
-        """K/Kc with Kc = (B - A) W0/D0: sliding on rigid asperities is stable above 1."""
-        p = self.numbers
-        return float(p.K * p.D0 / ((p.B - p.A) * p.W0))
-
-    @property
     def contact_resonance(self) -> float:
         """Frequency (Hz) at which the mass oscillates on the asperities' shear stiffness."""
         p = self.numbers

@@ -10,7 +10,6 @@ Hz. The paper's models leave the mass out.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -116,18 +115,5 @@ def resonance_curves(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-def _cuts(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
-    """Quantities on the cuts over lambda (um) and over the frequency, linear in ln f."""
-
-    def at_frequency(curve: str, column: str, frequency: float) -> float:
-        rows = read.curve(curve)
-        return float(np.interp(np.log(frequency), np.log(rows["frequency"]), rows[column]))
-
-    return {
-        "at_frequency": at_frequency,
-        "at_length": lambda curve, column, um: read.at(curve, column, 1e-6 * um, "lambda"),
-    }
-
-
 #: Drop, mu1 and mu2 against lambda at 120 Hz and against frequency at 0.7 um.
-resonance_figure = CurveFigure("figure-15", resonance_curves, _cuts)
+resonance_figure = CurveFigure("figure-15", resonance_curves)

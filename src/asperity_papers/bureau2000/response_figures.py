@@ -11,6 +11,7 @@ from asperity_papers.bureau2000.curves import (
     APPLIED,
     CurveFigure,
     FigureCurve,
+    curves_of_laws,
     elastic_curves,
     speed_curves,
     with_inertia,
@@ -69,21 +70,8 @@ def curves_3(machine: Machine) -> list[FigureCurve]:
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
 
 
-def _over_velocity(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
-    """A line over ln V: its slope, and its mean friction at a velocity (m/s)."""
-
-    def line(curve: str) -> tuple[Float, Float]:
-        rows = read.curve(curve)
-        return np.log(rows["V"].to_numpy()), rows["mean_friction"].to_numpy()
-
-    return {
-        "slope": lambda curve: np.polyfit(*line(curve), 1)[0],
-        "at_velocity": lambda curve, V: np.interp(np.log(V), *line(curve)),
-    }
-
-
 #: Mean against V for four amplitudes.
-figure_3 = CurveFigure("figure-03", curves_3, _over_velocity)
+figure_3 = CurveFigure("figure-03", curves_3)
 
 
 # --- Figure 5: air and vacuum at 200 Hz ----------------------------------------------------------
@@ -146,12 +134,9 @@ figure_8 = CurveFigure(
 
 def curves_9(machine: Machine) -> list[FigureCurve]:
     """Two coefficients at both velocities, and Rice-Ruina."""
-    p, eps = machine.numbers, machine.borne_amplitudes()
-    high, low = (
-        speed_curves(machine, LD, eps, case=f"alpha = {a:g}", overrides={"alpha": a})
-        for a in (p.alpha, p.alpha_low)
-    )
-    return [*high, *low, *speed_curves(machine, RR, eps, case="RR")]
+    p = machine.numbers
+    two = {f"alpha = {alpha:g}": (LD, {"alpha": alpha}) for alpha in (p.alpha, p.alpha_low)}
+    return curves_of_laws(machine, {**two, "RR": (RR, {})})
 
 
 #: Linker-Dieterich with two coefficients, and Rice-Ruina to hold it against.
@@ -166,12 +151,8 @@ figure_11 = CurveFigure(
 
 def law_curves(machine: Machine) -> list[FigureCurve]:
     """Three laws at both velocities."""
-    eps, alpha = machine.borne_amplitudes(), {"alpha": float(machine.numbers.alpha)}
-    return [
-        *speed_curves(machine, RR, eps, case="RR"),
-        *speed_curves(machine, LD, eps, case="LD", overrides=alpha),
-        *speed_curves(machine, EXT, eps, case="EXT"),
-    ]
+    alpha = {"alpha": float(machine.numbers.alpha)}
+    return curves_of_laws(machine, {"RR": (RR, {}), "LD": (LD, alpha), "EXT": (EXT, {})})
 
 
 #: The three laws on common axes, which the head of the report shows.

@@ -10,7 +10,7 @@ from scipy.optimize import elementwise
 
 import asperity as asp
 from asperity.ledger import FigureNumbers
-from asperity_papers.bureau2000.curves import BORNE, CurveFigure, FigureCurve, speed_curves
+from asperity_papers.bureau2000.curves import BORNE, CurveFigure, curves_of_laws
 from asperity_papers.bureau2000.machine import EXT, LD, RR, SPEEDS, Float, Machine
 
 
@@ -59,16 +59,6 @@ def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, F
     return np.where(root.success, root.x, np.nan)
 
 
-def floquet_curves(machine: Machine) -> list[FigureCurve]:
-    """The laws of `variants` at both velocities."""
-    eps = machine.borne_amplitudes()
-    return [
-        curve
-        for name, (law, overrides) in variants(machine).items()
-        for curve in speed_curves(machine, law, eps, case=name, overrides=overrides)
-    ]
-
-
 def _threshold(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
     """Amplitude at which modulation makes sliding stable, by curve."""
     crossed: dict[str, float] = {}
@@ -81,7 +71,9 @@ def _threshold(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
 
 
 #: Stability against eps_eff, by law and velocity, with the thresholds.
-floquet_figure = CurveFigure("figure-12", floquet_curves, _threshold)
+floquet_figure = CurveFigure(
+    "figure-12", lambda machine: curves_of_laws(machine, variants(machine)), _threshold
+)
 
 
 def _bracket(rows: pd.DataFrame) -> tuple[float, float]:

@@ -15,7 +15,13 @@ from asperity.ledger import TabFigure, altered
 from asperity.materials import Material
 from asperity.orbit import Outcome
 from asperity.parameters import law_parameters
-from asperity_papers.bureau2000.curves import WORDS, FigureCurve, solve_curves, variations
+from asperity_papers.bureau2000.curves import (
+    WORDS,
+    FigureCurve,
+    operating_points,
+    solve_curves,
+    variations,
+)
 from asperity_papers.bureau2000.figures import CURVES
 from asperity_papers.bureau2000.machine import EXT, STRONGEST, Machine, printed
 from asperity_papers.bureau2000.motion import one_period
@@ -50,11 +56,7 @@ def _columns(figure: str) -> tuple[str, ...]:
 def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
     """Points of a line, most of them by the method that takes milliseconds."""
     _check_share(curve)
-    slider = machine.slider(curve.law, **curve.overrides)
-    f = machine.numbers.frequency if curve.frequency is None else curve.frequency
-    V, applied, frequency = np.broadcast_arrays(
-        *(np.atleast_1d(np.asarray(x, float)) for x in (curve.V, curve.applied, f))
-    )
+    slider, V, applied, frequency = operating_points(machine, curve)
     function, law = _function(curve.law), slider.law
     values = {
         **{n: getattr(law, f"{n}_" if iskeyword(n) else n) for n in law_parameters(type(law))},

@@ -111,19 +111,6 @@ def borne_fraction_formula(machine: Machine) -> Numbers:
     return {"printed": printed, "independent": float(independent)}
 
 
-@check("pressure-equation-gap")
-def pressure_equation_gap(machine: Machine) -> Numbers:
-    p = machine.numbers
-    narrowest = p.h0 - machine.strongest * p.lambda_z
-    printed, derived = (h**2 / (12 * p.eta_air) for h in (narrowest, p.h0))
-    # Poiseuille's mass flow over rho0 h0, per pressure gradient, at vanishing amplitude.
-    gap, pressure, gradient = p.h0 * (1 - 1e-9), p.P0 * (1 + 1e-9), 1e-3
-    mass_flow = pressure / p.P0 * gap**3 / (12 * p.eta_air) * gradient
-    independent = mass_flow / (p.h0 * gradient)
-    shares = {"printed over it": printed / independent, "derived over it": derived / independent}
-    return {"printed": printed, "derived": derived, "independent": independent, **shares}
-
-
 # --- Stiffnesses, the borne fraction at 120 Hz, the shear of the air -----------------------------
 
 
