@@ -168,12 +168,13 @@ class Machine:
         p = self.numbers
         return AirLayer(**({"P0": p.P0, "h0": p.h0, "eta": p.eta_air, "R": p.R} | overrides))
 
-    def borne(self, frequency: float, layer: AirLayer | None) -> float:
+    def borne(
+        self, frequency: float, layer: AirLayer | None, lambda_z: float | None = None
+    ) -> float:
         """eps_eff/eps with or without an air layer: without, inertia and contacts alone."""
         p = self.numbers
-        return float(
-            effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=p.lambda_z, layer=layer)
-        )
+        length = p.lambda_z if lambda_z is None else lambda_z
+        return float(effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=length, layer=layer))
 
     def elastic_slope(self, velocity: float) -> float:
         """D mu1/d eps of the velocity-independent plateau, mu l/(1 + l) with l = lambda K/W0."""
@@ -278,6 +279,7 @@ class Machine:
             "RR": Law(RR),
             "LD": Law(LD),
             "EXT": Law(EXT),
+            "EXT_measured": Law(EXT, {"lambda_": p.lambda_quasi_static}),
             "LD_low": Law(LD, {"alpha": p.alpha_low}),
             "AMONTONS": Law("amontons"),
             "PRODUCT": Law("strength-area"),
@@ -289,8 +291,9 @@ class Machine:
             "drop": lambda *point: -observables["delta_mu"](*point),
             "exponent": exponent,
             "last_slope": lambda *line: slopes(*line)[-1],
-            "least_slope": lambda *line: slopes(*line).min(),
-            "least_step": lambda *line: np.diff(curve(*line)).min(),
+            "slopes": slopes,
+            "curve": curve,
+            "steps": np.diff,
             "transfer": self.transfer,
             "mu": self.mu_ss,
             "strongest": self.strongest,

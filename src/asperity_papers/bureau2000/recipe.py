@@ -94,15 +94,12 @@ def read_thresholds(path: str | Path) -> Thresholds:
     return Thresholds(Path(path).name, **columns)
 
 
-#: Name in the paper's file of numbers, and of its uncertainty where that is another one.
+#: Name in the paper's file of numbers, and of the number whose uncertainty it has.
 _PUBLISHED = {
-    "mu0": ("mu0", ""),
-    "A": ("A", ""),
-    "B": ("B", ""),
-    "D0": ("D0", ""),
-    "eps_ratio": ("transmission", ""),
+    **{name: (name, name) for name in ("mu0", "A", "B", "D0")},
+    "eps_ratio": ("transmission", "transmission"),
     "lambda": ("lambda", "lambda_quasi_static"),
-    "alpha": ("alpha_low", ""),
+    "alpha": ("alpha_low", "alpha_low"),
 }
 
 
@@ -231,19 +228,17 @@ def _steady_and_threshold(
 ) -> _SteadyStateNumbers:
     """Steps 1 and 2 as one weighted least squares: what is measured twice is averaged."""
     log_v = np.log(steady.points["V"] / V0)
-    measured = np.concatenate(
-        [
-            steady.values["mean_friction"],
-            thresholds.K_over_W0,
-            2 * math.pi * thresholds.frequency,
-        ]
-    )
-    errors = np.concatenate(
-        [
-            steady.errors["mean_friction"],
-            thresholds.K_over_W0_err,
-            2 * math.pi * thresholds.frequency_err,
-        ]
+    turn = 2 * math.pi
+    measured, errors = (
+        np.concatenate(parts)
+        for parts in (
+            (steady.values["mean_friction"], thresholds.K_over_W0, turn * thresholds.frequency),
+            (
+                steady.errors["mean_friction"],
+                thresholds.K_over_W0_err,
+                turn * thresholds.frequency_err,
+            ),
+        )
     )
 
     def residuals(u: Float) -> Float:
@@ -258,11 +253,9 @@ def _steady_and_threshold(
         solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
         base = _SteadyStateNumbers(solved.x, np.linalg.inv(solved.jac.T @ solved.jac))
         finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in _numbers_of(base))
-    except (ArithmeticError, np.linalg.LinAlgError):
-        finite = False
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (ArithmeticError, ValueError):
         finite = False
     if not finite:
         rule = "have bifurcations from which A, B and D0 follow"
@@ -364,14 +357,8 @@ def _with_published(
 ) -> RecipeNumber:
     """A number with the paper's."""
     unit = "m" if name in ("D0", "lambda") else ""
-    fitted = RecipeNumber(name, unit, value, se, se_alone, step, how, None, None, "")
-    if name not in _PUBLISHED:
-        return fitted
-    key, uncertain = _PUBLISHED[name]
-    number, spread = printed()[key], printed()[uncertain or key].si_uncertainty
-    return replace(
-        fitted,
-        published=float(number.si),
-        published_uncertainty=None if spread is None else float(spread),
-        published_place=number.place,
-    )
+    key, uncertain = _PUBLISHED.get(name, ("", ""))
+    number = printed()[key] if key else None
+    spread = printed()[uncertain].si_uncertainty if uncertain else None
+    published, place = (number.si, number.place) if number else (None, "")
+    return RecipeNumber(name, unit, value, se, se_alone, step, how, published, spread, place)

@@ -17,8 +17,6 @@ from asperity.units import from_si
 from asperity_papers.bureau2000.machine import (
     APPLIED,
     EXT,
-    LD,
-    RR,
     SPEEDS,
     STRONGEST,
     Float,
@@ -56,15 +54,6 @@ def stabilising_amplitude(r: PeriodicResponse) -> Pair:
 
 
 # --- II.B.1: the mean force ----------------------------------------------------------------------
-
-
-@check("systematic-lowering")
-def systematic_lowering(machine: Machine) -> Numbers:
-    curves = [machine.curve(law).delta_mu for law in (RR, LD, EXT)]
-    return {
-        "largest delta mu": max(float(np.max(drop)) for drop in curves),
-        "largest step": max(float(np.diff(drop, axis=1).max()) for drop in curves),
-    }
 
 
 def _line(machine: Machine) -> tuple[Float, Float, Float]:

@@ -74,12 +74,6 @@ def product_form_steady(machine: Machine) -> Numbers:
     return {"relative change": worst, "eta": p.A / p.mu0, "m": p.B / p.mu0}
 
 
-@check("amontons-mean")
-def amontons_mean(machine: Machine) -> Numbers:
-    changes = machine.curve("amontons").delta_mu.ravel()
-    return {"largest change": max(abs(float(x)) for x in changes)}
-
-
 @check("age-jump")
 def age_jump(machine: Machine) -> Numbers:
     law = cast(LinkerDieterich, machine.slider(LD).law)

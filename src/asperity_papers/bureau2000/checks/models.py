@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from asperity.air import effective_modulation
 from asperity.ledger import check
 from asperity_papers.bureau2000.machine import (
     EXT,
@@ -35,27 +34,7 @@ def _share_for_the_drop(machine: Machine, law: str, applied: np.ndarray) -> floa
     return float(np.interp(stated, drops, applied)) * p.transmission / STRONGEST
 
 
-@check("depends-on-normal-stiffness")
-def depends_on_normal_stiffness(machine: Machine) -> Numbers:
-    p, layer, factor = machine.numbers, machine.air_layer(), 1.01
-    shares = [
-        float(effective_modulation(p.frequency, W0=p.W0, M=p.M, lambda_z=length, layer=layer))
-        for length in (p.lambda_z, p.lambda_z / factor)
-    ]
-    return {"sensitivity": float(np.log(shares[1] / shares[0]) / np.log(factor))}
-
-
 # --- III.B: Linker and Dieterich's ageing law ----------------------------------------------------
-
-
-@check("caption-harmonics")
-def caption_harmonics(machine: Machine) -> Numbers:
-    a, b = machine.curve(LD, alpha=machine.numbers.alpha_low), machine.curve(LD)
-    apart = {
-        "mu1": float(np.abs(a.mu1 - b.mu1)[0].max()), "mu2": float(np.abs(a.mu2 - b.mu2)[0].max())
-    }  # fmt: skip
-    scaled = {name: gap / machine.numbers.mu1_order for name, gap in apart.items()}
-    return scaled | {f"{name} apart": gap for name, gap in apart.items()}
 
 
 @check("alpha-upper-limit")
@@ -90,16 +69,3 @@ def extended_equation(machine: Machine) -> Numbers:
         gaps[f"mu1, {name}"] = mu1 / abs(orbit.c1) - 1
         gaps[f"mu2, {name}"] = mu2 / abs(orbit.c2) - 1
     return gaps | {"worst": max(abs(gap) for gap in gaps.values())}
-
-
-@check("mu1-most-sensitive")
-def mu1_most_sensitive(machine: Machine) -> Numbers:
-    p, r = machine.numbers, machine.curve(EXT)
-    other = machine.curve(EXT, lambda_=p.lambda_quasi_static)
-    step = np.log(p.lambda_ / p.lambda_quasi_static)
-    drop, mu1, mu2 = (
-        abs(float(np.log(at(np.abs(a))[0] / at(np.abs(b))[0]) / step))
-        for a, b in ((r.delta_mu, other.delta_mu), (r.mu1, other.mu1), (r.mu2, other.mu2))
-    )
-    exponents = {"of mu1": mu1, "of mu2": mu2, "of the drop": drop}
-    return {"drop": mu1 - drop, "mu2": mu1 - mu2, **exponents}
