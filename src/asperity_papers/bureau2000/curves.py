@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from asperity import Slider, periodic_response
+from asperity import periodic_response
 from asperity.ledger import FigureNumbers, figure_words
 from asperity_papers.bureau2000.machine import (
     EXT,
@@ -86,8 +86,7 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
     return pd.concat([_solve(machine, curve, options) for curve in curves], ignore_index=True)
 
 
-def operating_points(machine: Machine, curve: FigureCurve) -> tuple[Slider, Float, Float, Float]:
-    """Slider, velocity, applied amplitude and frequency at each point of a curve, in SI."""
+def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
     f = machine.numbers.frequency if curve.frequency is None else curve.frequency
     varied = {name: x for name, x in curve.overrides.items() if np.ndim(x)}
     inputs = (curve.V, curve.applied, f, *varied.values())
@@ -95,11 +94,7 @@ def operating_points(machine: Machine, curve: FigureCurve) -> tuple[Slider, Floa
         *(np.atleast_1d(np.asarray(x, float)) for x in inputs)
     )
     overrides = {**curve.overrides, **dict(zip(varied, arrays, strict=True))}
-    return machine.slider(curve.law, **overrides), V, applied, frequency
-
-
-def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
-    slider, V, applied, frequency = operating_points(machine, curve)
+    slider = machine.slider(curve.law, **overrides)
     law: Any = slider.law
     response = periodic_response(
         slider,
@@ -131,11 +126,6 @@ def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> 
     return rows
 
 
-def with_inertia(name: str) -> str:
-    """Name of the curve that counts the mass, next to the curve `name`."""
-    return f"{name}, inertia"
-
-
 def speed_curves(
     machine: Machine, law: str, applied: Float, share: float = 1.0, case: str = "", **others: Any
 ) -> list[FigureCurve]:
@@ -160,16 +150,14 @@ def curves_of_laws(
 
 def elastic_curves(machine: Machine, applied: Float, share: float = 1.0) -> list[FigureCurve]:
     """The elasto-plastic law at both velocities, with the mass, and at the ends of `variations`."""
-    moved = [
-        replace(curve, name=with_inertia(curve.name), inertia=True)
-        for curve in speed_curves(machine, EXT, applied, share)
-    ]
+    still = speed_curves(machine, EXT, applied, share)
+    moved = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in still]
     # Named "1 um/s, A low" etc.
     ends = [
-        FigureCurve(f"{SLOW}, {end}", EXT, machine.velocities[0], applied, share, None, overrides)
+        replace(still[0], name=f"{SLOW}, {end}", overrides=overrides)
         for end, overrides in variations(machine).items()
     ]
-    return [*speed_curves(machine, EXT, applied, share), *moved, *ends]
+    return [*still, *moved, *ends]
 
 
 @dataclass(frozen=True)

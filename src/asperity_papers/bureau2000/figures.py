@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -23,9 +22,6 @@ from asperity_papers.bureau2000.virtual import (
     recovered_table,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 #: Figures made of curves: those of the paper, and four that are not in it.
 _OF_THE_PAPER = [getattr(curves, f"figure_{n}") for n in (2, 3, 4, 5, 6, 7, 8, 9, 11)]
 _FURTHER = (
@@ -40,9 +36,7 @@ NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
 #: Lines of each figure of the paper.
 CURVES = {figure.name: figure.curves for figure in _OF_THE_PAPER}
 #: Figures without numbers.
-SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
-    name: partial(schematics.draw, name) for name in ("figure-01", "figure-10")
-}
+SCHEMATICS = ("figure-01", "figure-10")
 
 
 @contextmanager
@@ -63,7 +57,7 @@ def _of_the_paper() -> Section:
 
 
 def _schematic(name: str) -> PaperFigure:
-    return WORDS.figure(FigureNumbers(name, pd.DataFrame()), {}, lambda _: SCHEMATICS[name]())
+    return WORDS.figure(FigureNumbers(name, pd.DataFrame()), {}, lambda _: schematics.draw(name))
 
 
 def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
@@ -102,11 +96,9 @@ def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
 
 
 def _simulated(figure: VirtualFigure) -> PaperFigure:
-    numbers, parameters = figure.numbers, PAPER.parameter_lines()
-    parts = (("", "points", figure.points), ("-model", "the model's lines", numbers.data))
-    place = WORDS.figures[numbers.name].place
+    name = figure.numbers.name
     tables = {
-        f"{numbers.name}{suffix}": (data, provenance(figure, place, what, parameters))
-        for suffix, what, data in parts
+        name: (figure.points, provenance(figure, "points")),
+        f"{name}-model": (figure.numbers.data, provenance(figure, "the model's lines")),
     }
-    return WORDS.figure(numbers, tables)
+    return WORDS.figure(figure.numbers, tables)

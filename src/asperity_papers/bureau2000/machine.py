@@ -8,7 +8,7 @@ amplitude is about eps = 0.5, the strongest modulation, where the text quotes it
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
-from functools import cache, cached_property
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
@@ -24,7 +24,7 @@ from asperity.air import (
     mindlin_length_ratio,
 )
 from asperity.ledger import Paper
-from asperity.materials import Material, load
+from asperity.materials import Material
 from asperity.orbit import PeriodicResponse
 from asperity.theory import SmallModulation, ageing_response
 from asperity_papers.bureau2000.integration import (
@@ -72,12 +72,6 @@ STRONGEST = 0.5
 APPLIED = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.625)
 
 
-@cache
-def printed() -> Material:
-    """The paper's numbers as printed."""
-    return load("bureau2000")
-
-
 class Machine:
     """Predictions of the laws and the air layer at one set of the paper's numbers.
 
@@ -91,7 +85,7 @@ class Machine:
     """
 
     def __init__(self, numbers: Material | None = None, steps: int = 100) -> None:
-        self.numbers = printed() if numbers is None else numbers
+        self.numbers = PAPER.numbers if numbers is None else numbers
         self.steps = steps
         self._solved: dict[Hashable, Any] = {}
 

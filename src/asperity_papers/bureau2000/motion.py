@@ -81,17 +81,6 @@ def period_figure(machine: Machine) -> FigureNumbers:
 QUALITY = 10.0
 #: Ranges of the two cuts: beyond what is published of lambda (um), and around 120 and 200 Hz.
 _LENGTHS, _FREQUENCIES, _POINTS = (0.4, 1.0), (80.0, 800.0), 100
-QUASI_STATIC, UNDAMPED, DAMPED = "no inertia", "inertia", "inertia, damped"
-
-
-def contact_damping(machine: Machine) -> float:
-    """Damper between slider and track (N s/m) that gives the resonance its `QUALITY`.
-
-    It is parallel to the asperities and the joint: sqrt(M W0/lambda)/QUALITY. What it adds to the
-    mean force, its value times V, is below 0.001 W0 at 10 um/s.
-    """
-    p = machine.numbers
-    return float(np.sqrt(p.M * p.W0 / p.lambda_) / QUALITY)
 
 
 def resonance_curves(machine: Machine) -> list[FigureCurve]:
@@ -105,9 +94,10 @@ def resonance_curves(machine: Machine) -> list[FigureCurve]:
         FigureCurve("lambda", EXT, V, epsilon, overrides={"lambda_": lengths}),
         FigureCurve("frequency", EXT, V, epsilon, frequency=np.sort([*between, *experiments])),
     )
-    cases = {
-        QUASI_STATIC: (False, 0.0), UNDAMPED: (True, 0.0), DAMPED: (True, contact_damping(machine))
-    }  # fmt: skip
+    # A damper between slider and track, parallel to asperities and joint. What it adds to the mean
+    # force, its value (N s/m) times V, is below 0.001 W0 at 10 um/s.
+    damping = float(np.sqrt(p.M * p.W0 / p.lambda_) / QUALITY)
+    cases = {"no inertia": (False, 0), "inertia": (True, 0), "inertia, damped": (True, damping)}
     return [
         replace(cut, name=f"{cut.name}, {name}", inertia=inertia, damping=damping)
         for name, (inertia, damping) in cases.items()

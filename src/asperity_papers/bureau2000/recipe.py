@@ -29,7 +29,7 @@ from asperity import InputError
 from asperity.inference import LockInTable, bounded_interval, fit, shift_of_estimates
 from asperity.ledger import RecipeNumber, RecipeResult, read_columns
 from asperity.units import to_si
-from asperity_papers.bureau2000.machine import PAPER, printed
+from asperity_papers.bureau2000.machine import PAPER
 
 Float = NDArray[np.float64]
 
@@ -139,11 +139,11 @@ def paper_procedure(
     steady, drop, first = _rows(readings)
     warnings: list[str] = []
     report(0, 4, "steady sliding and bifurcation")
-    constants = {"V0": printed()["V0"].si, **dict(fixed or {})}
+    constants = {"V0": PAPER.numbers["V0"].si, **dict(fixed or {})}
     V0 = to_si(constants["V0"], "velocity", "V0")
     base = _steady_and_threshold(steady, thresholds, V0, warnings)
     numbers = _numbers_of(base)
-    if printed()["V0"].si != V0:
+    if PAPER.numbers["V0"].si != V0:
         # The paper has no friction coefficient at that velocity.
         numbers[0] = replace(
             numbers[0], published=None, published_uncertainty=None, published_place=""
@@ -326,7 +326,7 @@ def _fitted(
     With `same_readings` those of `ratio`, the number of step 3, are those of this step: their noise
     is not counted again.
     """
-    fixed, material = {**constants, **base.values()}, printed()
+    fixed, material = {**constants, **base.values()}, PAPER.numbers
     if ratio is not None:
         fixed["eps_ratio"] = ratio.number.value
     free = [name, *others]
@@ -358,7 +358,7 @@ def _with_published(
     """A number with the paper's."""
     unit = "m" if name in ("D0", "lambda") else ""
     key, uncertain = _PUBLISHED.get(name, ("", ""))
-    number = printed()[key] if key else None
-    spread = printed()[uncertain].si_uncertainty if uncertain else None
+    number = PAPER.numbers[key] if key else None
+    spread = PAPER.numbers[uncertain].si_uncertainty if uncertain else None
     published, place = (number.si, number.place) if number else (None, "")
     return RecipeNumber(name, unit, value, se, se_alone, step, how, published, spread, place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from asperity_papers.bureau2000.curves import (
     curves_of_laws,
     elastic_curves,
     speed_curves,
-    with_inertia,
 )
 from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, Float, Machine
 
@@ -77,29 +77,19 @@ figure_3 = CurveFigure("figure-03", curves_3)
 # --- Figure 5: air and vacuum at 200 Hz ----------------------------------------------------------
 
 
-def vacuum_shares(machine: Machine) -> tuple[float, float]:
-    """eps_eff/eps at 200 Hz, in vacuum and in air.
-
-    In vacuum by the appendix, 1/|1 - (omega/omega_0)^2|; in air the same over 2.5, the factor by
-    which the paper's data collapse.
-    """
-    vacuum = machine.borne(machine.numbers.frequency_vacuum, None)
-    return vacuum, vacuum / machine.numbers.collapse_divisor_200Hz
-
-
 def curves_5(machine: Machine) -> list[FigureCurve]:
-    """In vacuum and in air, with the mass too, and under the layer's full disc."""
+    """In vacuum and in air, with the mass too, and under the layer's full disc.
+
+    The share in vacuum is that of the appendix, 1/|1 - (omega/omega_0)^2|; in air it is divided by
+    2.5, the factor by which the paper's data collapse.
+    """
     p, eps = machine.numbers, machine.applied_amplitudes()
     V, f = p.V_vacuum, p.frequency_vacuum
-    shares = dict(zip((VACUUM, AIR), vacuum_shares(machine), strict=True))
-    return [
-        *(FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()),
-        *(
-            FigureCurve(with_inertia(name), EXT, V, eps, share, f, inertia=True)
-            for name, share in shares.items()
-        ),
-        FigureCurve(FULL_DISC, EXT, V, eps, machine.borne(f, machine.air_layer()), f),
-    ]
+    vacuum, disc = (machine.borne(f, layer) for layer in (None, machine.air_layer()))
+    shares = {VACUUM: vacuum, AIR: vacuum / p.collapse_divisor_200Hz}
+    still = [FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()]
+    moved = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in still]
+    return [*still, *moved, FigureCurve(FULL_DISC, EXT, V, eps, disc, f)]
 
 
 #: Change of the mean in air and in vacuum, at 200 Hz.
@@ -162,7 +152,7 @@ law_figure = CurveFigure("figure-16", law_curves)
 def phase_curves(machine: Machine) -> list[FigureCurve]:
     """Three laws, and the elasto-plastic one with the mass, at both velocities."""
     eps = machine.borne_amplitudes()
-    moving = speed_curves(machine, EXT, eps, case=with_inertia("EXT"), inertia=True)
+    moving = speed_curves(machine, EXT, eps, case="EXT, inertia", inertia=True)
     return [*law_curves(machine), *moving]
 
 

@@ -25,16 +25,6 @@ def variants(machine: Machine) -> dict[str, tuple[str, dict[str, float]]]:
     }
 
 
-def log_multiplier(machine: Machine, variant: str, V: Float, epsilon: Float) -> Float:
-    """Real part of the logarithm of the leading multiplier; NaN where not solved."""
-    law, overrides = variants(machine)[variant]
-    response = asp.periodic_response(
-        machine.slider(law, **overrides), velocity=V, epsilon=epsilon,
-        frequency=machine.numbers.frequency,
-    )  # fmt: skip
-    return np.where(response.converged, response.log_multipliers[..., 0].real, np.nan)
-
-
 def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, Float]) -> Float:
     """Amplitude eps_eff at which modulation makes sliding stable, for each velocity.
 
@@ -53,9 +43,14 @@ def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, F
     array, shape (n,)
         NaN where the multiplier does not cross 1 between them.
     """
-    root = elementwise.find_root(
-        lambda epsilon, V: log_multiplier(machine, variant, V, epsilon), bracket, args=(V,)
-    )
+    law, overrides = variants(machine)[variant]
+    slider, frequency = machine.slider(law, **overrides), machine.numbers.frequency
+
+    def log_multiplier(epsilon: Float, V: Float) -> Float:
+        r = asp.periodic_response(slider, velocity=V, epsilon=epsilon, frequency=frequency)
+        return np.where(r.converged, r.log_multipliers[..., 0].real, np.nan)
+
+    root = elementwise.find_root(log_multiplier, bracket, args=(V,))
     return np.where(root.success, root.x, np.nan)
 
 

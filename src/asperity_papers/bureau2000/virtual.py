@@ -28,7 +28,7 @@ from asperity.ledger import (
     table,
 )
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
-from asperity_papers.bureau2000.machine import EXT, SPEEDS, Float
+from asperity_papers.bureau2000.machine import EXT, PAPER, SPEEDS, Float
 from asperity_papers.bureau2000.recordings import (
     PRINTED,
     QUANTITIES,
@@ -348,26 +348,14 @@ def _cells(quantity: RecoveredQuantity) -> tuple[str, ...]:
     return tuple(map(rich, texts))
 
 
-def provenance(
-    figure: VirtualFigure, place: str, what: str, parameters: Sequence[str]
-) -> list[str]:
-    """What the first lines of a CSV say.
-
-    Parameters
-    ----------
-    figure : VirtualFigure
-    place : str
-        Place of the figure in the report.
-    what : str
-        The table: of the points or of the lines.
-    parameters : sequence of str
-        Lines on the numbers that the models were given.
-    """
+def provenance(figure: VirtualFigure, what: str) -> list[str]:
+    """What the first lines of a CSV say: `what` it has, points or lines, and how it was made."""
     runs = [
         f"  {s.name}, {s.frequency:g} Hz: seeds {', '.join(map(str, s.seeds))}; eps_eff/eps "
         f"{abs(s.transfer):.6g}; sliding {s.sliding:.4g} s, modulated {s.modulated:.4g} s"
         for s in figure.series
     ]
+    place = WORDS.figures[figure.numbers.name].place
     return [
         f"SIMULATED, {what} of {place}: a virtual experiment; no measured points",
         "after the protocol of Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810 (2000)",
@@ -376,7 +364,7 @@ def provenance(
         "runs (seed: noise of the sensors, drift of the gauge; the motion is the same):",
         *runs,
         "parameters, where nothing above says otherwise (kind in brackets):",
-        *parameters,
+        *PAPER.parameter_lines(),
         "read off the points:",
         *(f"  {name} = {value:.12g}" for name, value in figure.numbers.scalars.items()),
     ]

@@ -11,18 +11,14 @@ from scipy.optimize import brentq
 
 from asperity.air import NormalContact
 from asperity.ledger import altered, check
-from asperity.orbit import PeriodicResponse
 from asperity.theory import closed_forms as cf
 from asperity.units import from_si
 from asperity_papers.bureau2000.machine import (
     APPLIED,
     EXT,
-    SPEEDS,
     STRONGEST,
     Float,
     Machine,
-    Pair,
-    at,
     by_speed,
 )
 
@@ -37,20 +33,13 @@ def no_stick_slip(machine: Machine) -> Numbers:
     Kc = float(cf.critical_stiffness(machine.small_modulation(machine.velocities[0])))
     K = from_si(Kc, machine.numbers["K"].unit, "stiffness")
     critical = Machine(altered(machine.numbers, {"K": float(K)}))
-    multiplier = critical.curve(EXT).floquet_max
-    worst = {
-        name: max(at(multiplier, eps)[k] for eps in APPLIED if eps <= STRONGEST)
-        for k, name in enumerate(SPEEDS)
-    }
-    stable_from = by_speed(stabilising_amplitude(machine.curve(EXT)), "stable from, ")
-    return {**worst, "largest": max(worst.values()), **stable_from}
-
-
-def stabilising_amplitude(r: PeriodicResponse) -> Pair:
-    """Applied amplitude at which the leading multiplier of a curve enters the unit circle."""
-    # The logarithm falls with eps; np.interp wants its abscissae to rise.
-    slow, fast = (float(np.interp(0.0, row[::-1], APPLIED[::-1])) for row in np.log(r.floquet_max))
-    return slow, fast
+    judged = APPLIED.index(STRONGEST) + 1
+    worst = by_speed(critical.curve(EXT).floquet_max[:, :judged].max(1))
+    # Where the leading multiplier enters the unit circle: its logarithm falls with eps, and
+    # np.interp wants its abscissae to rise.
+    logarithms = np.log(machine.curve(EXT).floquet_max)
+    entered = [np.interp(0.0, row[::-1], APPLIED[::-1]) for row in logarithms]
+    return {**worst, "largest": max(worst.values()), **by_speed(entered, "stable from, ")}
 
 
 # --- II.B.1: the mean force ----------------------------------------------------------------------
