@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import write_table, written_folder
+from asperity.outputs.json import to_json
 from asperity.parameters.parameter import count_text
 
 if TYPE_CHECKING:
@@ -212,5 +212,4 @@ def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
         "uncertainties": {u.quantity: u.note for u in paper.contents.uncertainty},
         "claims": [claim.as_dict() for claim in claims],
     }
-    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    path.write_text(to_json(record, indent=2) + "\n", encoding="utf-8", newline="\n")
