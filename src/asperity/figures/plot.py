@@ -346,8 +346,8 @@ class _Drawing:
         look = _look(item.look)
         if look.pop("inside", False):
             look["transform"] = axis.transAxes
-        if "rotation" in look:
-            look["rotation"] = self.value(look["rotation"], panel)
+        if look.get("rotation") in self.numbers:
+            look["rotation"] = self.numbers[look["rotation"]]
         (x,), (y,) = self.ends(item.x, panel), self.ends(item.y, panel)
         axis.text(x, y, self.words(item.text, panel), **look)
 

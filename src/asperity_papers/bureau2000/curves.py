@@ -121,8 +121,9 @@ def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> 
         }
     )
     # Steady sliding: zeros but for round-off, and no phases.
-    rows.loc[applied == 0, ["delta_mu", "mu1", "mu2"]] = 0.0
-    rows.loc[applied == 0, ["phase1", "phase2"]] = np.nan
+    still = (applied == 0) & rows["converged"]
+    rows.loc[still, ["delta_mu", "mu1", "mu2"]] = 0.0
+    rows.loc[still, ["phase1", "phase2"]] = np.nan
     return rows
 
 

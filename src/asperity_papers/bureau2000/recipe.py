@@ -28,7 +28,7 @@ from scipy.stats import chi2 as chi_squared
 from asperity import InputError
 from asperity.inference import LockInTable, bounded_interval, fit, shift_of_estimates
 from asperity.ledger import RecipeNumber, RecipeResult, read_columns
-from asperity.units import to_si
+from asperity.parameters import obeying
 from asperity_papers.bureau2000.machine import PAPER
 
 Float = NDArray[np.float64]
@@ -140,7 +140,7 @@ def paper_procedure(
     warnings: list[str] = []
     report(0, 4, "steady sliding and bifurcation")
     constants = {"V0": PAPER.numbers["V0"].si, **dict(fixed or {})}
-    V0 = to_si(constants["V0"], "velocity", "V0")
+    V0 = float(obeying(constants["V0"], "V0", "velocity", "positive"))
     base = _steady_and_threshold(steady, thresholds, V0, warnings)
     numbers = _numbers_of(base)
     if PAPER.numbers["V0"].si != V0:
