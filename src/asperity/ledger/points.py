@@ -23,10 +23,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import pandas as pd
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, require
 from asperity.ledger.figures import Observables, PaperFigure
 from asperity.ledger.recipe import read_columns
 from asperity.outputs.json import to_json
+from asperity.parameters.arguments import one_of
 from asperity.parameters.parameter import count_text
 from asperity.units import to_si
 
@@ -123,15 +124,9 @@ def check_names(points: pd.DataFrame, observables: Mapping[str, Observables], na
     InputError
     """
     for row, point in points.iterrows():
-        figure, where = point["figure"], f"{name}, row {row}"
-        columns = list(observables.get(figure, ()))
-        for field_, rule, known in (
-            ("figure", "be a figure with curves", list(observables)),
-            ("observable", f"be one of {figure}", columns),
-        ):
-            if point[field_] not in known:
-                got = f"'{point[field_]}'"
-                raise InputError(f"{where}: {field_}", rule, got, closest(point[field_], known))
+        where = f"{name}, row {row}"
+        figure = one_of(point["figure"], observables, f"{where}: figure")
+        one_of(point["observable"], observables[figure], f"{where}: observable")
 
 
 def with_curves(
@@ -189,11 +184,8 @@ def _row(point: pd.Series, table: pd.DataFrame, panel: Panel, where: str) -> dic
     """A point with the value of its curve; `where` is its row, for messages."""
     from scipy.interpolate import CubicSpline
 
-    curve = table[table["curve"] == point["series"]]
-    if curve.empty:
-        known = [str(one) for one in table["curve"].unique()]
-        rule, got = f"be a curve of {point['figure']}", f"'{point['series']}'"
-        raise InputError(f"{where}: series", rule, got, closest(point["series"], known))
+    series = one_of(point["series"], map(str, table["curve"].unique()), f"{where}: series")
+    curve = table[table["curve"] == series]
     x = to_si(str(point["x"]), panel.x_kind, f"{where}: x")
     at = curve[panel.x].to_numpy(float)
     if not at.min() <= x <= at.max():
