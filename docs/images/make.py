@@ -13,7 +13,7 @@ from PIL import Image
 import asperity as asp
 from asperity.figures.stick_slip import draw_stick_slip
 from asperity.figures.style import style
-from asperity_papers.bureau2000.figures import draw
+from asperity_papers.bureau2000.curves import WORDS
 from asperity_papers.bureau2000.machine import Machine
 from asperity_papers.bureau2000.response_figures import figure_11
 
@@ -80,7 +80,7 @@ def save(figure: Figure, name: str) -> None:
 def main() -> None:
     """Write all of them."""
     with style():
-        save(draw(figure_11(Machine())), "figure-11.png")
+        save(WORDS.figures["figure-11"].draw(figure_11(Machine())), "figure-11.png")
         save(vibration(), "vibration.png")
         save(stick_slip(), "stick-slip.png")
         save(velocity_step(), "velocity-step.png")

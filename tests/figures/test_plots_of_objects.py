@@ -4,10 +4,12 @@ from io import BytesIO
 
 import matplotlib.image
 import numpy as np
+import pandas as pd
 import pytest
 
 import asperity as asp
 from asperity.errors import InputError
+from asperity.figures.plot import Plot
 from asperity.figures.recording import draw_amplitudes
 from asperity.loads import Hold, Programme, Slide
 
@@ -121,3 +123,23 @@ def test_amplitudes_are_drawn_over_the_load_with_bars_of_95_percent():
     assert np.ptp(ends[:, 1]) == pytest.approx(2 * 1.96 * 0.005)
     assert mean.lines[-1].get_xydata().tolist() == [[0.0, 0.52]]
     assert [c.get_label() for c in harmonics.containers] == [r"$\mu_1$", r"$\mu_2$"]
+
+
+def test_a_described_figure_has_arrows_and_texts_at_named_angles() -> None:
+    words = {"kind": "text", "x": 1.0, "y": 0.5, "text": "falls by {drop:.1f}"}
+    plot = Plot(
+        panel=({"x": "t", "y": "f"},),
+        draw=(
+            {"kind": "arrow", "x": (0.0, "end"), "y": (1.0, 2.0)},
+            {"kind": "marker", "x": (0.0, 1.0), "y": (0.0, 1.0), "look": {"linestyle": "solid"}},
+            words | {"look": {"rotation": "angle"}},
+            words | {"look": {"rotation": "vertical"}},
+        ),
+    )
+    numbers = {"end": 3.0, "angle": -30.0, "drop": 0.25}
+    (axis,) = plot.figure(pd.DataFrame(), numbers).axes
+    arrow, *texts = axis.texts
+    assert (arrow.xyann, arrow.xy) == ((0.0, 1.0), (3.0, 2.0))
+    assert [text.get_rotation() for text in texts] == [330.0, 90.0]
+    assert texts[0].get_text() == "falls by 0.2"
+    assert axis.get_lines()[0].get_linestyle() == "-"

@@ -7,7 +7,7 @@ import pytest
 from asperity import materials
 from asperity.errors import InputError
 from asperity.ledger import Contents, check, fill, judge_claims, rules
-from asperity.ledger.claims import formula_verdict, judge
+from asperity.ledger.claims import computed_numbers, formula_verdict, judge
 from asperity.ledger.contents import About, Entry, RuleWords
 from asperity.ledger.sentences import names_in
 
@@ -118,6 +118,28 @@ def test_a_formula_names_terms_of_the_model():
     ):
         with pytest.raises(InputError, match=r"x must be a (formula|number)"):
             rules.formula_value(wrong, {"a": 10.0}, "x", terms)
+
+
+def test_functions_of_formulas():
+    terms = {"z": lambda: 3.0 - 4.0j, "row": lambda: [2.0, 5.0]}
+    for formula, value in (
+        ("abs(z())", 5.0),
+        ("real(z()) - imag(z())", 7.0),
+        ("min(a, 1) + max(row())", 6.0),
+        ("sqrt(a)*ln(a)", 2.0 * math.log(4.0)),
+    ):
+        assert rules.formula_value(formula, {"a": 4.0}, "x", terms) == value
+
+
+def test_a_formula_names_the_values_before_it():
+    """A printed number of the same name goes first."""
+    formulas = {"half": "K/2", "K": "2*half", "twice": "K + half"}
+    made = entry(stated=1.0).model_copy(update={"values": formulas})
+    K = NUMBERS.K
+    assert computed_numbers(made, {}, None, NUMBERS) == {"half": K / 2, "K": K, "twice": 1.5 * K}
+    backwards = made.model_copy(update={"values": {"b": "half", "half": "K/2"}})
+    with pytest.raises(InputError, match=r"x\.values\.b must be a number"):
+        computed_numbers(backwards, {}, None, NUMBERS)
 
 
 @pytest.mark.parametrize("formula", ["a b", "__import__('os')", "a.b", "1/0", "[a]", "ln(0)", ""])

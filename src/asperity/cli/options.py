@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -279,8 +279,37 @@ def _option(parameter: Parameter) -> Decorator:
     )
 
 
-def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
+def pairs_of(
+    texts: Iterable[str], option: str, like: str, form: str = "VALUE", *, at_last: bool = False
+) -> Iterator[tuple[str, str]]:
     """Split ``NAME=VALUE`` texts of an option that may be repeated.
+
+    Parameters
+    ----------
+    texts : iterable of str
+    option : str
+    like : str
+        An example of a text.
+    form : str
+        What messages call the value.
+    at_last : bool
+        Whether a name may have an ``=``: the last one splits a text.
+
+    Raises
+    ------
+    InputError
+        If one has no name or value.
+    """
+    for text in texts:
+        split = text.rpartition("=") if at_last else text.partition("=")
+        name, _, value = map(str.strip, split)
+        advice = f"write it like {option} {like}"
+        require(name and value, option, f"be NAME={form}", f"'{text}'", advice)
+        yield name, value
+
+
+def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
+    """Parameters by their names, from ``NAME=VALUE`` texts.
 
     Raises
     ------
@@ -288,10 +317,7 @@ def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
         If one has no name or value, or a name is given twice.
     """
     result: dict[str, str] = {}
-    for pair in pairs:
-        name, _, value = (part.strip() for part in pair.partition("="))
-        like = f'write it like {option} "K=0.2 N/um"'
-        require(name and value, option, "be NAME=VALUE", f"'{pair}'", like)
+    for name, value in pairs_of(pairs, option, '"K=0.2 N/um"'):
         add_setting(result, parameter_name(name), value)
     return result
 
@@ -308,12 +334,12 @@ def parameter_name(name: str) -> str:
     return parameter_named(name, None if law == "all" else get_law(law))
 
 
-def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
+def add_setting(settings: dict[str, str], name: str, value: str | None, option: str = "") -> None:
     """Add a value that another option gives, if it does; twice the same name is an error."""
     if value is None:
         return
-    twice = f"'{settings.get(name)}' and '{value}'"
-    require(name not in settings, name, "be given once", twice, "leave one out")
+    field, twice = f"{option} {name}".strip(), f"'{settings.get(name)}' and '{value}'"
+    require(name not in settings, field, "be given once", twice, "leave one out")
     settings[name] = value
 
 

@@ -7,7 +7,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from asperity.cli.options import Command, option, stacked
+from asperity.cli.options import Command, add_setting, option, pairs_of, stacked
 from asperity.errors import InputError, require
 
 #: Where no channel has the motion of the drive.
@@ -90,50 +90,28 @@ def source_options(command: Command) -> Command:
         from asperity.questions.options import COLUMN_OPTIONS
         from asperity.questions.recording import Source
 
-        roles = {role: others.pop(o.lstrip("-")) for role, o in COLUMN_OPTIONS.items()}
-        for role, name in _name_value_pairs(columns, "--column"):
-            once = roles.get(role) is None
-            got = f"'{roles.get(role)}' and '{name}'"
-            require(once, f"--column {role}", "be given once", got, "leave one out")
-            roles[role] = name
+        roles: dict[str, str] = {}
+        for role, chosen in COLUMN_OPTIONS.items():
+            add_setting(roles, role, others.pop(chosen.lstrip("-")))
+        for role, name in pairs_of(columns, "--column", "velocity=speed", at_last=True):
+            add_setting(roles, role, name, "--column")
+        unit_of: dict[str, str] = {}
+        for name, unit in pairs_of(units, "--unit", "Fn=N", at_last=True):
+            add_setting(unit_of, name, unit, "--unit")
+        made: dict[str, str] = {}
+        like = '"force = 2.4 N/V * Gauge"'
+        for name, expression in pairs_of(channels, "--channel", like, "EXPRESSION"):
+            add_setting(made, name, expression, "--channel")
         source = Source(
             # Columns of files without headers are chosen by number, in the digits 0 to 9.
             columns={
                 role: int(name) if re.fullmatch(r"[0-9]{1,9}", name) else name
                 for role, name in roles.items()
-                if name is not None
             },
-            units=dict(_name_value_pairs(units, "--unit")),
-            channels=_expressions_of(channels),
+            units=unit_of,
+            channels=made,
             **{name: others.pop(name) for name in _FIELDS},
         )
         return command(source=source, **others)
 
     return stacked(*_OPTIONS)(gathered)
-
-
-def _name_value_pairs(texts: tuple[str, ...], option: str) -> list[tuple[str, str]]:
-    """Split ``NAME=VALUE`` texts at the last ``=``."""
-    pairs: list[tuple[str, str]] = []
-    for text in texts:
-        name, _, value = (part.strip() for part in text.rpartition("="))
-        like = "velocity=speed" if option == "--column" else "Fn=N"
-        given, advice = name and value, f"write it like {option} {like}"
-        require(given, option, "be NAME=VALUE", f"'{text}'", advice)
-        got = f"'{dict(pairs).get(name)}' and '{value}'"
-        require(name not in dict(pairs), f"{option} {name}", "be given once", got, "leave one out")
-        pairs.append((name, value))
-    return pairs
-
-
-def _expressions_of(texts: tuple[str, ...]) -> dict[str, str]:
-    """Expressions of channels by name, from ``NAME=EXPRESSION`` texts."""
-    made: dict[str, str] = {}
-    for text in texts:
-        name, _, expression = (part.strip() for part in text.partition("="))
-        like = 'write it like --channel "force = 2.4 N/V * Gauge"'
-        require(name and expression, "--channel", "be NAME=EXPRESSION", f"'{text}'", like)
-        once = f"be given once for '{name}'"
-        require(name not in made, "--channel", once, "two", "leave one out")
-        made[name] = expression
-    return made

@@ -89,32 +89,38 @@ def draw_plane(axis: Axes, dataset: xarray.Dataset, show: str) -> QuadMesh:
     dataset : Dataset
     show : str
     """
-    x, y = (dataset[dataset.attrs[side]] for side in "xy")
-    units = [axis_unit(side) for side in (x, y)]
+    sides = [dataset[dataset.attrs[side]] for side in "xy"]
+    units = [axis_unit(side) for side in sides]
+    grid = [side.values / unit[0] for side, unit in zip(sides, units, strict=True)]
     log = [dataset.attrs[f"{side}_scale"] == "log" for side in "xy"]
-    values = np.ma.masked_invalid(dataset[show].values)
-    edges = [_edges(v.values / u[0], k) for v, u, k in zip((x, y), units, log, strict=True)]
     axis.set_facecolor(_FAILED["facecolor"])
     mesh = axis.pcolormesh(
-        *edges,
-        values,
+        *map(_edges, grid, log),
+        np.ma.masked_invalid(dataset[show].values),
         norm=colours(dataset, show),
         cmap=_colour_map(show),
         rasterized=True,
         shading="flat",
     )
-    _draw_failed(axis, dataset, units)
+    _draw_failed(axis, dataset, grid)
     _draw_boundary(axis, dataset, units)
-    _draw_unmodulated(axis, dataset, units)
-    for side, values_of, unit, is_log in (("x", x, units[0], log[0]), ("y", y, units[1], log[1])):
-        axis.set(**{f"{side}label": label(values_of, unit)})
-        ends = values_of.values[[0, -1]] / unit[0]
+    if (line := unmodulated(dataset)) is not None:
+        halo = patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)
+        pair = (values / unit[0] for values, unit in zip(line, units, strict=True))
+        axis.plot(*pair, zorder=3, path_effects=[halo], **_UNMODULATED)
+    for name, values, unit, side, is_log in zip("xy", grid, units, sides, log, strict=True):
+        axis.set(**{f"{name}label": label(side, unit)})
         if is_log:
-            axis.set(**{f"{side}scale": "log"})
-            _write_numbers(axis.xaxis if side == "x" else axis.yaxis, ends[1] / ends[0])
-        axis.set(**{f"{side}lim": ends})
+            axis.set(**{f"{name}scale": "log"})
+            _write_numbers(axis.xaxis if name == "x" else axis.yaxis, values[-1] / values[0])
+        axis.set(**{f"{name}lim": values[[0, -1]]})
     axis.tick_params(which="both", color="#333333")
-    _name_regions(axis, dataset)
+    halo = patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)
+    for word, x, y in region_names(dataset):
+        axis.text(
+            x, y, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
+            path_effects=[halo],
+        )  # fmt: skip
     return mesh
 
 
@@ -136,7 +142,8 @@ def colours(dataset: xarray.Dataset, show: str) -> Normalize:
 
 def keys(dataset: xarray.Dataset) -> list[Any]:
     """Entries of the legend: the kinds of bifurcation in the map, and other lines."""
-    kinds = _kinds(dataset)
+    on_lines = dataset["boundary_line"].values >= 0
+    kinds = set(dataset["boundary_kind"].values.astype(str)[on_lines])
     entries: list[Any] = [
         Line2D([], [], color=_LINE, linestyle=line, label=_KIND_NAMES.get(kind, kind))
         for kind, line in KIND_LINES.items()
@@ -194,15 +201,14 @@ def _colour_map(show: str) -> Any:
     return cm.batlow_r if show == "delta_mu" else cm.batlow
 
 
-def _draw_failed(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+def _draw_failed(axis: Axes, dataset: xarray.Dataset, grid: list[Float]) -> None:
     failed = ~dataset["converged"].values.astype(bool)
-    if not failed.any():
-        return
-    x, y = (dataset[dataset.attrs[s]].values / u[0] for s, u in zip("xy", units, strict=True))
-    hatched = axis.contourf(x, y, failed.astype(float), levels=[0.5, 1.5], colors="none",
-                            hatches=["xxxx"])  # fmt: skip
-    hatched.set_edgecolor(_FAILED["edgecolor"])
-    hatched.set_linewidth(0.0)
+    if failed.any():
+        hatched = axis.contourf(
+            *grid, failed.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xxxx"]
+        )
+        hatched.set_edgecolor(_FAILED["edgecolor"])
+        hatched.set_linewidth(0.0)
 
 
 def _draw_boundary(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
@@ -241,15 +247,6 @@ def unmodulated(dataset: xarray.Dataset) -> tuple[Float, Float] | None:
     return pair if dataset.attrs["x"] == other else pair[::-1]
 
 
-def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
-    line = unmodulated(dataset)
-    if line is None:
-        return
-    pair = [values / unit[0] for values, unit in zip(line, units, strict=True)]
-    halo = [patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)]
-    axis.plot(*pair, zorder=3, path_effects=halo, **_UNMODULATED)
-
-
 def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:
     """The words stable and unstable, each where its region is widest: shares of both axes."""
     solved = dataset["converged"].values.astype(bool)
@@ -263,19 +260,6 @@ def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:
         row, column = np.unravel_index(np.argmax(depth), depth.shape)
         places.append((word, (column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0]))
     return places
-
-
-def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
-    for word, x, y in region_names(dataset):
-        axis.text(
-            x, y, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
-            path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)],
-        )  # fmt: skip
-
-
-def _kinds(dataset: xarray.Dataset) -> set[str]:
-    on_lines = dataset["boundary_line"].values >= 0
-    return set(dataset["boundary_kind"].values.astype(str)[on_lines])
 
 
 def _extend(dataset: xarray.Dataset, show: str, mesh: QuadMesh) -> str:

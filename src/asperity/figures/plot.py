@@ -105,9 +105,9 @@ class Item(_Part):
     kind : str
         "line" of a curve; "band" between the lowest and the highest of `curves`; "points" with bars
         of 95 %; "value" and "range" that a text states at one abscissa; "remark" on such a value;
-        "text"; "marker"; "slope", a line through the origin; "level" and "limit", a line across at
-        an ordinate or abscissa; "zone" and "strip", the area between two of them; "key", an entry
-        of a legend alone.
+        "text"; "marker"; "arrow" between two points; "slope", a line through the origin; "level"
+        and "limit", a line across at an ordinate or abscissa; "zone" and "strip", the area between
+        two of them; "key", an entry of a legend alone.
     panels : tuple of int
         All by default.
     curve : str
@@ -127,12 +127,13 @@ class Item(_Part):
         Panel that has the entry: by default each of `panels` that has a legend; -1 is the legend of
         the figure.
     look : mapping
-        Arguments of Matplotlib; colours and dashes may be names of `asperity.figures.style`.
+        Arguments of Matplotlib; colours and dashes may be names of `asperity.figures.style`, and
+        the rotation of a text the name of a number.
     """
 
     kind: Literal[
-        "line", "band", "points", "value", "range", "remark", "text", "marker", "slope", "level",
-        "limit", "zone", "strip", "key",
+        "line", "band", "points", "value", "range", "remark", "text", "marker", "arrow", "slope",
+        "level", "limit", "zone", "strip", "key",
     ] = "line"  # fmt: skip
     panels: tuple[int, ...] = ()
     curve: str = ""
@@ -345,13 +346,19 @@ class _Drawing:
         look = _look(item.look)
         if look.pop("inside", False):
             look["transform"] = axis.transAxes
+        if look.get("rotation") in self.numbers:
+            look["rotation"] = self.numbers[look["rotation"]]
         (x,), (y,) = self.ends(item.x, panel), self.ends(item.y, panel)
         axis.text(x, y, self.words(item.text, panel), **look)
 
     def _marker(self, item: Item, panel: Panel, axis: Axes) -> None:
-        axis.plot(
-            self.ends(item.x, panel), self.ends(item.y, panel), linestyle="none", **_look(item.look)
-        )
+        look: Look = {"linestyle": "none"} | _look(item.look)
+        axis.plot(self.ends(item.x, panel), self.ends(item.y, panel), **look)
+
+    def _arrow(self, item: Item, panel: Panel, axis: Axes) -> None:
+        (x, x_end), (y, y_end) = self.ends(item.x, panel), self.ends(item.y, panel)
+        look = {"arrowstyle": "-|>"} | _look(item.look)
+        axis.annotate("", xy=(x_end, y_end), xytext=(x, y), arrowprops=look)
 
     def _slope(self, item: Item, panel: Panel, axis: Axes) -> None:
         x, (slope,) = np.array(self.ends(item.x, panel)), self.ends(item.y, panel)

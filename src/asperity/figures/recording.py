@@ -21,6 +21,7 @@ from asperity.figures.style import (
     STATED_FILL,
     letter_panels,
     new_figure,
+    room_above,
     three_panels,
 )
 from asperity.measurement.record import mean_cycle, residual_spectrum
@@ -100,7 +101,7 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
     room = 0.22 * (high - low)
     axis.set_ylim(low - 0.3 * room, high + 1.9 * room)
     length = float(measurement.time[-1] - start)
-    labelled = False
+    line = None
     for k, s in enumerate(measurement.segments):
         middle = (s.start + s.end) / 2 - start
         if k:
@@ -109,27 +110,18 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
             axis.axvspan(s.start - start, s.end - start, color=STATED_FILL, alpha=0.3, linewidth=0)
             continue
         span = np.array([s.steady.start, s.end])
-        axis.plot(
-            span - start,
-            s.steady.value + s.slope * (span - span.mean()),
-            color=LINKER_DIETERICH,
-            label=None if labelled else "steady level and drift",
-        )
-        labelled = True
+        level = s.steady.value + s.slope * (span - span.mean())
+        (line,) = axis.plot(span - start, level, color=LINKER_DIETERICH)
         # A label that would overlap its neighbours is left out.
         if np.isfinite(s.velocity) and s.end - s.start > 0.15 * length:
             axis.text(
                 middle, high + 0.75 * room, f"{1e6 * s.velocity:.3g} µm/s", va="top", ha="center"
             )
+    if line is not None:
+        line.set_label("steady level and drift")
     if measurement.holds:
-        axis.plot(
-            [h.peak_time - start for h in measurement.holds],
-            [h.peak for h in measurement.holds],
-            "v",
-            markersize=4,
-            color=_FITTED,
-            label="peak after a hold",
-        )
+        peaks = np.array([(h.peak_time - start, h.peak) for h in measurement.holds]).T
+        axis.plot(*peaks, "v", markersize=4, color=_FITTED, label="peak after a hold")
     axis.set(xlabel=since(start), ylabel="friction $F/W$")
     axis.legend(loc="upper right", ncols=2, handlelength=1.4)
     return figure
@@ -140,14 +132,8 @@ def _draw_recording(axis: Axes, measurement: Measurement) -> None:
     start = samples.time[0]
     band(axis, samples.time - start, samples.load / reading.W0, color=_LOAD)
     band(axis, samples.time - start, samples.force / reading.W0, color=_FITTED)
-    axis.axvspan(
-        reading.start - start,
-        reading.end - start,
-        color=STATED_FILL,
-        alpha=0.35,
-        linewidth=0,
-        zorder=0,
-    )
+    window = reading.start - start, reading.end - start
+    axis.axvspan(*window, color=STATED_FILL, alpha=0.35, linewidth=0, zorder=0)
     top = max(1.0 + abs(reading.epsilon), float(samples.load.max() / reading.W0))
     bottom = min(0.0, float(samples.force.min() / reading.W0))
     axis.set_ylim(bottom, top + 0.3 * (top - bottom))
@@ -173,8 +159,7 @@ def _draw_cycle(axis: Axes, measurement: Measurement) -> None:
     )
     harmonics = measurement.reading.harmonics.size
     axis.plot(cycle.fine_phase, scale * cycle.fitted, color=_FITTED, label=f"{harmonics} harmonics")
-    low, high = axis.get_ylim()
-    axis.set_ylim(low, high + 0.35 * (high - low))
+    room_above(axis, 0.35)
     axis.set(xlabel=r"phase of the load $\phi/2\pi$", ylabel=r"$10^3\,(F/W_0-\bar\mu)$")
     axis.legend(loc="upper right", ncols=2)
 
@@ -185,23 +170,14 @@ def _draw_residual(axis: Axes, measurement: Measurement) -> None:
     frequency, amplitude = residual_spectrum(measurement)
     order = np.arange(1, reading.harmonics.size + 1)
     band(axis, frequency, np.maximum(amplitude, 1e-300), color=_MEASURED, lines=True)
+    harmonics = np.abs(reading.harmonics)
     axis.plot(
-        order * reading.frequency,
-        np.abs(reading.harmonics),
-        "o",
-        color=_FITTED,
-        markersize=5,
-        label="harmonics",
+        order * reading.frequency, harmonics, "o", color=_FITTED, markersize=5, label="harmonics"
     )
-    floor = float(np.quantile(amplitude, 0.1))
-    ceiling = max(float(np.abs(reading.harmonics).max()), float(amplitude.max()))
-    axis.set(
-        yscale="log",
-        xlim=(0, frequency[-1]),
-        ylim=(max(floor, 1e-12) / 3, 20 * ceiling),
-        xlabel="frequency (Hz)",
-        ylabel="amplitude of $F/W_0$",
-    )
+    floor, ceiling = np.quantile(amplitude, 0.1), max(harmonics.max(), amplitude.max())
+    limits = max(floor, 1e-12) / 3, 20 * ceiling
+    axis.set(yscale="log", xlim=(0, frequency[-1]), ylim=limits)
+    axis.set(xlabel="frequency (Hz)", ylabel="amplitude of $F/W_0$")
     axis.plot([], [], color=_MEASURED, label="residual")
     axis.legend(loc="upper right", ncols=2)
 
@@ -225,5 +201,4 @@ def band(axis: Axes, x: Float, y: Float, *, color: str, lines: bool = False) -> 
             part_x, part_y = part_x[kept], part_y[kept]
         marker = "." if part_x.size == 1 else None
         axis.plot(part_x, part_y, color=color, linewidth=0.6, marker=marker, markersize=1)
-    formatter = ScalarFormatter(useOffset=False)
-    axis.yaxis.set_major_formatter(formatter)
+    axis.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.errors import require
@@ -163,19 +162,21 @@ def _curves(
     """Quantities over the last axis, a panel each, and a curve for each row of the first."""
     figure = new_figure(6.4, 2.7)
     panels = figure.subplots(1, len(shown))
-    dims = data[shown[0][0]].dims
-    along = str(dims[-1])
+    rows = data if data[shown[0][0]].ndim == 2 else data.expand_dims("row")
+    across, along = map(str, rows[shown[0][0]].dims)
     side = data[along] if along in data.coords else None
     unit = (1.0, "") if side is None else axis_unit(side)
     x = np.arange(data.sizes[along]) if side is None else side.values / unit[0]
-    rows = data if len(dims) == 2 else data.expand_dims("row")
-    across = str(rows[shown[0][0]].dims[0])
-    opened = np.zeros(rows[shown[0][0]].shape, bool) if unstable is None else unstable
-    opened = opened.reshape(rows[shown[0][0]].shape)
+    shape = rows[shown[0][0]].shape
+    opened = np.zeros(shape, bool) if unstable is None else unstable.reshape(shape)
     for panel, (name, text, scale) in zip(panels, shown, strict=True):
         for i in range(rows.sizes[across]):
             row = rows.isel({across: i})
-            _curve(panel, x, row[name].values / scale, opened[i], _row_label(row, across))
+            y = row[name].values / scale
+            (line,) = panel.plot(x, y, label=_row_label(row, across))
+            open_ = opened[i] & np.isfinite(y)
+            look = {"color": line.get_color(), "fillstyle": "none", "markersize": 3}
+            panel.plot(x[open_], y[open_], "o", **look)
         panel.set(xlabel=along if side is None else label(side, unit), ylabel=text)
         if x.min() > 0 and x.max() > 30 * x.min():
             panel.set_xscale("log")
@@ -189,12 +190,6 @@ def _curves(
         panels[2].legend(handles=panels[2].get_lines()[-1:], fontsize="small")
     figure.suptitle(law, fontsize="small")
     return figure
-
-
-def _curve(panel: Axes, x: Any, y: Any, unstable: Any, text: str) -> None:
-    (line,) = panel.plot(x, y, label=text)
-    open_ = unstable & np.isfinite(y)
-    panel.plot(x[open_], y[open_], "o", color=line.get_color(), fillstyle="none", markersize=3)
 
 
 def _row_label(row: xarray.Dataset, across: str) -> str:

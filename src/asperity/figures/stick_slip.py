@@ -9,7 +9,14 @@ from matplotlib.figure import Figure
 
 from asperity.figures.plot import NORMAL
 from asperity.figures.recording import band, since
-from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure, three_panels
+from asperity.figures.style import (
+    ELASTO_PLASTIC,
+    GREY,
+    STATED_FILL,
+    new_figure,
+    room_above,
+    three_panels,
+)
 from asperity.measurement.record import middle_events
 from asperity.measurement.stick_slip.regimes import REPEATED
 
@@ -42,15 +49,11 @@ def _draw_whole(axis: Axes, measurement: StickSlipMeasurement) -> None:
             span = regime.start - start, regime.end - start
             axis.axvspan(*span, color=STATED_FILL, alpha=0.35, zorder=0)
         if regime.kind not in names or len(measurement.regimes) < 6:
+            place = (regime.start + regime.end) / 2 - start, 1.01 + 0.07 * (k % 2)
             axis.text(
-                (regime.start + regime.end) / 2 - start,
-                1.01 + 0.07 * (k % 2),
-                regime.kind,
-                transform=axis.get_xaxis_transform(),
-                ha="center",
-                va="bottom",
-                fontsize=7,
-            )
+                *place, regime.kind, transform=axis.get_xaxis_transform(),
+                ha="center", va="bottom", fontsize=7,
+            )  # fmt: skip
         names.add(regime.kind)
     _label(axis, start)
 
@@ -64,14 +67,9 @@ def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
         return
     shown, near = middle_events(measurement)
     band(axis, measurement.time[near] - start, measurement.friction[near], color=GREY)
-    axis.plot(
-        np.stack([events.onset[shown], events.end[shown]]) - start,
-        np.stack([events.force_before[shown], events.force_after[shown]]),
-        ".-",
-        color=ELASTO_PLASTIC,
-        linewidth=1.2,
-        markersize=4,
-    )
+    times = np.stack([events.onset[shown], events.end[shown]]) - start
+    forces = np.stack([events.force_before[shown], events.force_after[shown]])
+    axis.plot(times, forces, ".-", color=ELASTO_PLASTIC, linewidth=1.2, markersize=4)
     _label(axis, start)
 
 
@@ -79,8 +77,7 @@ def _label(axis: Axes, start: float) -> None:
     """Labels of friction over the time after `start`, with room for the letter of the panel."""
     axis.set(xlabel=since(start), ylabel="$F/W$")
     axis.margins(x=0)
-    low, high = axis.get_ylim()
-    axis.set_ylim(low, high + 0.15 * (high - low))
+    room_above(axis, 0.15)
 
 
 def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
@@ -89,22 +86,17 @@ def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
     axis.set(xlabel="stick time (s)", ylabel=r"drop of $F/W$")
     if not known.any():
         return
+    waits, drops = events.stick_duration[known], events.drop[known]
     axis.errorbar(
-        events.stick_duration[known],
-        events.drop[known],
-        yerr=events.drop_uncertainty[known],
-        fmt="o",
-        color=ELASTO_PLASTIC,
-        markersize=2.5,
-        linewidth=0.7,
-    )
+        waits, drops, yerr=events.drop_uncertainty[known], fmt="o", color=ELASTO_PLASTIC,
+        markersize=2.5, linewidth=0.7,
+    )  # fmt: skip
     axis.axhline(measurement.smallest_drop, color=GREY, linewidth=0.8, linestyle="--")
     axis.text(
         0.985, measurement.smallest_drop, "smallest drop that is seen", fontsize=7,
         va="bottom", ha="right", transform=axis.get_yaxis_transform(),
     )  # fmt: skip
-    longest, shortest = (end(events.stick_duration[known]) for end in (np.max, np.min))
-    if longest > 10 * shortest:
+    if np.max(waits) > 10 * np.min(waits):
         axis.set_xscale("log")
     axis.margins(x=0.06, y=0.2)
     axis.set_ylim(bottom=0)

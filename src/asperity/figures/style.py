@@ -134,6 +134,12 @@ def letter_panels(axes: Sequence[Axes]) -> None:
         axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
 
 
+def room_above(axis: Axes, share: float) -> None:
+    """Leave a share of the height of the panel free above its curves, for a letter or a legend."""
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high + share * (high - low))
+
+
 def three_panels(draw: Sequence[Callable[[Axes, Any], None]], measurement: Any) -> Figure:
     """A figure of three panels with letters, one above the other, each with its function."""
     figure = new_figure(5.0, 7.2)

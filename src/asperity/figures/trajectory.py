@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from asperity.protocol import RunOutline
     from asperity.transients import Trajectory
 
+#: Quantity, colour, scale and label of each panel.
+_PANELS = (
+    ("load", RICE_RUINA, 1.0, "$W$ (N)"),
+    ("force", ELASTO_PLASTIC, 1.0, "$F$ (N)"),
+    ("velocity", ELASTO_PLASTIC, 1e6, "velocity (µm/s)"),
+    ("age", RICE_RUINA, 1.0, r"age $\Phi$ (s)"),
+)
 #: Largest number of marked events; more events are only counted.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
 _MOST_MARKS = 60
@@ -41,16 +48,14 @@ def draw_run(run: RunOutline) -> Figure:
     aged = "age" in run.low
     figure = new_figure(5.0, 8.0 if aged else 6.2)
     panels = figure.subplots(4 if aged else 3, 1, sharex=True)
+    for panel, (name, color, scale, label) in zip(panels, _PANELS, strict=False):
+        _draw_band(panel, run, name, color, scale)
+        panel.set_ylabel(label)
     load, force, velocity = panels[:3]
-    _draw_band(load, run, "load", RICE_RUINA, 1.0)
-    _draw_band(force, run, "force", ELASTO_PLASTIC, 1.0)
-    _draw_band(velocity, run, "velocity", ELASTO_PLASTIC, 1e6)
-    load.set_ylabel("$W$ (N)")
-    force.set_ylabel("$F$ (N)")
-    velocity.set_ylabel("velocity (µm/s)")
     _scale_velocity(velocity, run)
     if aged:
-        _draw_age(panels[3], run)
+        # Logarithmic where it spans decades, as from slip to a hold.
+        _spans_decades(panels[3], run.low["age"], run.high["age"])
     panels[-1].set_xlabel("time (s)")
     _mark_events(force, run)
     if run.title:
@@ -90,19 +95,13 @@ def _draw_band(axis: Axes, run: RunOutline, name: str, color: str, scale: float)
     # The edges of the band, which are one line where it has no width.
     for edge in (low, high):
         axis.plot(run.time, edge, color=color, linewidth=0.7)
-    span = float(np.max(high) - np.min(low))
-    if span <= 1e-9 * abs(float(np.max(high))):
-        middle = float(np.max(high))
-        axis.set_ylim(middle - 0.1 * abs(middle) - 1e-12, middle + 0.1 * abs(middle) + 1e-12)
+    least, most = float(np.min(low)), float(np.max(high))
+    span = most - least
+    if span <= 1e-9 * abs(most):
+        room = 0.1 * abs(most) + 1e-12
+        axis.set_ylim(most - room, most + room)
     else:
-        axis.set_ylim(float(np.min(low)) - 0.06 * span, float(np.max(high)) + 0.22 * span)
-
-
-def _draw_age(axis: Axes, run: RunOutline) -> None:
-    """The age, logarithmic where it spans decades, as from slip to a hold."""
-    _draw_band(axis, run, "age", RICE_RUINA, 1.0)
-    axis.set_ylabel(r"age $\Phi$ (s)")
-    _spans_decades(axis, run.low["age"], run.high["age"])
+        axis.set_ylim(least - 0.06 * span, most + 0.22 * span)
 
 
 def _scale_velocity(axis: Axes, run: RunOutline) -> None:
@@ -129,11 +128,9 @@ def _spans_decades(axis: Axes, low: Float, high: Float) -> bool:
 def _mark_events(axis: Axes, run: RunOutline) -> None:
     for kind, color in _MARKED.items():
         times = [t for t, k in run.events if k == kind]
-        if not 0 < len(times) <= _MOST_MARKS:
-            continue
-        for i, t in enumerate(times):
-            axis.axvline(
-                t, color=color, linewidth=0.7, linestyle="dotted", label=None if i else kind
-            )
+        if 0 < len(times) <= _MOST_MARKS:
+            for t in times:
+                line = axis.axvline(t, color=color, linewidth=0.7, linestyle="dotted")
+            line.set_label(kind)
     if axis.get_legend_handles_labels()[0]:
         axis.legend(loc="upper right", ncols=2, frameon=True, framealpha=1.0, edgecolor="none")

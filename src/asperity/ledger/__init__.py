@@ -13,6 +13,7 @@ from asperity.ledger.claims import (
     check as check,
     find_checks as find_checks,
     judge_claims as judge_claims,
+    printed_numbers as printed_numbers,
 )
 from asperity.ledger.contents import KINDS as KINDS, Contents as Contents
 from asperity.ledger.figures import (
@@ -35,7 +36,7 @@ from asperity.ledger.report import (
     ReproductionSummary as ReproductionSummary,
     reproduce as reproduce,
 )
-from asperity.ledger.rules import AcceptanceRule as AcceptanceRule
+from asperity.ledger.rules import AcceptanceRule as AcceptanceRule, formula_value as formula_value
 from asperity.ledger.sentences import fill as fill
 
 __all__ = public_names(globals())

@@ -182,18 +182,14 @@ def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Clai
         finite, or if the rule cannot be built.
     """
     numbers = judged_numbers(entry, computed)
+    rule, verdict = _rule_and_verdict(entry, numbers, stated)
     words = {
         name: value
         for name, value in entry.model_dump(exclude={"rule", "computed"}).items()
         if name in Claim.__dataclass_fields__
     }
-    return Claim(
-        **words,
-        computed=fill(entry.computed, computed, f"{entry.id}.computed"),
-        rule=_rule_text(entry, stated, several=len(numbers) > 1),
-        verdict=verdict(entry, numbers, stated),
-        numbers=numbers,
-    )
+    text = fill(entry.computed, computed, f"{entry.id}.computed")
+    return Claim(**words, computed=text, rule=rule, verdict=verdict, numbers=numbers)
 
 
 def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
@@ -206,7 +202,7 @@ def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
             got = f"{value!r} for '{name}' of '{entry.id}'"
             raise InputError("checks", "compute finite numbers", got, "correct the check")
     numbers = {name: float(v) for name, v in computed.items() if not isinstance(v, str)}
-    patterns = entry.judged or (_FORMULA if entry.rule.is_formula else ("*",))
+    patterns = entry.judged or (_FORMULA if entry.rule.accept == "formula" else ("*",))
     for pattern in entry.judged:
         if not any(fnmatchcase(name, pattern) for name in numbers):
             rule = "name numbers of its check"
@@ -217,36 +213,28 @@ def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
 _FORMULA = ("printed", "derived", "independent")
 
 
-def verdict(entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, float]) -> Verdict:
-    """The verdict of an entry's rule on the computed numbers."""
-    if entry.rule.is_undecided:
-        return "undecided"
-    if entry.rule.is_formula:
+def _rule_and_verdict(
+    entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, float]
+) -> tuple[str, Verdict]:
+    """The rule of an entry as a sentence, and its verdict on the computed numbers."""
+    words = entry.rule
+    if words.accept == "undecided":
+        return f"cannot be applied: {words.what}", "undecided"
+    if words.accept == "formula":
         missing = {"printed", "independent"} - set(numbers)
-        if missing or entry.rule.tolerance is None:
+        if missing or words.tolerance is None:
             lacking = ", ".join(sorted(missing)) or "a tolerance"
             raise InputError(
                 f"{entry.id}.rule must have the numbers 'printed' and 'independent' and a "
                 f"tolerance, got none of: {lacking}; add it"
             )
-        return formula_verdict(
-            numbers["printed"],
-            numbers.get("derived", math.nan),
-            numbers["independent"],
-            entry.rule.tolerance,
-        )
-    rule = entry.rule.build(stated, entry.id)
+        printed, derived, independent = (numbers.get(name, math.nan) for name in _FORMULA)
+        verdict = formula_verdict(printed, derived, independent, words.tolerance)
+        return rules.formula_text(words.tolerance), verdict
+    rule = words.build(stated, entry.id)
     kept = bool(numbers) and all(rule.holds(value) for value in numbers.values())
-    return "reproduced" if kept else "differs"
-
-
-def _rule_text(entry: Entry, stated: Mapping[str, float], *, several: bool) -> str:
-    if entry.rule.is_undecided:
-        return f"cannot be applied: {entry.rule.what}"
-    if entry.rule.is_formula:
-        return rules.formula_text(entry.rule.tolerance or math.nan)
-    text = entry.rule.build(stated, entry.id).text
-    return f"every one of: {text}" if several else text
+    text = f"every one of: {rule.text}" if len(numbers) > 1 else rule.text
+    return text, "reproduced" if kept else "differs"
 
 
 def formula_verdict(
@@ -317,18 +305,22 @@ def judge_claims(
     varied: dict[str, list[Sensitivity]] = {entry.id: [] for entry in contents.claim}
     for uncertainty in contents.uncertainty:
         affected = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
-        ends = [altered(numbers, end) for end in (uncertainty.low, uncertainty.high)]
+        changes = uncertainty.low, uncertainty.high
+        ends = [altered(numbers, end) for end in changes]
+        low_text, high_text = (
+            ", ".join(f"{name} = {value:g}" for name, value in end.items()) for end in changes
+        )
         models = [model(end) for end in ends]
         for entry in affected:
             low, high = (
-                judged_numbers(entry, computed_numbers(entry, checks, *at))
+                judge(entry, computed_numbers(entry, checks, *at), stated)
                 for at in zip(models, ends, strict=True)
             )
-            numbers_there = {n: (float(low[n]), float(high[n])) for n in low if n in high}
-            verdicts = verdict(entry, low, stated), verdict(entry, high, stated)
-            texts = _text(uncertainty.low), _text(uncertainty.high)
+            both = {n: (low.numbers[n], high.numbers[n]) for n in low.numbers if n in high.numbers}
             varied[entry.id].append(
-                Sensitivity(uncertainty.quantity, texts, numbers_there, verdicts)
+                Sensitivity(
+                    uncertainty.quantity, (low_text, high_text), both, (low.verdict, high.verdict)
+                )
             )
     return [replace(claim, sensitivity=tuple(varied[claim.id])) for claim in claims]
 
@@ -338,19 +330,16 @@ def computed_numbers(
 ) -> Computed:
     """The numbers of a claim, by its formulas or by its check.
 
-    A model may have ``terms``, further names of its formulas.
+    A formula may name the values before it. A model may have ``terms``, further names.
     """
     if not entry.values:
         return checks[entry.id](model)
     printed, terms = printed_numbers(numbers), getattr(model, "terms", {})
-    return {
-        name: rules.formula_value(formula, printed, f"{entry.id}.values.{name}", terms)
-        for name, formula in entry.values.items()
-    }
-
-
-def _text(end: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in end.items())
+    values: dict[str, float] = {}
+    for name, formula in entry.values.items():
+        place = f"{entry.id}.values.{name}"
+        values[name] = rules.formula_value(formula, values | printed, place, terms)
+    return values
 
 
 def printed_numbers(numbers: Material) -> dict[str, float]:
@@ -359,10 +348,10 @@ def printed_numbers(numbers: Material) -> dict[str, float]:
     ``low`` and ``high`` are the ends of a range, ``first`` and ``last`` those of a list of values,
     and ``uncertainty`` is that of a value.
     """
-    stated = {
-        name: number.si for name, number in numbers.numbers.items() if number.value is not None
-    }
+    stated: dict[str, float] = {}
     for name, number in numbers.numbers.items():
+        if number.value is not None:
+            stated[name] = number.si
         if number.si_range is not None:
             stated[f"{name}.low"], stated[f"{name}.high"] = number.si_range
         if number.si_values:

@@ -35,16 +35,6 @@ class RuleWords(Record):
     high: float | str | None = None
     tolerance: float | None = None
 
-    @property
-    def is_undecided(self) -> bool:
-        """Whether no rule can be applied, for the reason that `what` gives."""
-        return self.accept == "undecided"
-
-    @property
-    def is_formula(self) -> bool:
-        """Whether the rule judges a printed formula by an independent number."""
-        return self.accept == "formula"
-
     def build(self, numbers: Mapping[str, float], claim: str) -> rules.AcceptanceRule:
         """The rule with its numbers.
 

@@ -13,7 +13,7 @@ from asperity.ledger.claims import Claim, Headline
 from asperity.ledger.markup import embedded_png, rich, table
 from asperity.ledger.points import RULE, CurveComparison
 from asperity.ledger.sentences import fill, names_in
-from asperity.materials import Number, citation
+from asperity.materials import citation
 from asperity.outputs.tables import html_page
 from asperity.parameters.arguments import one_of
 
@@ -94,13 +94,13 @@ def build_page(
 
 
 def _agreement(agreement: Sequence[CurveComparison]) -> str:
-    chips = {"agrees": ("reproduced", "✓"), "disagrees": ("differs", "≠")}
+    kinds = {"agrees": "reproduced", "disagrees": "differs", "undecided": "undecided"}
     rows = [
         (
             rich(one.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
             rich(f"{one.observable}, {one.law}".lstrip(", ")),
             f"{one.chi_squared:.4g} for {one.points}, p = {one.p_value:.2g}",
-            _chip(*chips.get(one.verdict, ("misprint", "?")), one.verdict),
+            _chip(kinds[one.verdict], one.verdict),
         )
         for one in agreement
     ]
@@ -112,8 +112,9 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
     )
 
 
-def _chip(kind: str, sign: str, word: str) -> str:
-    """A verdict as a coloured word with a sign, because some readers do not see the colour."""
+def _chip(kind: str, word: str) -> str:
+    """A word in the colour and with the sign of a verdict: some readers do not see the colour."""
+    sign, _ = VERDICT_TEXTS[kind]
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
 
 
@@ -126,17 +127,16 @@ def _picture(shown: PaperFigure, folder: Path) -> str:
 def _figure(shown: PaperFigure, folder: Path) -> str:
     files = [f"figures/{shown.name}.{kind}" for kind in ("png", "pdf")]
     files += [f"data/{table.name}.csv" for table in shown.tables]
-    links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in files)
+    links = " ".join(
+        f'<a href="{escape(name)}">{Path(name).suffix[1:].upper()}'
+        f"{' of the model' * ('-model.' in name)}</a>"
+        for name in files
+    )
     return (
         f'<figure id="{shown.name}">{embedded_png(folder / files[0], shown.alt)}'
         f'<figcaption><p class="kicker">{shown.place}</p><h3>{rich(shown.title)}</h3>'
         f'<p>{rich(shown.caption)}</p><p class="files">{links}</p></figcaption></figure>'
     )
-
-
-def _kind(name: str) -> str:
-    kind = name.rsplit(".", 1)[1].upper()
-    return f"{kind} of the model" if "-model." in name else kind
 
 
 def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
@@ -179,7 +179,6 @@ def _reference(entry: str) -> str:
 
 def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[str, str]) -> str:
     computed = {name: claim.computed for name, claim in claims.items()}
-    several = len(words.sentences) > 1
     items = [
         rich(fill(sentence, computed, "summary.sentences"))
         + "".join(
@@ -188,12 +187,12 @@ def _paragraph(words: SummaryWords, claims: dict[str, Claim], pictures: Mapping[
         )
         for sentence in words.sentences
     ]
-    text = _list(items, "ol") if several else f"<p>{items[0]}</p>"
-    listed = [claim for claim in claims.values() if claim.verdict == words.verdict]
+    text = _list(items, "ol") if len(items) > 1 else f"<p>{items[0]}</p>"
     if words.verdict:
         entries = [
             f'<a href="#{escape(claim.id)}">{rich(claim.place)}</a>: {rich(claim.statement)}'
-            for claim in listed
+            for claim in claims.values()
+            if claim.verdict == words.verdict
         ]
         text += _list(entries, "ul")
     if words.figures:
@@ -218,10 +217,8 @@ def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str
 
 
 def _standing(headline: Headline) -> str:
-    kind, sign = ("reproduced", "✓") if headline.holds else ("differs", "≠")
-    if headline.standing == "undecided":
-        kind, sign = "undecided", "?"
-    return _chip(kind, sign, headline.standing)
+    kind = "undecided" if headline.standing == "undecided" else "differs"
+    return _chip("reproduced" if headline.holds else kind, headline.standing)
 
 
 def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
@@ -303,7 +300,7 @@ def _entries(claims: Sequence[Claim]) -> str:
 def _entry(claim: Claim) -> str:
     kind = "test" if claim.is_test else "apart"
     counted_as = "" if claim.is_test else f' <span class="kind">{claim.kind}</span>'
-    chip = _chip(claim.verdict, VERDICT_TEXTS[claim.verdict][0], claim.verdict)
+    chip = _chip(claim.verdict, claim.verdict)
     notes = (
         ("", claim.why),
         ("Stated", claim.stated),
@@ -312,20 +309,17 @@ def _entry(claim: Claim) -> str:
         ("Rule", claim.rule),
         ("Within the uncertainties", sensitivity_text(claim)),
     )
+    shown = [
+        f"<p>{f'<b>{head}:</b> ' if head else ''}{rich(text)}</p>" for head, text in notes if text
+    ]
     return (
         f'<details class="claim {claim.verdict} {kind}" id="{escape(claim.id)}">'
         f'<summary><span class="place">{rich(claim.place)}</span>'
         f'<span class="statement">{rich(claim.statement)}</span>'
         f'<span class="verdict">{chip}{counted_as}</span></summary>'
-        f"{''.join(_note(head, text) for head, text in notes)}"
+        f"{''.join(shown)}"
         f'<p class="note"><a href="#{escape(claim.id)}">Link to this entry</a></p></details>'
     )
-
-
-def _note(head: str, text: str) -> str:
-    if not text:
-        return ""
-    return f"<p>{f'<b>{head}:</b> ' if head else ''}{rich(text)}</p>"
 
 
 def sensitivity_text(claim: Claim) -> str:
@@ -333,21 +327,17 @@ def sensitivity_text(claim: Claim) -> str:
     parts = []
     for varied in claim.sensitivity:
         low, high = varied.ends
-        ranges = [f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in _leading(varied.numbers)]
-        changed = [
+        items = list(varied.numbers.items())
+        # claims.json has all of them.
+        shown = items if len(items) <= 2 else [items[0], items[-1]]
+        ranges = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in shown)
+        changed = ", ".join(
             f"{verdict} at {end}"
             for end, verdict in zip((low, high), varied.verdicts, strict=True)
             if verdict != claim.verdict
-        ]
-        text = f"{low} to {high}: {', '.join(ranges)}"
-        parts.append(text + (f" ({', '.join(changed)})" if changed else ""))
+        )
+        parts.append(f"{low} to {high}: {ranges}" + (f" ({changed})" if changed else ""))
     return "; ".join(parts)
-
-
-def _leading(numbers: Mapping[str, tuple[float, float]]) -> list[tuple[str, tuple[float, float]]]:
-    """The first and the last number; claims.json has all of them."""
-    items = list(numbers.items())
-    return items if len(items) <= 2 else [items[0], items[-1]]
 
 
 # --- The numbers of the paper ---------------------------------------------------------------------
@@ -355,10 +345,12 @@ def _leading(numbers: Mapping[str, tuple[float, float]]) -> list[tuple[str, tupl
 
 def _parameters(paper: Paper) -> str:
     """The numbers with uncertainty, kind and place."""
-    rows = [
-        _parameter(*words, paper.numbers[name])
-        for name, words in paper.contents.paper.parameters.items()
-    ]
+    rows = []
+    for name, (symbol, meaning) in paper.contents.paper.parameters.items():
+        number = paper.numbers[name]
+        value = str(number).replace(" um", " µm")
+        texts = map(rich, (symbol, meaning, value, number.kind, number.place))
+        rows.append((*texts, rich(number.note) or "–"))
     heads = {
         "Symbol": "symbol", "What it is": "statement", "Value": "stated", "Kind": "kind",
         "Place": "place", "Remark": "note",
@@ -368,9 +360,3 @@ def _parameters(paper: Paper) -> str:
         "because the paper does not give it.</p>"
         f"{table(heads, rows, 'Parameters', 'ledger numbers')}"
     )
-
-
-def _parameter(symbol: str, meaning: str, number: Number) -> tuple[str, ...]:
-    value = str(number).replace(" um", " µm")
-    texts = (rich(symbol), rich(meaning), rich(value), number.kind, rich(number.place))
-    return (*texts, rich(number.note) or "–")

@@ -16,7 +16,6 @@ undecided      chi^2 is not larger, but the errors are so wide that a curve 20 %
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -24,9 +23,12 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import pandas as pd
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, require
 from asperity.ledger.figures import Observables, PaperFigure
 from asperity.ledger.recipe import read_columns
+from asperity.outputs.json import to_json
+from asperity.parameters.arguments import one_of
+from asperity.parameters.parameter import count_text
 from asperity.units import to_si
 
 if TYPE_CHECKING:
@@ -122,15 +124,9 @@ def check_names(points: pd.DataFrame, observables: Mapping[str, Observables], na
     InputError
     """
     for row, point in points.iterrows():
-        figure, where = point["figure"], f"{name}, row {row}"
-        columns = list(observables.get(figure, ()))
-        for field_, rule, known in (
-            ("figure", "be a figure with curves", list(observables)),
-            ("observable", f"be one of {figure}", columns),
-        ):
-            if point[field_] not in known:
-                got = f"'{point[field_]}'"
-                raise InputError(f"{where}: {field_}", rule, got, closest(point[field_], known))
+        where = f"{name}, row {row}"
+        figure = one_of(point["figure"], observables, f"{where}: figure")
+        one_of(point["observable"], observables[figure], f"{where}: observable")
 
 
 def with_curves(
@@ -188,11 +184,8 @@ def _row(point: pd.Series, table: pd.DataFrame, panel: Panel, where: str) -> dic
     """A point with the value of its curve; `where` is its row, for messages."""
     from scipy.interpolate import CubicSpline
 
-    curve = table[table["curve"] == point["series"]]
-    if curve.empty:
-        known = [str(one) for one in table["curve"].unique()]
-        rule, got = f"be a curve of {point['figure']}", f"'{point['series']}'"
-        raise InputError(f"{where}: series", rule, got, closest(point["series"], known))
+    series = one_of(point["series"], map(str, table["curve"].unique()), f"{where}: series")
+    curve = table[table["curve"] == series]
     x = to_si(str(point["x"]), panel.x_kind, f"{where}: x")
     at = curve[panel.x].to_numpy(float)
     if not at.min() <= x <= at.max():
@@ -259,9 +252,7 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Observables) ->
                 linestyle="none", marker=markers[series], markersize=5, color=COLOURS["points"],
                 markerfacecolor="white", capsize=2.5, elinewidth=1.0, zorder=6,
             )  # fmt: skip
-    sources = ", ".join(map(str, rows["source"].unique()[:2])) + ", …" * (
-        rows["source"].nunique() > 2
-    )
+    sources = ", ".join([*map(str, rows["source"].unique()[:2]), "…"][: rows["source"].nunique()])
     figure.legend(
         handles=list(handles.values()),
         labels=[f"{name.replace(' um', ' µm')}" for name in handles],
@@ -308,11 +299,9 @@ class MeasuredPoints:
             draw_points(drawn, rows, shown)
             return drawn
 
-        count = f"{len(rows)} point" + "s" * (len(rows) > 1)
-        return replace(
-            figure, draw=draw, caption=f"{figure.caption} Red: {count} of {self.name}, with "
-            "standard uncertainties.",
-        )  # fmt: skip
+        count = count_text(len(rows), "point")
+        added = f"Red: {count} of {self.name}, with standard uncertainties."
+        return replace(figure, draw=draw, caption=f"{figure.caption} {added}")
 
     def write(self, folder: Path) -> list[CurveComparison]:
         """Write data/points.csv and agreement.json, and return the comparisons."""
@@ -324,9 +313,7 @@ class MeasuredPoints:
         head = [f"points of {self.name} and the curves of the figures", RULE]
         save_table(rows, folder / "data" / "points.csv", header=head, columns=POINT_COLUMNS)
         compared = comparisons(rows)
-        record = {
-            "rule": RULE, "file": self.name, "comparisons": [asdict(one) for one in compared]
-        }  # fmt: skip
-        text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
+        found = [asdict(one) for one in compared]
+        text = to_json({"rule": RULE, "file": self.name, "comparisons": found}, indent=2)
         (folder / "agreement.json").write_text(text + "\n", encoding="utf-8", newline="\n")
         return compared

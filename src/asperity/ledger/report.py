@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,8 @@ from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import write_table, written_folder
+from asperity.outputs.json import to_json
+from asperity.outputs.tables import aligned
 from asperity.parameters.parameter import count_text
 
 if TYPE_CHECKING:
@@ -82,19 +83,10 @@ class ReproductionSummary:
             ("time", f"{self.seconds:.1f} s"),
         ]
         head = f"{self.paper}, reproduced by asperity {__version__}"
-        return [head, *(f"  {name:<9}{text}" for name, text in rows), *self._exception_lines()]
-
-    def _exception_lines(self) -> list[str]:
-        if not self.exceptions:
-            return []
-        width = max(len(place) for _, place, _ in self.exceptions)
-        return [
-            "Not reproduced as printed:",
-            *(
-                f"  {verdict:<9} {place:<{width}}  {statement}"
-                for verdict, place, statement in self.exceptions
-            ),
-        ]
+        lines = [head, *(f"  {name:<9}{text}" for name, text in rows)]
+        if self.exceptions:
+            lines += ["Not reproduced as printed:", *aligned(self.exceptions, "  ").splitlines()]
+        return lines
 
 
 def reproduce(
@@ -212,5 +204,4 @@ def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
         "uncertainties": {u.quantity: u.note for u in paper.contents.uncertainty},
         "claims": [claim.as_dict() for claim in claims],
     }
-    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    path.write_text(to_json(record, indent=2) + "\n", encoding="utf-8", newline="\n")

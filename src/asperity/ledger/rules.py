@@ -149,9 +149,15 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
-    "sqrt": math.sqrt, "ln": math.log, "abs": abs
-}  # fmt: skip
+_FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "sqrt": math.sqrt,
+    "ln": math.log,
+    "abs": abs,
+    "min": min,
+    "max": max,
+    "real": operator.attrgetter("real"),
+    "imag": operator.attrgetter("imag"),
+}
 
 
 def formula_value(
@@ -160,7 +166,9 @@ def formula_value(
     place: str,
     terms: Mapping[str, Any] | None = None,
 ) -> float:
-    """The value of a formula with + - * / **, sqrt, ln, abs, pi and the paper's numbers.
+    """The value of a formula of the paper's numbers with + - * / ** and pi.
+
+    Functions are sqrt, ln, abs, min and max, and real and imag of a complex number.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from asperity import Slider, periodic_response
+from asperity import periodic_response
 from asperity.ledger import FigureNumbers, figure_words
 from asperity_papers.bureau2000.machine import (
     EXT,
@@ -19,7 +18,6 @@ from asperity_papers.bureau2000.machine import (
     SLOW,
     Float,
     Machine,
-    steady_multiplier,
 )
 
 #: Words and pictures of figures and sections.
@@ -90,26 +88,28 @@ def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any
 
 def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
     f = machine.numbers.frequency if curve.frequency is None else curve.frequency
-    varied: dict[str, Float] = {
-        name: np.asarray(x, float) for name, x in curve.overrides.items() if np.ndim(x)
-    }
-    inputs = [curve.V, curve.applied, f, *varied.values()]
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in inputs))
-    V, applied, frequency = arrays[:3]
-    varied = dict(zip(varied, arrays[3:], strict=True))
-
-    def at(rows: np.ndarray) -> Slider:
-        """The slider at some of the operating points."""
-        values = {name: x[rows] for name, x in varied.items()}
-        return machine.slider(curve.law, **{**curve.overrides, **values})
-
-    still = applied == 0
-    law: Any = at(np.full(V.shape, True)).law
+    varied = {name: x for name, x in curve.overrides.items() if np.ndim(x)}
+    inputs = (curve.V, curve.applied, f, *varied.values())
+    V, applied, frequency, *arrays = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(x, float)) for x in inputs)
+    )
+    overrides = {**curve.overrides, **dict(zip(varied, arrays, strict=True))}
+    slider = machine.slider(curve.law, **overrides)
+    law: Any = slider.law
+    response = periodic_response(
+        slider,
+        velocity=V,
+        epsilon=curve.share * applied,
+        frequency=frequency,
+        inertia=curve.inertia,
+        radiation_damping=curve.damping or None,
+        **options,
+    )
     rows = pd.DataFrame(
         {
             "curve": curve.name,
             "law": curve.law,
-            "alpha": getattr(law, "alpha", np.nan),
+            "alpha": float(getattr(law, "alpha", np.nan)),
             "lambda": np.asarray(law.elastic_length, float),
             "inertia": curve.inertia,
             "damping": curve.damping,
@@ -117,35 +117,14 @@ def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> 
             "frequency": frequency,
             "epsilon_applied": applied,
             "epsilon_eff": curve.share * applied,
+            **{name: getattr(response, name) for name in _SOLVED},
         }
     )
-    rows["alpha"] = rows["alpha"].astype(float)
-    rows["mean_friction"] = np.asarray(law.mu_ss(V))
-    rows[["delta_mu", "mu1", "mu2"]] = 0.0
-    rows[["phase1", "phase2", "floquet_max"]] = np.nan
-    # Steady sliding is known in closed form, without inertia; an orbit of zero amplitude has no
-    # relative accuracy.
-    if still.any() and not curve.inertia:
-        rows.loc[still, "floquet_max"] = steady_multiplier(at(still), V[still], frequency[still])
-    rows["stable"] = rows["floquet_max"] < 1
-    rows["converged"] = True
-    response = periodic_response(
-        at(~still),
-        velocity=V[~still],
-        epsilon=curve.share * applied[~still],
-        frequency=frequency[~still],
-        inertia=curve.inertia,
-        radiation_damping=curve.damping or None,
-        **options,
-    )
-    for name in _SOLVED:
-        rows.loc[~still, name] = getattr(response, name)
+    # Steady sliding: zeros but for round-off, and no phases.
+    still = (applied == 0) & rows["converged"]
+    rows.loc[still, ["delta_mu", "mu1", "mu2"]] = 0.0
+    rows.loc[still, ["phase1", "phase2"]] = np.nan
     return rows
-
-
-def with_inertia(name: str) -> str:
-    """Name of the curve that counts the mass, next to the curve `name`."""
-    return f"{name}, inertia"
 
 
 def speed_curves(
@@ -158,69 +137,106 @@ def speed_curves(
     ]
 
 
+def curves_of_laws(
+    machine: Machine, laws: Mapping[str, tuple[str, Mapping[str, float]]]
+) -> list[FigureCurve]:
+    """Laws with parameters that replace the paper's against eps_eff, at both velocities."""
+    eps = machine.borne_amplitudes()
+    return [
+        curve
+        for name, (law, overrides) in laws.items()
+        for curve in speed_curves(machine, law, eps, case=name, overrides=overrides)
+    ]
+
+
 def elastic_curves(machine: Machine, applied: Float, share: float = 1.0) -> list[FigureCurve]:
     """The elasto-plastic law at both velocities, with the mass, and at the ends of `variations`."""
-    moved = [
-        replace(curve, name=with_inertia(curve.name), inertia=True)
-        for curve in speed_curves(machine, EXT, applied, share)
-    ]
+    still = speed_curves(machine, EXT, applied, share)
+    moved = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in still]
     # Named "1 um/s, A low" etc.
     ends = [
-        FigureCurve(f"{SLOW}, {end}", EXT, machine.velocities[0], applied, share, None, overrides)
+        replace(still[0], name=f"{SLOW}, {end}", overrides=overrides)
         for end, overrides in variations(machine).items()
     ]
-    return [*speed_curves(machine, EXT, applied, share), *moved, *ends]
+    return [*still, *moved, *ends]
 
 
 @dataclass(frozen=True)
 class CurveFigure:
-    """A figure made of curves.
+    """A figure made of curves; figures.toml has the formulas of what is read off them.
 
     Attributes
     ----------
     name : str
     curves : function
         The curves, from the machine.
-    read : function
-        From the machine and the solved curves to the numbers for the head of the table, and
-        further ones that the caption quotes: those that figures.toml has no formula of.
+    terms : function
+        Further names for the formulas, from the machine and the solved curves.
     """
 
     name: str
-    curves: Callable[[Machine], Iterable[FigureCurve]]
-    read: Callable[[Machine, FigureNumbers], tuple[dict[str, float], dict[str, float]]] = (
-        lambda machine, read: ({}, {})
-    )
+    curves: Callable[[Machine], list[FigureCurve]]
+    terms: Callable[[Machine, FigureNumbers], dict[str, Any]] = lambda machine, read: {}
 
     def __call__(self, machine: Machine) -> FigureNumbers:
         """Solve the curves, and read the numbers off them."""
         data = solve_curves(machine, self.curves(machine))
-        read = FigureNumbers(self.name, data)
-        values = WORDS.figures[self.name].values(machine.numbers, _terms(machine, read))
-        scalars, quoted = map(operator.or_, values, self.read(machine, read))
-        return figure_numbers(machine, self.name, data, scalars, quoted=quoted)
+        terms = self.terms(machine, FigureNumbers(self.name, data))
+        return figure_numbers(machine, self.name, data, terms=terms)
+
+
+def figure_numbers(
+    machine: Machine,
+    name: str,
+    data: pd.DataFrame,
+    scalars: Mapping[str, float] | None = None,
+    *,
+    points: pd.DataFrame | None = None,
+    terms: Mapping[str, Any] | None = None,
+) -> FigureNumbers:
+    """A figure with the numbers of its formulas, further ones, and what the text states."""
+    stated = {
+        "share": machine.share,
+        "epsilon_eff at 0.5": machine.strongest,
+        "collapse": 1 / machine.numbers.collapse_divisor_200Hz,
+        "onset": machine.numbers.epsilon_onset,
+    }
+    for quantity, pair in machine.stated().items():
+        stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
+    known = {**machine.terms, **_terms(machine, FigureNumbers(name, data)), **(terms or {})}
+    formulas, further = WORDS.figures[name].values(machine.numbers, known)
+    return FigureNumbers(name, data, dict(scalars or {}) | formulas, stated | further, points)
 
 
 def _terms(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
     """Names for formulas of figures.toml: quantities at a curve's end or at eps = 0.5."""
 
-    def amplitude(curve: str, column: str, value: float) -> float:
-        """Where a falling quantity has a value."""
-        rows = read.curve(curve)
-        return float(np.interp(-value, -rows[column], rows[BORNE]))
+    def column(curve: str, name: str) -> Float:
+        return read.curve(curve)[name].to_numpy()
 
     return {
-        **machine.terms,
         "slow": SLOW,
         "fast": FAST,
-        **{name: name for name in ("delta_mu", "mu1", "mu2")},
+        **{name: name for name in read.data.columns if name not in machine.numbers.numbers},
+        "nth": lambda curve, name, n: column(curve, name)[int(n)],
         "last": read.last,
-        "at": lambda curve, column: read.at(curve, column, machine.strongest, BORNE),
-        "amplitude": amplitude,
-        "late_over_early": lambda curve, column: late_over_early_slope(read, curve, column),
-        "mu": machine.mu_ss,
-        "strongest": machine.strongest,
-        "elastic_slope": machine.elastic_slope,
+        "least": lambda curve, name: column(curve, name).min(),
+        "largest": lambda curve, name: column(curve, name).max(),
+        "mean": lambda curve, name: read.curve(curve)[name].mean(),
+        "at": lambda curve, name: read.at(curve, name, machine.strongest, BORNE),
+        # The amplitude at which a falling quantity has a value.
+        "amplitude": lambda curve, name, value: np.interp(
+            -value, -column(curve, name), column(curve, BORNE)
+        ),
+        "along": lambda curve, name, x, value: read.at(curve, name, value, x),
+        "along_log": lambda curve, name, x, value: np.interp(
+            np.log(value), np.log(column(curve, x)), column(curve, name)
+        ),
+        "slope_in_log": lambda curve, name, x: np.polyfit(
+            np.log(column(curve, x)), column(curve, name), 1
+        )[0],
+        "late_over_early": lambda curve, name: late_over_early_slope(read, curve, name),
+        "degrees": np.degrees,
     }
 
 
@@ -230,34 +246,6 @@ def late_over_early_slope(numbers: FigureNumbers, curve: str, column: str) -> fl
     x, y = rows[BORNE].to_numpy(), rows[column].to_numpy()
     tenth = len(x) // 10
     return float((y[-1] - y[-1 - tenth]) / (x[-1] - x[-1 - tenth]) / (y[-1] / x[-1]))
-
-
-def curve_figure(
-    name: str, curves: Callable[[Machine], Iterable[FigureCurve]]
-) -> Callable[..., CurveFigure]:
-    """Make a function that reads numbers off solved curves a `CurveFigure`."""
-    return lambda read: CurveFigure(name, curves, read)
-
-
-def figure_numbers(
-    machine: Machine,
-    name: str,
-    data: pd.DataFrame,
-    scalars: Mapping[str, float],
-    *,
-    quoted: Mapping[str, float] | None = None,
-    points: pd.DataFrame | None = None,
-) -> FigureNumbers:
-    """A figure with curves, and what the text states for its captions and marks."""
-    stated = {
-        "share": machine.share,
-        "epsilon_eff at 0.5": machine.strongest,
-        "collapse": 1 / machine.numbers.collapse_divisor_200Hz,
-        "onset": machine.numbers.epsilon_onset,
-    }
-    for quantity, pair in machine.stated().items():
-        stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
-    return FigureNumbers(name, data, scalars, stated | dict(quoted or {}), points)
 
 
 # --- How far the published uncertainties of A, B and lambda move a curve --------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -23,9 +22,6 @@ from asperity_papers.bureau2000.virtual import (
     recovered_table,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 #: Figures made of curves: those of the paper, and four that are not in it.
 _OF_THE_PAPER = [getattr(curves, f"figure_{n}") for n in (2, 3, 4, 5, 6, 7, 8, 9, 11)]
 _FURTHER = (
@@ -39,15 +35,8 @@ NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
 }
 #: Lines of each figure of the paper.
 CURVES = {figure.name: figure.curves for figure in _OF_THE_PAPER}
-#: Figures with more than their plot.
-DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
-    "figure-03": curves.draw_3,
-    "figure-07": curves.draw_7,
-}
 #: Figures without numbers.
-SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
-    name: partial(schematics.draw, name) for name in ("figure-01", "figure-10")
-}
+SCHEMATICS = ("figure-01", "figure-10")
 
 
 @contextmanager
@@ -55,11 +44,6 @@ def sections() -> Iterator[Sequence[Section]]:
     """The report's sections; the virtual experiment is computed while the first one is."""
     with experiment_in_background() as readings:
         yield _of_the_paper(), _of_the_experiment(readings)
-
-
-def draw(numbers: FigureNumbers) -> Figure:
-    """The picture of a figure; the style must be active."""
-    return DRAWN.get(numbers.name, WORDS.figures[numbers.name].draw)(numbers)
 
 
 def _of_the_paper() -> Section:
@@ -73,7 +57,7 @@ def _of_the_paper() -> Section:
 
 
 def _schematic(name: str) -> PaperFigure:
-    return WORDS.figure(FigureNumbers(name, pd.DataFrame()), {}, lambda _: SCHEMATICS[name]())
+    return WORDS.figure(FigureNumbers(name, pd.DataFrame()), {}, lambda _: schematics.draw(name))
 
 
 def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
@@ -91,7 +75,7 @@ def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
         "read off the curves:",
         *(f"  {name} = {value:.12g}" for name, value in numbers.scalars.items()),
     ]
-    return WORDS.figure(numbers, {numbers.name: (numbers.data, head)}, draw)
+    return WORDS.figure(numbers, {numbers.name: (numbers.data, head)})
 
 
 def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
@@ -112,11 +96,9 @@ def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
 
 
 def _simulated(figure: VirtualFigure) -> PaperFigure:
-    numbers, parameters = figure.numbers, PAPER.parameter_lines()
-    parts = (("", "points", figure.points), ("-model", "the model's lines", numbers.data))
-    place = WORDS.figures[numbers.name].place
+    name = figure.numbers.name
     tables = {
-        f"{numbers.name}{suffix}": (data, provenance(figure, place, what, parameters))
-        for suffix, what, data in parts
+        name: (figure.points, provenance(figure, "points")),
+        f"{name}-model": (figure.numbers.data, provenance(figure, "the model's lines")),
     }
-    return WORDS.figure(numbers, tables)
+    return WORDS.figure(figure.numbers, tables)

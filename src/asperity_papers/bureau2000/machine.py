@@ -7,20 +7,26 @@ amplitude is about eps = 0.5, the strongest modulation, where the text quotes it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Callable, Hashable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from asperity import Slider, periodic_response, perturbation_response
-from asperity.air import AirLayer, effective_modulation
+from asperity import Slider, periodic_response
+from asperity.air import (
+    AirLayer,
+    NormalContact,
+    bessel_ratio,
+    effective_modulation,
+    mindlin_length_ratio,
+)
 from asperity.ledger import Paper
-from asperity.materials import Material, load
+from asperity.materials import Material
 from asperity.orbit import PeriodicResponse
-from asperity.theory import SmallModulation
+from asperity.theory import SmallModulation, ageing_response
 from asperity_papers.bureau2000.integration import (
     IntegratedOrbit,
     IntegratedPoint,
@@ -32,8 +38,27 @@ PAPER = Paper("bureau2000", "asperity_papers.bureau2000")
 Float = NDArray[np.float64]
 Pair = tuple[float, float]
 Result = TypeVar("Result")
-#: A law with parameters that replace the paper's; None is the elasto-plastic one with inertia.
-Law: TypeAlias = tuple[str, dict[str, float]] | None
+
+
+class Law(NamedTuple):
+    """A law of the claims.
+
+    Attributes
+    ----------
+    name : str
+    overrides : mapping of str to float
+        Parameters that replace the paper's.
+    inertia : bool
+        Whether the mass of the slider counts; only at the strongest modulation then.
+    strongest : bool
+        Whether it is asked at the strongest modulation, whatever the amplitude.
+    """
+
+    name: str
+    overrides: Mapping[str, float] = MappingProxyType({})
+    inertia: bool = False
+    strongest: bool = False
+
 
 RR, LD, EXT = "rice-ruina", "linker-dieterich", "elasto-plastic"
 #: The elasto-plastic law with the plastic velocity in the age law too, which the paper does not.
@@ -45,15 +70,6 @@ SPEEDS = (SLOW, FAST)
 STRONGEST = 0.5
 #: Applied amplitudes at which claims are judged; 0.625 is eps_eff = 0.3.
 APPLIED = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.625)
-#: Those at which a statement about the harmonics is judged: from where the drop of the mean
-#: emerges from the noise to the strongest.
-READ = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
-
-
-@cache
-def printed() -> Material:
-    """The paper's numbers as printed."""
-    return load("bureau2000")
 
 
 class Machine:
@@ -69,7 +85,7 @@ class Machine:
     """
 
     def __init__(self, numbers: Material | None = None, steps: int = 100) -> None:
-        self.numbers = printed() if numbers is None else numbers
+        self.numbers = PAPER.numbers if numbers is None else numbers
         self.steps = steps
         self._solved: dict[Hashable, Any] = {}
 
@@ -113,12 +129,6 @@ class Machine:
         return float(self.slider(RR).law.mu_ss(velocity))
 
     @property
-    def stiffness_ratio(self) -> float:
-        """K/Kc with Kc = (B - A) W0/D0: sliding on rigid asperities is stable above 1."""
-        p = self.numbers
-        return float(p.K * p.D0 / ((p.B - p.A) * p.W0))
-
-    @property
     def contact_resonance(self) -> float:
         """Frequency (Hz) at which the mass oscillates on the asperities' shear stiffness."""
         p = self.numbers
@@ -152,12 +162,13 @@ class Machine:
         p = self.numbers
         return AirLayer(**({"P0": p.P0, "h0": p.h0, "eta": p.eta_air, "R": p.R} | overrides))
 
-    def borne(self, frequency: float, layer: AirLayer | None) -> float:
+    def borne(
+        self, frequency: float, layer: AirLayer | None, lambda_z: float | None = None
+    ) -> float:
         """eps_eff/eps with or without an air layer: without, inertia and contacts alone."""
         p = self.numbers
-        return float(
-            effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=p.lambda_z, layer=layer)
-        )
+        length = p.lambda_z if lambda_z is None else lambda_z
+        return float(effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=length, layer=layer))
 
     def elastic_slope(self, velocity: float) -> float:
         """D mu1/d eps of the velocity-independent plateau, mu l/(1 + l) with l = lambda K/W0."""
@@ -197,43 +208,25 @@ class Machine:
             lambda: self.response(law, V, applied, **overrides),
         )
 
-    def outputs(self, law: str, **overrides: float) -> Outputs:
-        """Quasi-static response of a law at eps = 0.5."""
-        r = self.curve(law, **overrides)
-        return Outputs(at(r.mu_ss), at(r.delta_mu), at(r.mu1), at(r.mu2))
-
-    def inertial_outputs(self) -> Outputs:
+    def with_inertia(self) -> PeriodicResponse:
         """Response of the elasto-plastic law at eps = 0.5 with the slider's inertia."""
-        return self._once("inertial", self._inertial_outputs)
-
-    def _inertial_outputs(self) -> Outputs:
-        r = periodic_response(
-            self.slider(EXT),
-            velocity=np.array(self.velocities),
-            epsilon=self.strongest,
-            frequency=self.numbers.frequency,
-            inertia=True,
+        return self._once(
+            "inertia",
+            lambda: periodic_response(
+                self.slider(EXT),
+                velocity=np.array(self.velocities),
+                epsilon=self.strongest,
+                frequency=self.numbers.frequency,
+                inertia=True,
+            ),
         )
-        pairs = ((float(a[0]), float(a[1])) for a in (r.mu_ss, r.delta_mu, r.mu1, r.mu2))
-        return Outputs(*pairs)
 
-    def ageless_changes(self, law: str) -> dict[str, float]:
-        """Relative changes of drop, mu1 and mu2 when friction no longer feels the age.
-
-        At eps = 0.5 and the fast velocity, with mu0 set so that the steady friction stays what it
-        was.
-        """
-        p, fast = self.numbers, self.velocities[1]
-        mu_fast = float(self.slider(law).law.mu_ss(fast))
-        full = self.response(law, fast, [STRONGEST])
-        without = self.response(
-            law, fast, [STRONGEST], B=0.0, mu0=mu_fast - p.A * float(np.log(fast / p.V0))
-        )
-        return {
-            "drop": float((without.delta_mu / full.delta_mu)[0]) - 1,
-            "mu1": float((without.mu1 / full.mu1)[0]) - 1,
-            "mu2": float((without.mu2 / full.mu2)[0]) - 1,
-        }
+    def transfer(
+        self, V: float, omega: float, lambda_: float = 0.0, alpha: float = 0.0, M: float = 0.0
+    ) -> complex:
+        """First harmonic over the amplitude of a small modulation, at omega (rad/s)."""
+        point = self.small_modulation(V, omega=omega, lambda_=lambda_, alpha=alpha, M=M)
+        return complex(ageing_response(point).transfer)
 
     @cached_property
     def terms(self) -> dict[str, Any]:
@@ -248,11 +241,10 @@ class Machine:
 
         def observable(name: str) -> Callable[..., float]:
             def value(law: Law, speed: int, applied: float = STRONGEST) -> float:
-                if law is None:
-                    pair: Pair = getattr(self.inertial_outputs(), name)
-                else:
-                    pair = at(getattr(self.curve(law[0], **law[1]), name), applied)
-                return pair[speed]
+                if law.inertia:
+                    return float(getattr(self.with_inertia(), name)[speed])
+                response = self.curve(law.name, **law.overrides)
+                return at(getattr(response, name), STRONGEST if law.strongest else applied)[speed]
 
             return value
 
@@ -261,33 +253,59 @@ class Machine:
             fast, slow = quantity(law, 1, applied), quantity(law, 0, applied)
             return float(np.log(abs(fast / slow)) / np.log(high / low))
 
-        def slopes(quantity: Any, law: Law, speed: int) -> Float:
-            """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes."""
-            values = np.abs([quantity(law, speed, applied) for applied in APPLIED])
-            return np.diff(np.log(values)) / np.diff(np.log(APPLIED))
+        def curve(quantity: Any, law: Law, speed: int) -> Float:
+            return np.array([quantity(law, speed, applied) for applied in APPLIED])
 
+        def slopes(*line: Any) -> Float:
+            """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes."""
+            return np.diff(np.log(np.abs(curve(*line)))) / np.diff(np.log(APPLIED))
+
+        def ageless(law: str) -> Law:
+            """Without the state term, mu0 such that the steady friction at 10 um/s is the same."""
+            mu0 = float(self.slider(law).law.mu_ss(high)) - p.A * float(np.log(high / p.V0))
+            return Law(law, {"B": 0.0, "mu0": mu0})
+
+        contact = NormalContact(W0=p.W0, lambda_z=p.lambda_z)
         observables = {n: observable(n) for n in ("mu_ss", "delta_mu", "mu1", "mu2")}
         return {
             "slow": 0,
             "fast": 1,
-            "RR": (RR, {}),
-            "LD": (LD, {}),
-            "EXT": (EXT, {}),
-            "LD_low": (LD, {"alpha": p.alpha_low}),
-            "AMONTONS": ("amontons", {}),
-            "EXT_inertia": None,
+            "RR": Law(RR),
+            "LD": Law(LD),
+            "EXT": Law(EXT),
+            "EXT_measured": Law(EXT, {"lambda_": p.lambda_quasi_static}),
+            "LD_low": Law(LD, {"alpha": p.alpha_low}),
+            "AMONTONS": Law("amontons"),
+            "PRODUCT": Law("strength-area"),
+            "RR_ageless": ageless(RR),
+            "EXT_ageless": ageless(EXT),
+            "EXT_inertia": Law(EXT, inertia=True),
             "vacuum": None,
             **observables,
             "drop": lambda *point: -observables["delta_mu"](*point),
             "exponent": exponent,
-            "last_slope": lambda *curve: slopes(*curve)[-1],
-            "least_slope": lambda *curve: slopes(*curve).min(),
+            "last_slope": lambda *line: slopes(*line)[-1],
+            "slopes": slopes,
+            "curve": curve,
+            "steps": np.diff,
+            "transfer": self.transfer,
+            "mu": self.mu_ss,
+            "strongest": self.strongest,
+            "elastic_slope": self.elastic_slope,
             "borne": self.borne,
             "stiffness": lambda layer: layer.stiffness,
             "disc": lambda radius: self.air_layer(R=radius),
             "air": self.air_layer(),
             "nominal": self.air_layer(R=self.nominal_radius),
-            "rarefied": self.air_layer(P0=p.P_vacuum, R=self.nominal_radius),
+            "rarefied": self.air_layer(
+                P0=p.P_vacuum, R=self.nominal_radius, temperature=p.gas_temperature
+            ),
+            "mean_free_path": lambda layer: layer.mean_free_path,
+            "squeeze": lambda layer, f: complex(layer.gamma(2 * np.pi * f) * layer.R),
+            "bessel": lambda z: complex(bessel_ratio(z)),
+            "mindlin": mindlin_length_ratio,
+            "load": contact.load,
+            "closure": contact.closure,
         }
 
     # --- Closed forms and the reference integration ----------------------------------------------
@@ -330,49 +348,12 @@ class Machine:
         return {"drop": (slow, fast), "mu1": (low, high), "mu2": mu2, "ratio": ratio}
 
 
-@dataclass(frozen=True)
-class Outputs:
-    """A model's response at eps = 0.5, each at the slow and the fast velocity."""
-
-    mu_ss: Pair
-    delta_mu: Pair
-    mu1: Pair
-    mu2: Pair
-
-    @property
-    def relative_drop(self) -> Pair:
-        """Drop of the mean over the friction coefficient without modulation."""
-        return -self.delta_mu[0] / self.mu_ss[0], -self.delta_mu[1] / self.mu_ss[1]
-
-    @property
-    def drop_over_mu1(self) -> Pair:
-        """Drop of the mean over the first harmonic."""
-        return -self.delta_mu[0] / self.mu1[0], -self.delta_mu[1] / self.mu1[1]
-
-    @property
-    def mu2_over_mu1(self) -> Pair:
-        """Second over first harmonic."""
-        return self.mu2[0] / self.mu1[0], self.mu2[1] / self.mu1[1]
-
-
 def at(values: Float, applied: float = STRONGEST) -> Pair:
     """Entries of a curve at one applied amplitude, for the slow and the fast velocity."""
     slow, fast = values[:, APPLIED.index(applied)]
     return float(slow), float(fast)
 
 
-def relative(values: Pair) -> float:
-    """Relative change from the slow to the fast velocity."""
-    slow, fast = values
-    return fast / slow - 1
-
-
 def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
     """Numbers at the two velocities by their names, with a prefix such as ``"mu1, "``."""
     return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
-
-
-def steady_multiplier(slider: Slider, V: ArrayLike, frequency: float | Float) -> Float:
-    """Growth of a perturbation of steady sliding over one period 1/frequency (Hz)."""
-    response = perturbation_response(slider, velocity=V, frequency=frequency)
-    return np.exp(np.asarray(response.eigenvalues)[..., 0].real / frequency)

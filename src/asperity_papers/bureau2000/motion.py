@@ -17,7 +17,7 @@ import pandas as pd
 from asperity import periodic_response
 from asperity.ledger import FigureNumbers
 from asperity.orbit import over_a_period
-from asperity_papers.bureau2000.curves import FigureCurve, curve_figure, figure_numbers
+from asperity_papers.bureau2000.curves import CurveFigure, FigureCurve, figure_numbers
 from asperity_papers.bureau2000.machine import EXT, EXT_AGE, Float, Machine
 
 #: Instants of the period: pulses of slip are a third of a radian wide and less.
@@ -72,18 +72,7 @@ def period_figure(machine: Machine) -> FigureNumbers:
         one_period(machine, law, V, epsilon, inertia=inertia) for law, inertia in PERIODS.values()
     ]
     data = pd.concat(tables, keys=list(PERIODS), names=["curve"]).reset_index("curve")
-    data = data.reset_index(drop=True)
-    drops = [float(rows["force"].mean()) - machine.mu_ss(V) for rows in tables]
-    scalars = {
-        "velocity_min": float(tables[0]["velocity"].min()),
-        "velocity_max": float(tables[0]["velocity"].max()),
-        "plastic_velocity_max": float(tables[0]["plastic_velocity"].max()),
-        "drop_printed": drops[0],
-        "drop_plastic_age": drops[1],
-        "drop_inertia": drops[2],
-        "plastic_age_smaller_by": 1 - drops[1] / drops[0],
-    }
-    return figure_numbers(machine, "figure-13", data, scalars)
+    return figure_numbers(machine, "figure-13", data.reset_index(drop=True))
 
 
 # --- The resonance of the slider on its asperities -----------------------------------------------
@@ -92,20 +81,6 @@ def period_figure(machine: Machine) -> FigureNumbers:
 QUALITY = 10.0
 #: Ranges of the two cuts: beyond what is published of lambda (um), and around 120 and 200 Hz.
 _LENGTHS, _FREQUENCIES, _POINTS = (0.4, 1.0), (80.0, 800.0), 100
-#: Values of lambda (um) that the caption names: the ends and the middle of its measured range, and
-#: the fitted one.
-_MARKED = (0.47, 0.62, 0.70, 0.77)
-QUASI_STATIC, UNDAMPED, DAMPED = "no inertia", "inertia", "inertia, damped"
-
-
-def contact_damping(machine: Machine) -> float:
-    """Damper between slider and track (N s/m) that gives the resonance its `QUALITY`.
-
-    It is parallel to the asperities and the joint: sqrt(M W0/lambda)/QUALITY. What it adds to the
-    mean force, its value times V, is below 0.001 W0 at 10 um/s.
-    """
-    p = machine.numbers
-    return float(np.sqrt(p.M * p.W0 / p.lambda_) / QUALITY)
 
 
 def resonance_curves(machine: Machine) -> list[FigureCurve]:
@@ -119,9 +94,10 @@ def resonance_curves(machine: Machine) -> list[FigureCurve]:
         FigureCurve("lambda", EXT, V, epsilon, overrides={"lambda_": lengths}),
         FigureCurve("frequency", EXT, V, epsilon, frequency=np.sort([*between, *experiments])),
     )
-    cases = {
-        QUASI_STATIC: (False, 0.0), UNDAMPED: (True, 0.0), DAMPED: (True, contact_damping(machine))
-    }  # fmt: skip
+    # A damper between slider and track, parallel to asperities and joint. What it adds to the mean
+    # force, its value (N s/m) times V, is below 0.001 W0 at 10 um/s.
+    damping = float(np.sqrt(p.M * p.W0 / p.lambda_) / QUALITY)
+    cases = {"no inertia": (False, 0), "inertia": (True, 0), "inertia, damped": (True, damping)}
     return [
         replace(cut, name=f"{cut.name}, {name}", inertia=inertia, damping=damping)
         for name, (inertia, damping) in cases.items()
@@ -129,44 +105,5 @@ def resonance_curves(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-@curve_figure("figure-15", resonance_curves)
-def resonance_figure(
-    machine: Machine, read: FigureNumbers
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Drop, mu1 and mu2 against lambda at 120 Hz and against frequency at 0.7 um."""
-    p, V, f = machine.numbers, machine.velocities[1], machine.numbers.frequency_vacuum
-    still, moved = (f"frequency, {name}" for name in (QUASI_STATIC, UNDAMPED))
-    percent = {
-        name: 100 * -at_frequency(read, name, "delta_mu", f) / machine.mu_ss(V)
-        for name in (still, moved)
-    }
-    changes = {
-        f"change of {column} at lambda {length:g} um": _change(read, column, 1e-6 * length)
-        for column in ("delta_mu", "mu2")
-        for length in _MARKED
-    }
-    low, high = machine.ends_of("lambda_quasi_static")
-    marks = {"lambda low": low, "lambda high": high, "lambda fitted": p.lambda_}
-    return {
-        "contact_resonance": machine.contact_resonance,
-        "contact_damping": contact_damping(machine),
-        "relative_drop_200Hz": percent[still] / 100,
-        "relative_drop_200Hz_inertia": percent[moved] / 100,
-        "mu2_ratio_200Hz": at_frequency(read, moved, "mu2", f)
-        / at_frequency(read, still, "mu2", f),
-        **changes,
-    }, {"Q": QUALITY, **marks}
-
-
-def at_frequency(numbers: FigureNumbers, curve: str, column: str, frequency: float) -> float:
-    """A quantity on a cut over the frequency, linear in ln f between the points."""
-    rows = numbers.curve(curve)
-    return float(np.interp(np.log(frequency), np.log(rows["frequency"]), rows[column]))
-
-
-def _change(numbers: FigureNumbers, column: str, length: float) -> float:
-    """Relative change of a quantity by inertia at one lambda (m)."""
-    still, moved = (
-        numbers.at(f"lambda, {name}", column, length, "lambda") for name in (QUASI_STATIC, UNDAMPED)
-    )
-    return moved / still - 1
+#: Drop, mu1 and mu2 against lambda at 120 Hz and against frequency at 0.7 um.
+resonance_figure = CurveFigure("figure-15", resonance_curves)

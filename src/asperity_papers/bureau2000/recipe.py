@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,10 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2 as chi_squared
 
 from asperity import InputError
-from asperity.inference import (
-    LockInTable,
-    bounded_interval,
-    fit,
-    shift_of_estimates,
-)
+from asperity.inference import LockInTable, bounded_interval, fit, shift_of_estimates
 from asperity.ledger import RecipeNumber, RecipeResult, read_columns
-from asperity_papers.bureau2000.machine import PAPER, printed
+from asperity.parameters import obeying
+from asperity_papers.bureau2000.machine import PAPER
 
 Float = NDArray[np.float64]
 
@@ -98,15 +94,12 @@ def read_thresholds(path: str | Path) -> Thresholds:
     return Thresholds(Path(path).name, **columns)
 
 
-#: Name in the paper's file of numbers, and of its uncertainty where that is another one.
+#: Name in the paper's file of numbers, and of the number whose uncertainty it has.
 _PUBLISHED = {
-    "mu0": ("mu0", ""),
-    "A": ("A", ""),
-    "B": ("B", ""),
-    "D0": ("D0", ""),
-    "eps_ratio": ("transmission", ""),
+    **{name: (name, name) for name in ("mu0", "A", "B", "D0")},
+    "eps_ratio": ("transmission", "transmission"),
     "lambda": ("lambda", "lambda_quasi_static"),
-    "alpha": ("alpha_low", ""),
+    "alpha": ("alpha_low", "alpha_low"),
 }
 
 
@@ -129,7 +122,7 @@ def paper_procedure(
         For step 2.
     fixed : mapping, optional
         K and W0 where they are no columns, in SI or as texts with units; those of the paper if
-        they are neither. V0 is 1 um/s.
+        they are neither. V0, at which mu0 is read, is 1 um/s by default.
     progress : callable, optional
         Called with steps done, all steps, and a label.
 
@@ -143,39 +136,40 @@ def paper_procedure(
         If rows for step 1 are missing, or friction does not weaken with velocity.
     """
     report = progress or (lambda done, total, label: None)
-    material = printed()
-    constants = {"V0": material["V0"].si, **dict(fixed or {})}
     steady, drop, first = _rows(readings)
     warnings: list[str] = []
     report(0, 4, "steady sliding and bifurcation")
-    base = _steady_and_threshold(steady, thresholds, float(material["V0"].si), warnings)
-    steps = _SingleFits(base, constants, warnings)
-    numbers: list[RecipeNumber] = [*_numbers_of(base)]
-    result = partial(RecipeResult, PAPER.name, data=(readings.name, thresholds.name))
+    constants = {"V0": PAPER.numbers["V0"].si, **dict(fixed or {})}
+    V0 = float(obeying(constants["V0"], "V0", "velocity", "positive"))
+    base = _steady_and_threshold(steady, thresholds, V0, warnings)
+    numbers = _numbers_of(base)
+    if PAPER.numbers["V0"].si != V0:
+        # The paper has no friction coefficient at that velocity.
+        numbers[0] = replace(
+            numbers[0], published=None, published_uncertainty=None, published_place=""
+        )
     if drop is None:
         warnings.append("no rows have epsilon above 0 and delta_mu: steps 3 to 5 are left out")
-        return result({n.name: n for n in numbers}, tuple(warnings))
-    report(1, 4, "eps_ratio from the drop")
-    ratio = steps.fitted(3, drop, "rice-ruina", "eps_ratio", {}, "the drop, by Rice-Ruina")
-    numbers.append(ratio.number)
-    later = {"eps_ratio": (ratio.number.value, ratio)}
-    report(2, 4, "lambda from mu1")
-    if first is None:
-        warnings.append("no rows have epsilon above 0 and mu1: step 4 is left out")
     else:
-        how = "mu1, elasto-plastic law"
-        numbers.append(steps.fitted(4, first, "elasto-plastic", "lambda", later, how).number)
-    report(3, 4, "alpha from the drop")
-    at_ratio = steps.fitted(
-        5, drop, "linker-dieterich", "alpha", later, "the drop, at that eps_ratio", same=True
-    )
-    numbers.append(_limited(at_ratio.number))
-    free = steps.fitted(
-        5, drop, "linker-dieterich", "alpha", {}, "the drop, eps_ratio free", ("eps_ratio",)
-    )
-    numbers.append(replace(_limited(free.number), name="alpha, eps_ratio free"))
-    report(4, 4, "alpha from the drop")
-    return result({n.name: n for n in numbers}, tuple(warnings))
+        fitted = partial(_fitted, base, constants, warnings)
+        report(1, 4, "eps_ratio from the drop")
+        ratio = fitted(3, drop, "rice-ruina", "eps_ratio", "the drop, by Rice-Ruina")
+        numbers.append(ratio.number)
+        report(2, 4, "lambda from mu1")
+        if first is None:
+            warnings.append("no rows have epsilon above 0 and mu1: step 4 is left out")
+        else:
+            how = "mu1, elasto-plastic law"
+            numbers.append(fitted(4, first, "elasto-plastic", "lambda", how, ratio).number)
+        report(3, 4, "alpha from the drop")
+        bounded = partial(fitted, 5, drop, "linker-dieterich", "alpha")
+        at_ratio = bounded("the drop, at that eps_ratio", ratio, same_readings=True)
+        free = bounded("the drop, eps_ratio free", others=("eps_ratio",))
+        numbers.append(_limited(at_ratio.number))
+        numbers.append(replace(_limited(free.number), name="alpha, eps_ratio free"))
+        report(4, 4, "alpha from the drop")
+    names = readings.name, thresholds.name
+    return RecipeResult(PAPER.name, {n.name: n for n in numbers}, tuple(warnings), names)
 
 
 def _limited(number: RecipeNumber) -> RecipeNumber:
@@ -200,24 +194,31 @@ def _rows(
     steady = part("mean_friction", ~modulated)
     if steady is None:
         rule = "have rows with epsilon = 0 and mean_friction"
-        raise InputError(f"{readings.name}", rule, "none", "measure steady sliding")
+        raise InputError(readings.name, rule, "none", "measure steady sliding")
     if np.unique(steady.points["V"]).size < 2:
         rule = "have rows with epsilon = 0 at two velocities or more"
-        raise InputError(f"{readings.name}", rule, "one", "the slope with ln V needs them")
+        raise InputError(readings.name, rule, "one", "the slope with ln V needs them")
     return steady, part("delta_mu", modulated), part("mu1", modulated)
 
 
 @dataclass(frozen=True, eq=False)
 class _SteadyStateNumbers:
-    """mu0, A, B and D0, with the covariance of mu0, ln(B - A), ln A and ln D0."""
+    """mu0, ln(B - A), ln A and ln D0, and their covariance."""
 
     coordinates: Float
     covariance: Float
 
-    def values(self, coordinates: Float) -> dict[str, float]:
-        mu0, weakening, a, d = coordinates
+    def values(self, shift: Float | float = 0.0) -> dict[str, float]:
+        """The parameters at coordinates that are moved by `shift`."""
+        mu0, weakening, a, d = self.coordinates + shift
         A = math.exp(a)
         return {"mu0": float(mu0), "A": A, "B": A + math.exp(weakening), "D0": math.exp(d)}
+
+    def moved(self) -> list[tuple[dict[str, float], dict[str, float]]]:
+        """The parameters one standard deviation up and down each principal axis."""
+        variances, axes = np.linalg.eigh(self.covariance)
+        shifts = (axes * np.sqrt(np.maximum(variances, 0.0))).T
+        return [(self.values(shift), self.values(-shift)) for shift in shifts]
 
 
 # What leaves the range of doubles is refused at the end.
@@ -227,42 +228,44 @@ def _steady_and_threshold(
 ) -> _SteadyStateNumbers:
     """Steps 1 and 2 as one weighted least squares: what is measured twice is averaged."""
     log_v = np.log(steady.points["V"] / V0)
-    mean, error = steady.values["mean_friction"], steady.errors["mean_friction"]
-    omega, omega_err = 2 * math.pi * thresholds.frequency, 2 * math.pi * thresholds.frequency_err
+    turn = 2 * math.pi
+    measured, errors = (
+        np.concatenate(parts)
+        for parts in (
+            (steady.values["mean_friction"], thresholds.K_over_W0, turn * thresholds.frequency),
+            (
+                steady.errors["mean_friction"],
+                thresholds.K_over_W0_err,
+                turn * thresholds.frequency_err,
+            ),
+        )
+    )
 
     def residuals(u: Float) -> Float:
         mu0, weakening, a, d = u
         line = mu0 - math.exp(weakening) * log_v
-        stiffness = math.exp(weakening - d)
+        stiffness = np.full(thresholds.V.shape, math.exp(weakening - d))
         critical = math.exp((weakening - a) / 2 - d) * thresholds.V
-        return np.concatenate(
-            [
-                (line - mean) / error,
-                (stiffness - thresholds.K_over_W0) / thresholds.K_over_W0_err,
-                (critical - omega) / omega_err,
-            ]
-        )
+        return np.asarray((np.concatenate([line, stiffness, critical]) - measured) / errors)
 
     try:
         start = _start_of_least_squares(steady, log_v, thresholds)
         solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
-        covariance = np.linalg.inv(solved.jac.T @ solved.jac)
-        base = _SteadyStateNumbers(solved.x, covariance)
-        numbers = _numbers_of(base)
-        finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in numbers)
+        base = _SteadyStateNumbers(solved.x, np.linalg.inv(solved.jac.T @ solved.jac))
+        finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in _numbers_of(base))
     except InputError:
         raise
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+    except (ArithmeticError, ValueError):
         finite = False
     if not finite:
         rule = "have bifurcations from which A, B and D0 follow"
         got = "numbers with which that cannot be computed"
-        raise InputError(f"{thresholds.name}", rule, got, "correct the cells, which are in SI")
-    dof = solved.fun.size - 4
-    if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
+        raise InputError(thresholds.name, rule, got, "correct the cells, which are in SI")
+    dof, chi2 = solved.fun.size - 4, float(solved.fun @ solved.fun)
+    if dof > 0 and chi_squared.sf(chi2, dof) < _MISFIT:
         warnings.append(
             f"steady sliding and bifurcations do not agree within their uncertainties: "
-            f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
+            f"chi-squared {chi2:.3g} for {dof} degrees of freedom"
         )
     return base
 
@@ -273,128 +276,80 @@ def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thres
     slope, level = np.polyfit(log_v, mean, 1, w=1 / error)
     if slope >= 0:
         rule, got = "have friction that weakens with velocity", f"a slope of {slope:.3g} with ln V"
-        raise InputError(f"{steady.name}", rule, got, "without weakening there is no bifurcation")
+        raise InputError(steady.name, rule, got, "without weakening there is no bifurcation")
     k = float(np.average(thresholds.K_over_W0, weights=thresholds.K_over_W0_err**-2))
     omega = 2 * math.pi * thresholds.frequency
     contrast = float(np.median(omega / thresholds.V)) * -slope / k
-    return np.array(
-        [
-            level,
-            math.log(-slope),
-            math.log(-slope / contrast**2),
-            math.log(-slope / k),
-        ]
-    )
+    return np.array([level, *map(math.log, (-slope, -slope / contrast**2, -slope / k))])
 
 
-#: Step of each number of steady sliding and bifurcation, and what it is read from.
-_HOW = {
-    "mu0": (1, "mean friction at V0"),
-    "B - A": (1, "slope of the mean friction with ln V"),
-    "A": (2, "critical frequency, K/W0 and B - A at the bifurcation"),
-    "B": (2, "A and the slope"),
-    "D0": (2, "K/W0 at the bifurcation and the slope"),
-}
-
-
-def _numbers_of(base: _SteadyStateNumbers) -> tuple[RecipeNumber, ...]:
+def _numbers_of(base: _SteadyStateNumbers) -> list[RecipeNumber]:
     """mu0, B - A, A, B and D0 with their standard errors, to first order."""
-    values = base.values(base.coordinates)
-    values["B - A"] = weakening = math.exp(base.coordinates[1])
-    gradient = {
-        "mu0": [1.0, 0, 0, 0],
-        "A": [0, 0, values["A"], 0],
-        "B": [0, weakening, values["A"], 0],
-        "D0": [0, 0, 0, values["D0"]],
-        "B - A": [0, weakening, 0, 0],
-    }
+    mu0, A, B, D0 = base.values().values()
+    weakening = math.exp(base.coordinates[1])
     numbers = []
-    for name, how in _HOW.items():
-        row = np.array(gradient[name])
-        se = float(np.sqrt(row @ base.covariance @ row))
-        numbers.append(_with_published(name, values[name], se, se, *how))
-    return tuple(numbers)
+    for name, value, gradient, step, how in (
+        ("mu0", mu0, (1, 0, 0, 0), 1, "mean friction at V0"),
+        ("B - A", weakening, (0, weakening, 0, 0), 1, "slope of the mean friction with ln V"),
+        ("A", A, (0, 0, A, 0), 2, "critical frequency, K/W0 and B - A at the bifurcation"),
+        ("B", B, (0, weakening, A, 0), 2, "A and the slope"),
+        ("D0", D0, (0, 0, 0, D0), 2, "K/W0 at the bifurcation and the slope"),
+    ):
+        se = float(np.sqrt(gradient @ base.covariance @ gradient))
+        numbers.append(_with_published(name, value, se, se, step, how))
+    return numbers
 
 
-@dataclass(frozen=True, eq=False)
-class _FittedNumber:
-    """A fitted number, and how it moves with what was fixed.
-
-    Attributes
-    ----------
-    number : RecipeNumber
-    shifts : array, shape (m,)
-        By one standard deviation of each independent source of error.
-    """
+class _FittedNumber(NamedTuple):
+    """A fitted number, and its shifts by one standard deviation of each source of error."""
 
     number: RecipeNumber
     shifts: Float
 
 
-@dataclass(frozen=True, eq=False)
-class _SingleFits:
-    """Fits of one parameter with the numbers of earlier steps fixed."""
+def _fitted(
+    base: _SteadyStateNumbers,
+    constants: Mapping[str, Any],
+    warnings: list[str],
+    step: int,
+    table: LockInTable,
+    law: str,
+    name: str,
+    how: str,
+    ratio: _FittedNumber | None = None,
+    *,
+    others: Sequence[str] = (),
+    same_readings: bool = False,
+) -> _FittedNumber:
+    """The fit of a parameter, with the numbers of earlier steps fixed and `others` free too.
 
-    base: _SteadyStateNumbers
-    constants: Mapping[str, Any]
-    warnings: list[str]
-
-    def fitted(
-        self,
-        step: int,
-        table: LockInTable,
-        law: str,
-        name: str,
-        earlier: Mapping[str, tuple[float, _FittedNumber]],
-        how: str,
-        others: Sequence[str] = (),
-        *,
-        same: bool = False,
-    ) -> _FittedNumber:
-        """The fit of a parameter, with others free too if they are named.
-
-        With `same` the earlier steps use the same readings: their noise is that of this step and
-        is not counted again.
-        """
-        known = self.base.values(self.base.coordinates)
-        fixed = {**self.constants, **known, **{n: v for n, (v, _) in earlier.items()}}
-        material = printed()
-        free = [name, *others]
-        start = {n: v for n, v in {"alpha": material["alpha_low"].si}.items() if n in free}
-        if "eps_ratio" in free:
-            start["eps_ratio"] = material["transmission"].si
-        result = fit(table, law, free, fixed=fixed, material=material, start=start)
-        if not result.converged:
-            rule = "have periodic responses with the numbers of the earlier steps"
-            got = f"none that fits {name}"
-            raise InputError(f"{table.name}", rule, got, "check the thresholds and K and W0")
-        self.warnings.extend(f"step {step}: {w}" for w in result.warnings)
-        estimate = result.parameters[name]
-
-        def shift(high: Mapping[str, float], low: Mapping[str, float]) -> float:
-            return shift_of_estimates(result, high, low)[name]
-
-        shifts = np.array([shift(*ends) for ends in self._moved()])
-        more = []
-        for other, (value, source) in earlier.items():
-            # To first order, from a change of 1 %.
-            slope = shift({other: value * 1.01}, {other: value * 0.99})
-            shifts = shifts + slope / (0.01 * value) * source.shifts[: shifts.size]
-            more.append(0.0 if same else slope / (0.01 * value) * source.number.se_own)
-        shifts = np.array([*shifts, *more])
-        se = float(np.sqrt(estimate.se**2 + np.sum(shifts**2)))
-        return _FittedNumber(
-            _with_published(name, estimate.value, se, estimate.se, step, how), shifts
-        )
-
-    def _moved(self) -> list[tuple[dict[str, float], ...]]:
-        """mu0, A, B and D0 one standard deviation up and down each principal axis."""
-        values, vectors = np.linalg.eigh(self.base.covariance)
-        along = vectors * np.sqrt(np.maximum(values, 0.0))
-        return [
-            tuple(self.base.values(self.base.coordinates + sign * along[:, j]) for sign in (1, -1))
-            for j in range(along.shape[1])
-        ]
+    With `same_readings` those of `ratio`, the number of step 3, are those of this step: their noise
+    is not counted again.
+    """
+    fixed, material = {**constants, **base.values()}, PAPER.numbers
+    if ratio is not None:
+        fixed["eps_ratio"] = ratio.number.value
+    free = [name, *others]
+    starts = {"alpha": material["alpha_low"].si, "eps_ratio": material["transmission"].si}
+    start = {n: starts[n] for n in free if n in starts}
+    result = fit(table, law, free, fixed=fixed, material=material, start=start)
+    if not result.converged:
+        rule = "have periodic responses with the numbers of the earlier steps"
+        got = f"none that fits {name}"
+        raise InputError(table.name, rule, got, "check the thresholds and K and W0")
+    warnings.extend(f"step {step}: {w}" for w in result.warnings)
+    estimate = result.parameters[name]
+    shifts = np.array([shift_of_estimates(result, *ends)[name] for ends in base.moved()])
+    if ratio is not None:
+        # To first order, from a change of 1 %.
+        value, change = ratio.number.value, 0.01 * ratio.number.value
+        ends = {"eps_ratio": value + change}, {"eps_ratio": value - change}
+        slope = shift_of_estimates(result, *ends)[name] / change
+        shifts = shifts + slope * ratio.shifts
+        if not same_readings:
+            shifts = np.append(shifts, slope * ratio.number.se_own)
+    se = float(np.sqrt(estimate.se**2 + np.sum(shifts**2)))
+    return _FittedNumber(_with_published(name, estimate.value, se, estimate.se, step, how), shifts)
 
 
 def _with_published(
@@ -402,14 +357,8 @@ def _with_published(
 ) -> RecipeNumber:
     """A number with the paper's."""
     unit = "m" if name in ("D0", "lambda") else ""
-    fitted = RecipeNumber(name, unit, value, se, se_alone, step, how, None, None, "")
-    if name not in _PUBLISHED:
-        return fitted
-    key, uncertain = _PUBLISHED[name]
-    number, spread = printed()[key], printed()[uncertain or key].si_uncertainty
-    return replace(
-        fitted,
-        published=float(number.si),
-        published_uncertainty=None if spread is None else float(spread),
-        published_place=number.place,
-    )
+    key, uncertain = _PUBLISHED.get(name, ("", ""))
+    number = PAPER.numbers[key] if key else None
+    spread = PAPER.numbers[uncertain].si_uncertainty if uncertain else None
+    published, place = (number.si, number.place) if number else (None, "")
+    return RecipeNumber(name, unit, value, se, se_alone, step, how, published, spread, place)

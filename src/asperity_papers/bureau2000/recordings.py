@@ -267,13 +267,9 @@ def all_series() -> tuple[Series, ...]:
 
 
 def _series(velocity: float, epsilons: tuple[float, ...], number: int) -> Series:
-    """In air, at the frequency of most of the paper's data."""
-    return Series(series_name(velocity), velocity, PRINTED.numbers.frequency, epsilons, number)
-
-
-def series_name(velocity: float) -> str:
-    """A series by its velocity, such as ``"10 um/s"``."""
-    return f"{1e6 * velocity:.3g} um/s"
+    """In air, at the frequency of most of the paper's data; its name is that of the velocity."""
+    name = f"{1e6 * velocity:.3g} um/s"
+    return Series(name, velocity, PRINTED.numbers.frequency, epsilons, number)
 
 
 #: One thread each for XLA and for NumPy's linear algebra: the other core is taken.

@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from asperity.figures import COLOURS
 from asperity.ledger import FigureNumbers
 from asperity_papers.bureau2000.curves import (
     APPLIED,
-    BORNE,
-    WORDS,
     CurveFigure,
     FigureCurve,
-    curve_figure,
+    curves_of_laws,
     elastic_curves,
     speed_curves,
-    with_inertia,
 )
-from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, STRONGEST, Float, Machine
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Numbers = dict[str, float]
+from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, Float, Machine
 
 #: Velocities per decade in figure 3.
 _PER_DECADE = 12
-#: Degrees that a line is tilted in figure 3 as printed, for a slope of 1 in ln V.
-_TILT = 1180.0
 #: Curves of figure 5, with what bears the load.
 VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
 
@@ -47,25 +37,21 @@ def curves_2(machine: Machine) -> list[FigureCurve]:
     ]
 
 
-@curve_figure("figure-02", curves_2)
-def figure_2(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Change of the mean against eps at 120 Hz."""
-    slope, intercept, departure = _straight_line(read, machine.numbers.epsilon_onset)
-    return {
-        "slope": slope,
-        "intercept": intercept,
-        "departure_from_line": departure,
-        "transmission_air": machine.borne(machine.numbers.frequency, machine.air_layer()),
-    }, {}
-
-
-def _straight_line(read: FigureNumbers, onset: float) -> tuple[float, float, float]:
-    """Slope, intercept and largest departure of the line through the slow curve above `onset`."""
+def _straight_line(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """The line through the slow curve above the onset, and the largest departure from it."""
     slow = read.curve(SLOW)
-    line = slow[slow[APPLIED] >= onset]
+    line = slow[slow[APPLIED] >= machine.numbers.epsilon_onset]
     slope, intercept = np.polyfit(line[APPLIED], line["delta_mu"], 1)
     departure = line["delta_mu"] - slope * line[APPLIED] - intercept
-    return float(slope), float(intercept), float(np.abs(departure).max())
+    return {
+        "line_slope": slope,
+        "line_intercept": intercept,
+        "line_departure": np.abs(departure).max(),
+    }
+
+
+#: Change of the mean against eps at 120 Hz.
+figure_2 = CurveFigure("figure-02", curves_2, _straight_line)
 
 
 # --- Figure 3: mean against V for four amplitudes ------------------------------------------------
@@ -84,65 +70,26 @@ def curves_3(machine: Machine) -> list[FigureCurve]:
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
 
 
-@curve_figure("figure-03", curves_3)
-def figure_3(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Mean against V for four amplitudes."""
-    return {
-        f"slope_{eps:g}": float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
-        for eps, rows in read.data.groupby(APPLIED, sort=False)
-    }, {}
-
-
-def draw_3(numbers: FigureNumbers) -> Figure:
-    """The lines, each with its slope along it, and the stated slope."""
-    figure = WORDS.figures["figure-03"].draw(numbers)
-    axis = figure.axes[0]
-    names = list(numbers.data["curve"].unique())
-    for name in names:
-        rows, eps = numbers.curve(name), name.removeprefix("eps = ")
-        slope = numbers.scalars[f"slope_{eps}"]
-        # The strongest one has its name below: the stated slope lies above it.
-        below = name == names[-1]
-        axis.text(
-            1e6 * rows["V"].iloc[2], rows["mean_friction"].iloc[2] + (-0.004 if below else 0.003),
-            rf"$\epsilon={eps}$,  slope ${slope:.4f}$", rotation=_TILT * slope,
-            rotation_mode="anchor", va="top" if below else "bottom", fontsize=10,
-        )  # fmt: skip
-    # The slope without modulation, through the strongest modulation at 1 um/s.
-    strongest = numbers.curve(names[-1])
-    V, mean = 1e6 * strongest["V"].to_numpy(), strongest["mean_friction"].to_numpy()
-    through = float(np.interp(0.0, np.log(V), mean))
-    line = through + numbers.scalars["slope_0"] * np.log(V)
-    axis.plot(V, line, linewidth=1.1, color=COLOURS["stated"])
-    return figure
+#: Mean against V for four amplitudes.
+figure_3 = CurveFigure("figure-03", curves_3)
 
 
 # --- Figure 5: air and vacuum at 200 Hz ----------------------------------------------------------
 
 
-def vacuum_shares(machine: Machine) -> tuple[float, float]:
-    """eps_eff/eps at 200 Hz, in vacuum and in air.
-
-    In vacuum by the appendix, 1/|1 - (omega/omega_0)^2|; in air the same over 2.5, the factor by
-    which the paper's data collapse.
-    """
-    vacuum = machine.borne(machine.numbers.frequency_vacuum, None)
-    return vacuum, vacuum / machine.numbers.collapse_divisor_200Hz
-
-
 def curves_5(machine: Machine) -> list[FigureCurve]:
-    """In vacuum and in air, with the mass too, and under the layer's full disc."""
+    """In vacuum and in air, with the mass too, and under the layer's full disc.
+
+    The share in vacuum is that of the appendix, 1/|1 - (omega/omega_0)^2|; in air it is divided by
+    2.5, the factor by which the paper's data collapse.
+    """
     p, eps = machine.numbers, machine.applied_amplitudes()
     V, f = p.V_vacuum, p.frequency_vacuum
-    shares = dict(zip((VACUUM, AIR), vacuum_shares(machine), strict=True))
-    return [
-        *(FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()),
-        *(
-            FigureCurve(with_inertia(name), EXT, V, eps, share, f, inertia=True)
-            for name, share in shares.items()
-        ),
-        FigureCurve(FULL_DISC, EXT, V, eps, machine.borne(f, machine.air_layer()), f),
-    ]
+    vacuum, disc = (machine.borne(f, layer) for layer in (None, machine.air_layer()))
+    shares = {VACUUM: vacuum, AIR: vacuum / p.collapse_divisor_200Hz}
+    still = [FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()]
+    moved = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in still]
+    return [*still, *moved, FigureCurve(FULL_DISC, EXT, V, eps, disc, f)]
 
 
 #: Change of the mean in air and in vacuum, at 200 Hz.
@@ -152,83 +99,50 @@ figure_5 = CurveFigure("figure-05", curves_5)
 # --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
 
 
-def curves_6(machine: Machine) -> list[FigureCurve]:
-    """Both velocities, all of the load borne by the contacts."""
-    return speed_curves(machine, RR, machine.applied_amplitudes())
-
-
 #: Rice-Ruina: change of the mean against eps.
-figure_6 = CurveFigure("figure-06", curves_6)
-
-
-def curves_7(machine: Machine) -> list[FigureCurve]:
-    """The slow velocity."""
-    return curves_6(machine)[:1]
+figure_6 = CurveFigure(
+    "figure-06", lambda machine: speed_curves(machine, RR, machine.applied_amplitudes())
+)
 
 
 #: Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop.
-figure_7 = CurveFigure("figure-07", curves_7)
-
-
-def draw_7(numbers: FigureNumbers) -> Figure:
-    """An arrow from the applied amplitude of the stated drop to the scaled one."""
-    figure = WORDS.figures["figure-07"].draw(numbers)
-    drop, left = numbers.quoted["stated drop 1"], numbers.quoted["epsilon_eff at 0.5"]
-    arrow = {"arrowstyle": "-|>", "color": COLOURS["stated"], "linewidth": 1.2}
-    ends = (left + 0.022, drop), (STRONGEST - 0.02, drop)
-    figure.axes[0].annotate("", xy=ends[0], xytext=ends[1], arrowprops=arrow)
-    return figure
-
-
-def curves_4(machine: Machine) -> list[FigureCurve]:
-    """The elasto-plastic law against eps."""
-    return elastic_curves(machine, machine.applied_amplitudes(), machine.share)
+figure_7 = CurveFigure("figure-07", lambda machine: figure_6.curves(machine)[:1])
 
 
 #: Harmonics against eps at 120 Hz.
-figure_4 = CurveFigure("figure-04", curves_4)
-
-
-def curves_8(machine: Machine) -> list[FigureCurve]:
-    """Rice-Ruina at both velocities."""
-    return speed_curves(machine, RR, machine.borne_amplitudes())
+figure_4 = CurveFigure(
+    "figure-04",
+    lambda machine: elastic_curves(machine, machine.applied_amplitudes(), machine.share),
+)
 
 
 #: Rice-Ruina: harmonics against eps_eff.
-figure_8 = CurveFigure("figure-08", curves_8)
+figure_8 = CurveFigure(
+    "figure-08", lambda machine: speed_curves(machine, RR, machine.borne_amplitudes())
+)
 
 
 def curves_9(machine: Machine) -> list[FigureCurve]:
     """Two coefficients at both velocities, and Rice-Ruina."""
-    p, eps = machine.numbers, machine.borne_amplitudes()
-    high, low = (
-        speed_curves(machine, LD, eps, case=f"alpha = {a:g}", overrides={"alpha": a})
-        for a in (p.alpha, p.alpha_low)
-    )
-    return [*high, *low, *speed_curves(machine, RR, eps, case="RR")]
+    p = machine.numbers
+    two = {f"alpha = {alpha:g}": (LD, {"alpha": alpha}) for alpha in (p.alpha, p.alpha_low)}
+    return curves_of_laws(machine, {**two, "RR": (RR, {})})
 
 
 #: Linker-Dieterich with two coefficients, and Rice-Ruina to hold it against.
 figure_9 = CurveFigure("figure-09", curves_9)
 
 
-def curves_11(machine: Machine) -> list[FigureCurve]:
-    """The elasto-plastic law against eps_eff."""
-    return elastic_curves(machine, machine.borne_amplitudes())
-
-
 #: The elasto-plastic law, what the uncertainties make of it, and inertia.
-figure_11 = CurveFigure("figure-11", curves_11)
+figure_11 = CurveFigure(
+    "figure-11", lambda machine: elastic_curves(machine, machine.borne_amplitudes())
+)
 
 
 def law_curves(machine: Machine) -> list[FigureCurve]:
     """Three laws at both velocities."""
-    eps, alpha = machine.borne_amplitudes(), {"alpha": float(machine.numbers.alpha)}
-    return [
-        *speed_curves(machine, RR, eps, case="RR"),
-        *speed_curves(machine, LD, eps, case="LD", overrides=alpha),
-        *speed_curves(machine, EXT, eps, case="EXT"),
-    ]
+    alpha = {"alpha": float(machine.numbers.alpha)}
+    return curves_of_laws(machine, {"RR": (RR, {}), "LD": (LD, alpha), "EXT": (EXT, {})})
 
 
 #: The three laws on common axes, which the head of the report shows.
@@ -238,18 +152,10 @@ law_figure = CurveFigure("figure-16", law_curves)
 def phase_curves(machine: Machine) -> list[FigureCurve]:
     """Three laws, and the elasto-plastic one with the mass, at both velocities."""
     eps = machine.borne_amplitudes()
-    moving = speed_curves(machine, EXT, eps, case=with_inertia("EXT"), inertia=True)
+    moving = speed_curves(machine, EXT, eps, case="EXT, inertia", inertia=True)
     return [*law_curves(machine), *moving]
 
 
-@curve_figure("figure-14", phase_curves)
-def phase_figure(machine: Machine, read: FigureNumbers) -> tuple[Numbers, Numbers]:
-    """Phases against eps_eff, by law and velocity.
-
-    The paper measures amplitudes with a lock-in amplifier, which gives the phases as well.
-    """
-    return {
-        f"{column} {curve}": float(np.degrees(read.at(curve, column, machine.strongest, BORNE)))
-        for curve in read.data["curve"].unique()
-        for column in ("phase1", "phase2")
-    }, {}
+#: Phases against eps_eff, by law and velocity: the paper measures amplitudes with a lock-in
+#: amplifier, which gives the phases as well.
+phase_figure = CurveFigure("figure-14", phase_curves)

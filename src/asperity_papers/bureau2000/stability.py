@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from scipy.optimize import elementwise
 
 import asperity as asp
 from asperity.ledger import FigureNumbers
-from asperity_papers.bureau2000.curves import BORNE, FigureCurve, curve_figure, speed_curves
-from asperity_papers.bureau2000.machine import (
-    EXT,
-    LD,
-    RR,
-    SPEEDS,
-    Float,
-    Machine,
-    steady_multiplier,
-)
+from asperity_papers.bureau2000.curves import BORNE, CurveFigure, curves_of_laws
+from asperity_papers.bureau2000.machine import EXT, LD, RR, SPEEDS, Float, Machine
 
 
 def variants(machine: Machine) -> dict[str, tuple[str, dict[str, float]]]:
@@ -29,16 +23,6 @@ def variants(machine: Machine) -> dict[str, tuple[str, dict[str, float]]]:
         f"LD {p.alpha_low:g}": (LD, {"alpha": p.alpha_low}),
         "EXT": (EXT, {}),
     }
-
-
-def log_multiplier(machine: Machine, variant: str, V: Float, epsilon: Float) -> Float:
-    """Real part of the logarithm of the leading multiplier; NaN where not solved."""
-    law, overrides = variants(machine)[variant]
-    response = asp.periodic_response(
-        machine.slider(law, **overrides), velocity=V, epsilon=epsilon,
-        frequency=machine.numbers.frequency,
-    )  # fmt: skip
-    return np.where(response.converged, response.log_multipliers[..., 0].real, np.nan)
 
 
 def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, Float]) -> Float:
@@ -59,40 +43,32 @@ def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, F
     array, shape (n,)
         NaN where the multiplier does not cross 1 between them.
     """
-    root = elementwise.find_root(
-        lambda epsilon, V: log_multiplier(machine, variant, V, epsilon), bracket, args=(V,)
-    )
+    law, overrides = variants(machine)[variant]
+    slider, frequency = machine.slider(law, **overrides), machine.numbers.frequency
+
+    def log_multiplier(epsilon: Float, V: Float) -> Float:
+        r = asp.periodic_response(slider, velocity=V, epsilon=epsilon, frequency=frequency)
+        return np.where(r.converged, r.log_multipliers[..., 0].real, np.nan)
+
+    root = elementwise.find_root(log_multiplier, bracket, args=(V,))
     return np.where(root.success, root.x, np.nan)
 
 
-def floquet_curves(machine: Machine) -> list[FigureCurve]:
-    """The laws of `variants` at both velocities."""
-    eps = machine.borne_amplitudes()
-    return [
-        curve
-        for name, (law, overrides) in variants(machine).items()
-        for curve in speed_curves(machine, law, eps, case=name, overrides=overrides)
-    ]
-
-
-@curve_figure("figure-12", floquet_curves)
-def floquet_figure(
-    machine: Machine, read: FigureNumbers
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Stability against eps_eff, by law and velocity, with the thresholds."""
-    V, rigid = np.array(machine.velocities), machine.slider(RR)
-    scalars = {"K_over_Kc": machine.stiffness_ratio}
-    for speed in V:
-        steady = steady_multiplier(rigid, speed, machine.numbers.frequency)
-        scalars[f"steady {speed:.0e}"] = float(steady)
+def _threshold(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
+    """Amplitude at which modulation makes sliding stable, by curve."""
+    crossed: dict[str, float] = {}
     for variant in variants(machine):
-        low, high = np.array([_bracket(read.curve(f"{variant}, {name}")) for name in SPEEDS]).T
-        crossed = thresholds(machine, variant, V, (low, high))
-        for name, value in zip(SPEEDS, crossed, strict=True):
-            scalars[f"threshold {variant}, {name}"] = float(value)
-    start = read.data.drop_duplicates("curve")
-    starts = zip(start["curve"], start["floquet_max"], strict=True)
-    return scalars, {f"start {curve}": float(value) for curve, value in starts}
+        curves = [f"{variant}, {speed}" for speed in SPEEDS]
+        low, high = np.array([_bracket(read.curve(curve)) for curve in curves]).T
+        found = thresholds(machine, variant, np.array(machine.velocities), (low, high))
+        crossed |= dict(zip(curves, found, strict=True))
+    return {"threshold": crossed.__getitem__}
+
+
+#: Stability against eps_eff, by law and velocity, with the thresholds.
+floquet_figure = CurveFigure(
+    "figure-12", lambda machine: curves_of_laws(machine, variants(machine)), _threshold
+)
 
 
 def _bracket(rows: pd.DataFrame) -> tuple[float, float]:

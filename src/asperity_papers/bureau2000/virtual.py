@@ -8,19 +8,27 @@ the same reading that a laboratory's recordings get, next to the model's lines.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from importlib.resources import files
-from typing import TypeAlias
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 import asperity as asp
-from asperity.ledger import FigureNumbers, fill, rich, table
+from asperity.ledger import (
+    FigureNumbers,
+    fill,
+    formula_value,
+    printed_numbers,
+    rich,
+    table,
+)
 from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
-from asperity_papers.bureau2000.machine import EXT, SLOW, SPEEDS, Float
+from asperity_papers.bureau2000.machine import EXT, PAPER, SPEEDS, Float
 from asperity_papers.bureau2000.recordings import (
     PRINTED,
     QUANTITIES,
@@ -34,8 +42,28 @@ from asperity_papers.bureau2000.response_figures import AIR, VACUUM, velocity_ax
 
 #: Half a 95 % interval, in standard uncertainties.
 NORMAL = 1.96
-#: Value, standard uncertainty, and the model's value.
-Read: TypeAlias = tuple[float, float, float]
+
+
+class Read(NamedTuple):
+    """A number read off independent points: value, standard uncertainty, and the model's value."""
+
+    value: float
+    uncertainty: float
+    model: float
+
+    def __neg__(self) -> Read:
+        return Read(-self.value, self.uncertainty, -self.model)
+
+    def __sub__(self, other: Read) -> Read:
+        spread = float(np.hypot(self.uncertainty, other.uncertainty))
+        return Read(self.value - other.value, spread, self.model - other.model)
+
+    def __truediv__(self, other: Read | float) -> Read:
+        if not isinstance(other, Read):
+            return Read(*(number / other for number in self))
+        value = self.value / other.value
+        spread = np.hypot(self.uncertainty / self.value, other.uncertainty / other.value)
+        return Read(value, abs(value) * float(spread), self.model / other.model)
 
 
 @dataclass(frozen=True)
@@ -92,18 +120,6 @@ def _of(points: pd.DataFrame, series: str) -> pd.DataFrame:
     return points[points["series"] == series]
 
 
-def last_point(points: pd.DataFrame, series: str, name: str) -> Read:
-    """Value, uncertainty and model of a quantity at a series' largest amplitude."""
-    row = _of(points, series).iloc[-1]
-    return float(row[name]), float(row[f"{name}_uncertainty"]), float(row[f"{name}_model"])
-
-
-def ratio(a: Read, b: Read) -> Read:
-    """Value, uncertainty and model of a quotient of two independent quantities."""
-    value = a[0] / b[0]
-    return value, abs(value) * float(np.hypot(a[1] / a[0], b[1] / b[0])), a[2] / b[2]
-
-
 def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
     """Points with the model's values, from the operating points of the lines.
 
@@ -114,9 +130,7 @@ def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
     """
     where = ["V", "frequency", "epsilon_eff"]
     same = np.all(
-        [np.isclose(points[[n]].to_numpy(), lines[n], rtol=1e-9, atol=1e-12) for n in where[1:]]
-        + [np.isclose(points[["V"]].to_numpy(), lines["V"], rtol=1e-9, atol=0)],
-        axis=0,
+        [np.isclose(points[[n]].to_numpy(), lines[n], rtol=1e-9, atol=1e-12) for n in where], axis=0
     )
     for row in np.flatnonzero(~same.any(axis=1)):
         V, f, epsilon = points[where].iloc[row]
@@ -127,101 +141,84 @@ def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
     return points.assign(**model)[list(WORDS.point_column)]
 
 
-def _over_amplitude(
-    readings: SimulatedPoints, series: tuple[Series, ...]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The model's lines of some series, with the machine's parameters, and their points."""
-    eps, overrides = PRINTED.applied_amplitudes(), {"B": state_coefficient()}
-    lines = solve_curves(
-        PRINTED,
-        (
-            FigureCurve(
-                one.name, EXT, one.velocity, eps, abs(one.transfer), one.frequency, overrides
-            )
-            for one in series
-        ),
-    )
-    return lines, with_model(pd.concat([readings[one.name] for one in series]), lines)
+def over_amplitude(name: str, names: Sequence[str], readings: SimulatedPoints) -> VirtualFigure:
+    """A figure of some series against eps."""
+    series = tuple(one for one in all_series() if one.name in names)
+    eps = PRINTED.applied_amplitudes()
+    curves = [
+        FigureCurve(one.name, EXT, one.velocity, eps, abs(one.transfer), one.frequency)
+        for one in series
+    ]
+    return _figure(name, series, curves, pd.concat([readings[one.name] for one in series]))
 
 
-def _figure(
-    name: str,
-    lines: pd.DataFrame,
-    points: pd.DataFrame,
-    series: tuple[Series, ...],
-    reads: Mapping[str, Read],
-    quoted: Mapping[str, float],
-    **slopes: float,
-) -> VirtualFigure:
-    recovered = tuple(
-        RecoveredQuantity(what, *reads[key], stated)
-        for key, (what, stated) in recovered_words()[name].items()
-    )
-    scalars = {
-        f"{quantity.what}, {part}": getattr(quantity, part)
-        for quantity in recovered
-        for part in ("value", "uncertainty", "true_value")
-    }
-    numbers = figure_numbers(PRINTED, name, lines, scalars | slopes, quoted=quoted, points=points)
-    return VirtualFigure(numbers, series, recovered)
-
-
-@cache
-def recovered_words() -> dict[str, dict[str, tuple[str, str]]]:
-    """Words of each recovered number, and what the paper states of it, by figure and number."""
-    file = files(__package__).joinpath("recovered.toml")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
-
-
-def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
-    """Change of the mean against eps, at two velocities."""
-    pair = all_series()[:2]
-    lines, points = _over_amplitude(readings, pair)
-    drops, still = (
-        [last_point(points, name, column) for name in SPEEDS]
-        for column in ("delta_mu", "static_friction")
-    )
-    reads, quoted = {"fast over slow": ratio(drops[1], drops[0])}, {"strongest": drops[0][0]}
-    for name, drop, F0 in zip(SPEEDS, drops, still, strict=True):
-        value, sigma, true_value = ratio(drop, F0)
-        reads[f"share, {name}"] = -value, sigma, -true_value
-        quoted |= {f"drop, {name}": -value, f"bar, {name}": NORMAL * sigma}
-    weak = _of(points, SLOW).iloc[0]
-    quoted |= {
-        "weakest": weak["delta_mu"],
-        "bar of the weakest": NORMAL * weak["delta_mu_uncertainty"],
-    }
-    return _figure("virtual-02", lines, points, pair, reads, quoted)
-
-
-def virtual_3(readings: SimulatedPoints) -> VirtualFigure:
+def over_velocity(readings: SimulatedPoints) -> VirtualFigure:
     """Mean against V for four amplitudes."""
     at_120_hz = (one for one in all_series() if one.frequency == PRINTED.numbers.frequency)
     series = tuple(sorted(at_120_hz, key=lambda one: one.velocity))
     amplitudes = PRINTED.numbers["epsilon_figure3"].si_values or ()
     V, share = velocity_axis(PRINTED), abs(series[0].transfer)
-    overrides = {"B": state_coefficient()}
-    lines = solve_curves(
-        PRINTED,
-        (FigureCurve(f"eps = {e:g}", EXT, V, e, share, overrides=overrides) for e in amplitudes),
-    )
+    curves = [FigureCurve(f"eps = {e:g}", EXT, V, e, share) for e in amplitudes]
     tables = [
         rows
         for one in (readings[series_.name] for series_ in series)
         for rows in (_still(one), one[one["epsilon_set"].isin(amplitudes)])
     ]
-    points = with_model(pd.concat(tables, ignore_index=True), lines)
-    slopes = {e: _slope(points[points["epsilon_set"] == e]) for e in amplitudes}
-    still, strong = slopes[min(slopes)], slopes[max(slopes)]
-    change = strong[0] - still[0], float(np.hypot(strong[1], still[1])), strong[2] - still[2]
-    quoted = {
-        "change": change[0],
-        "bar of the change": NORMAL * change[1],
-        "change of the model": change[2],
+    return _figure("virtual-03", series, curves, pd.concat(tables, ignore_index=True))
+
+
+def _figure(
+    name: str, series: tuple[Series, ...], curves: Sequence[FigureCurve], points: pd.DataFrame
+) -> VirtualFigure:
+    """A figure of points, with the model's lines and the numbers of its formulas."""
+    overrides = {"B": state_coefficient()}
+    lines = solve_curves(PRINTED, (replace(curve, overrides=overrides) for curve in curves))
+    points = with_model(points, lines)
+    terms, printed = _terms(series, points), printed_numbers(PRINTED.numbers)
+    recovered = []
+    for formula, what, stated in recovered_words()[name]:
+        value, uncertainty, true_value = (
+            formula_value(f"{part}({formula})", printed, f"recovered.{name}", PRINTED.terms | terms)
+            for part in Read._fields
+        )
+        recovered.append(RecoveredQuantity(what, value, uncertainty, true_value, stated))
+    scalars = {
+        f"{quantity.what}, {part}": getattr(quantity, part)
+        for quantity in recovered
+        for part in ("value", "uncertainty", "true_value")
     }
-    named = {f"slope_{e:g}": slope[0] for e, slope in slopes.items()}
-    reads = {"slope": still, "change": change}
-    return _figure("virtual-03", lines, points, series, reads, quoted, **named)
+    numbers = figure_numbers(PRINTED, name, lines, scalars, points=points, terms=terms)
+    return VirtualFigure(numbers, series, tuple(recovered))
+
+
+def _terms(series: tuple[Series, ...], points: pd.DataFrame) -> dict[str, Any]:
+    """Names for formulas of what is read off the points."""
+    shares = {one.name: abs(one.transfer) for one in series}
+
+    def read(name: str, column: str, row: float = -1) -> Read:
+        """A quantity of a series, by default at its largest amplitude."""
+        at = _of(points, name).iloc[int(row)]
+        return Read(*(float(at[f"{column}{part}"]) for part in ("", "_uncertainty", "_model")))
+
+    def factor() -> Read:
+        return Read(*collapse(_of(points, VACUUM), _of(points, AIR)), shares[AIR] / shares[VACUUM])
+
+    return {
+        **{name: name for name in QUANTITIES},
+        "read": read,
+        "slope_of": lambda epsilon: _slope(points[points["epsilon_set"] == epsilon]),
+        "factor": factor,
+        "share_of": shares.get,
+        **{part: attrgetter(part) for part in Read._fields},
+        "bar": lambda number: NORMAL * number.uncertainty,
+    }
+
+
+@cache
+def recovered_words() -> dict[str, list[tuple[str, str, str]]]:
+    """Formula and words of each recovered number, and what the paper states of it, by figure."""
+    file = files(__package__).joinpath("recovered.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def _still(rows: pd.DataFrame) -> pd.DataFrame:
@@ -247,49 +244,7 @@ def _slope(rows: pd.DataFrame) -> Read:
     value, sigma, model = (
         rows[f"mean_friction{name}"].to_numpy() for name in ("", "_uncertainty", "_model")
     )
-    return float(share @ value), float(np.sqrt(share**2 @ sigma**2)), float(share @ model)
-
-
-def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
-    """First and second harmonic against eps, at two velocities."""
-    pair = all_series()[:2]
-    lines, points = _over_amplitude(readings, pair)
-    first, second = (
-        [last_point(points, name, column) for name in SPEEDS] for column in ("mu1", "mu2")
-    )
-    slow = _of(points, SLOW)
-    plateau = float(slow["epsilon_eff"].iloc[-1]) * PRINTED.elastic_slope(pair[0].velocity)
-    reads = {
-        "mu1, fast over slow": ratio(first[1], first[0]),
-        "mu2, fast over slow": ratio(second[1], second[0]),
-        "over plateau": (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau),
-    }
-    quoted: dict[str, float] = {}
-    for name, mu1, mu2 in zip(SPEEDS, first, second, strict=True):
-        reads |= {f"mu1, {name}": mu1, f"ratio, {name}": ratio(mu2, mu1)}
-        quoted |= {
-            f"mu1, {name}": mu1[0], f"bar, {name}": NORMAL * mu1[1],
-            f"ratio, {name}": mu2[0] / mu1[0],
-        }  # fmt: skip
-    return _figure("virtual-04", lines, points, pair, reads, quoted)
-
-
-def virtual_5(readings: SimulatedPoints) -> VirtualFigure:
-    """Change of the mean in air and in vacuum, and the factor that makes them one curve."""
-    p = PRINTED.numbers
-    pair = tuple(one for one in all_series() if one.frequency == p.frequency_vacuum)
-    lines, points = _over_amplitude(readings, pair)
-    factor, sigma = collapse(_of(points, VACUUM), _of(points, AIR))
-    vacuum, air = (abs(one.transfer) for one in pair)
-    quoted = {
-        "factor": factor,
-        "bar of the factor": NORMAL * sigma,
-        "factor of the machine": air / vacuum,
-        **{f"share, {name}": share for name, share in ((VACUUM, vacuum), (AIR, air))},
-        **{f"drop, {n}": last_point(points, n, "delta_mu")[0] for n in (VACUUM, AIR)},
-    }
-    reads = {"factor": (factor, sigma, air / vacuum)}
-    return _figure("virtual-05", lines, points, pair, reads, quoted)
+    return Read(float(share @ value), float(np.sqrt(share**2 @ sigma**2)), float(share @ model))
 
 
 def collapse(vacuum: pd.DataFrame, air: pd.DataFrame) -> tuple[float, float]:
@@ -329,10 +284,10 @@ def collapse(vacuum: pd.DataFrame, air: pd.DataFrame) -> tuple[float, float]:
 
 #: What makes each figure out of the experiment, in the order of the paper.
 VIRTUAL: tuple[Callable[[SimulatedPoints], VirtualFigure], ...] = (
-    virtual_2,
-    virtual_3,
-    virtual_4,
-    virtual_5,
+    partial(over_amplitude, "virtual-02", SPEEDS),
+    over_velocity,
+    partial(over_amplitude, "virtual-04", SPEEDS),
+    partial(over_amplitude, "virtual-05", (VACUUM, AIR)),
 )
 
 
@@ -358,11 +313,8 @@ def introduction(figures: Sequence[VirtualFigure]) -> str:
         "resonance": PRINTED.contact_resonance,
     }
     texts = (fill(t, numbers, "section.experiment") for t in WORDS.section["experiment"].before)
-    bold = {"&lt;b&gt;": "<b>", "&lt;/b&gt;": "</b>"}
     page = "".join(f"<p>{rich(text)}</p>" for text in texts)
-    for escaped, tag in bold.items():
-        page = page.replace(escaped, tag)
-    return page
+    return page.replace("&lt;b&gt;", "<b>").replace("&lt;/b&gt;", "</b>")
 
 
 def _within(figure: VirtualFigure) -> np.ndarray:
@@ -396,26 +348,14 @@ def _cells(quantity: RecoveredQuantity) -> tuple[str, ...]:
     return tuple(map(rich, texts))
 
 
-def provenance(
-    figure: VirtualFigure, place: str, what: str, parameters: Sequence[str]
-) -> list[str]:
-    """What the first lines of a CSV say.
-
-    Parameters
-    ----------
-    figure : VirtualFigure
-    place : str
-        Place of the figure in the report.
-    what : str
-        The table: of the points or of the lines.
-    parameters : sequence of str
-        Lines on the numbers that the models were given.
-    """
+def provenance(figure: VirtualFigure, what: str) -> list[str]:
+    """What the first lines of a CSV say: `what` it has, points or lines, and how it was made."""
     runs = [
         f"  {s.name}, {s.frequency:g} Hz: seeds {', '.join(map(str, s.seeds))}; eps_eff/eps "
         f"{abs(s.transfer):.6g}; sliding {s.sliding:.4g} s, modulated {s.modulated:.4g} s"
         for s in figure.series
     ]
+    place = WORDS.figures[figure.numbers.name].place
     return [
         f"SIMULATED, {what} of {place}: a virtual experiment; no measured points",
         "after the protocol of Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810 (2000)",
@@ -424,7 +364,7 @@ def provenance(
         "runs (seed: noise of the sensors, drift of the gauge; the motion is the same):",
         *runs,
         "parameters, where nothing above says otherwise (kind in brackets):",
-        *parameters,
+        *PAPER.parameter_lines(),
         "read off the points:",
         *(f"  {name} = {value:.12g}" for name, value in figure.numbers.scalars.items()),
     ]

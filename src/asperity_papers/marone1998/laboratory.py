@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,14 @@ def scans() -> dict[str, Any]:
     return tomllib.loads(files(__package__).joinpath("scans.toml").read_text(encoding="utf-8"))
 
 
+def scan(figure: str, name: str, *index: float) -> Any:
+    """A reading of a printed figure."""
+    reading = scans()[figure][name]
+    for n in index:
+        reading = reading[int(n)]
+    return reading
+
+
 class Laboratory:
     """The interfaces of Figures 2, 3 and 5 with the paper's numbers.
 
@@ -47,6 +55,9 @@ class Laboratory:
     ----------
     numbers : Material
     """
+
+    #: Names for formulas of claims.toml.
+    terms: ClassVar = {"scan": scan}
 
     def __init__(self, numbers: Material) -> None:
         self.numbers = numbers

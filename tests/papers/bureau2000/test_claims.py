@@ -29,7 +29,7 @@ from asperity.ledger.claims import computed_numbers, headlines
 from asperity.ledger.contents import HeadlineWords
 from asperity_papers.bureau2000 import checks
 from asperity_papers.bureau2000.checks import features, perturbation
-from asperity_papers.bureau2000.machine import APPLIED, EXT, Machine
+from asperity_papers.bureau2000.machine import APPLIED, EXT, Law, Machine
 
 pytestmark = pytest.mark.slow
 
@@ -200,7 +200,7 @@ def test_the_curves_reach_the_amplitude_of_the_saturation_claim():
 
 
 def test_features_are_judged_as_their_claims_are(claims, model):
-    lacking = features.missed(features.over_the_range(model, EXT))
+    lacking = features.missed(model, Law(EXT))
     for name, key in features.CLAIMS.items():
         assert (name in lacking) == (claims[key].verdict != "reproduced"), name
 
@@ -318,20 +318,20 @@ def test_a_derivation_that_was_wrong_would_be_no_misprint(model, monkeypatch):
 
 
 def test_a_wrong_model_would_turn_the_verdicts_on_the_measurements(model):
-    right = model.outputs(EXT)
-    wrong = replace(right, mu1=(right.mu1[0] / 30, right.mu1[1]))
-    changed = Machine(model.numbers)
-    changed.terms["mu1"] = lambda law, speed: wrong.mu1[speed]
+    changed, right = Machine(model.numbers), model.terms["mu1"]
+    # The first harmonic at 1 um/s is 30 times smaller.
+    changed.terms["mu1"] = lambda law, speed, *eps: right(law, speed, *eps) / (1 if speed else 30)
     for name in ("mu1-order", "drop-over-mu1"):
         assert _one(name, changed).verdict == "differs"
-    lacking = features.missed(features.at_strongest(wrong))
+    strongest = Law(EXT, strongest=True)
+    lacking = features.missed(changed, strongest)
     assert {"mu1", "mu1 against V", "drop over mu1", "mu2 over mu1"} <= set(lacking)
-    assert features.missed(features.at_strongest(right)) == []
+    assert features.missed(model, strongest) == []
 
 
 def test_inertia_that_was_negligible_would_be_reproduced(model):
     changed = Machine(model.numbers)
-    changed.inertial_outputs = lambda: changed.outputs(EXT)
+    changed.terms["EXT_inertia"] = Law(EXT)
     assert _one("inertia-negligible-elastic", changed).verdict == "reproduced"
 
 

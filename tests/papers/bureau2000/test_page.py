@@ -8,6 +8,7 @@ import pytest
 from asperity.figures.style import save_picture, style
 from asperity.ledger import Claim, FigureNumbers, Section, find_paper
 from asperity.ledger.page import build_page
+from asperity_papers.bureau2000 import schematics
 from asperity_papers.bureau2000.figures import SCHEMATICS
 
 WIDTHS = (390, 800, 1400)
@@ -34,13 +35,13 @@ def address(tmp_path_factory):
     shown = [paper.words.figure(FigureNumbers(n, pd.DataFrame()), {}) for n in SCHEMATICS]
     (folder / "figures").mkdir()
     with style():
-        for name, draw in SCHEMATICS.items():
-            save_picture(draw(), folder / "figures" / name)
+        for name in SCHEMATICS:
+            save_picture(schematics.draw(name), folder / "figures" / name)
     found = claims(paper)
     sections = [(Section("figures", "Figures", ()), shown)]
     # The head shows the figures that need no computation.
     first, *others = paper.contents.summary
-    summary = (first.model_copy(update={"figures": tuple(SCHEMATICS)}), *others)
+    summary = (first.model_copy(update={"figures": SCHEMATICS}), *others)
     with pytest.MonkeyPatch.context() as patch:
         contents = paper.contents.model_copy(update={"summary": summary})
         patch.setitem(vars(paper), "contents", contents)

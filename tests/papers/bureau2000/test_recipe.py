@@ -116,6 +116,18 @@ def test_later_steps_carry_the_errors_of_the_earlier_ones(exact, recovered):
     assert shifted == pytest.approx(np.sqrt(rest.se**2 - rest.se_own**2), rel=0.3)
 
 
+def test_the_reference_velocity_moves_mu0_alone(exact, recovered):
+    columns, bifurcations = exact
+    thresholds = Thresholds("bifurcations", **bifurcations)
+    moved = paper_procedure(table_of(columns), thresholds, fixed=MACHINE | {"V0": "10 um/s"})
+    weakening = TRUTH["B"] - TRUTH["A"]
+    mu0 = moved.numbers["mu0"]
+    assert mu0.value == pytest.approx(TRUTH["mu0"] - weakening * np.log(10), rel=1e-5)
+    assert (mu0.published, mu0.deviation) == (None, None)
+    for name in ("A", "B", "D0", "eps_ratio", "lambda"):
+        assert moved.numbers[name].value == pytest.approx(recovered.numbers[name].value, rel=1e-5)
+
+
 def test_the_bound_on_alpha_is_weaker_without_that_share(recovered):
     numbers = recovered.numbers
     assert 0 < numbers["alpha"].upper_limit_95 < 0.05

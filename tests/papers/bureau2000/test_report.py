@@ -18,7 +18,7 @@ from asperity.figures.style import save_picture, style
 from asperity.ledger import Claim, Headline, Paper, Sensitivity, find_paper, reproduce, rich
 from asperity.ledger.contents import SummaryWords
 from asperity.outputs import written_folder
-from asperity_papers.bureau2000 import figures as report_sections
+from asperity_papers.bureau2000 import figures as report_sections, schematics
 from asperity_papers.bureau2000.curves import WORDS as FIGURE_WORDS
 from asperity_papers.bureau2000.figures import SCHEMATICS
 from asperity_papers.bureau2000.recordings import all_series
@@ -338,7 +338,7 @@ def test_a_second_report_has_the_same_bytes(tmp_path):
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
         with style():
-            written = [save_picture(draw(), folder / n) for n, draw in SCHEMATICS.items()]
+            written = [save_picture(schematics.draw(n), folder / n) for n in SCHEMATICS]
         contents.append([path.read_bytes() for pair in written for path in pair])
     assert contents[0] == contents[1]
 

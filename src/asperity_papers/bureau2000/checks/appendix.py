@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from asperity.air import (
-    NormalContact,
     bessel_ratio,
-    mindlin_length_ratio,
     shear_viscosity_ratio,
 )
 from asperity.ledger import check
@@ -27,39 +25,6 @@ def only_fitting_parameter(machine: Machine) -> Mixed:
     p = machine.numbers
     fitted = [n for n in ("A", "B", "D0", "lambda", "transmission") if p[n].kind == "fitted"]
     return {"fitted": len(fitted), "names": " and ".join(fitted)}
-
-
-def _contact(machine: Machine) -> NormalContact:
-    return NormalContact(W0=machine.numbers.W0, lambda_z=machine.numbers.lambda_z)
-
-
-@check("normal-stiffness")
-def normal_stiffness(machine: Machine) -> Numbers:
-    contact, p = _contact(machine), machine.numbers
-    step = 1e-6 * p.lambda_z
-    slope = float(contact.load(step) - contact.load(-step)) / (2 * step)
-    return {"printed": p.W0 / p.lambda_z, "independent": slope}
-
-
-@check("restoring-force-sign")
-def restoring_force_sign(machine: Machine) -> Numbers:
-    p = machine.numbers
-    closure = 0.01 * p.lambda_z
-    downwards = p.W0 - float(_contact(machine).load(closure))
-    return {"printed": p.W0 * -closure / p.lambda_z, "independent": downwards}
-
-
-@check("length-ratio")
-def length_ratio(machine: Machine) -> Numbers:
-    ratio = float(mindlin_length_ratio(machine.numbers.poisson_ratio))
-    return {"nu = 0.44": ratio, "nu = 1/2": float(mindlin_length_ratio(0.5))}
-
-
-@check("measured-lambda")
-def measured_lambda(machine: Machine) -> Mixed:
-    p = machine.numbers
-    lengths = {"measured": str(p["lambda_quasi_static"]), "fitted": str(p["lambda"])}
-    return {"quasi-static": p.lambda_quasi_static, **lengths}
 
 
 # --- The formulas of the air layer, Eqs. (35) to (40) --------------------------------------------
@@ -107,12 +72,6 @@ def pressure_force(machine: Machine) -> Numbers:
     }
 
 
-@check("elastic-limit")
-def elastic_limit(machine: Machine) -> Numbers:
-    value = complex(bessel_ratio(1e6))
-    return {"difference": abs(value + 1), "real": value.real, "imaginary": value.imag}
-
-
 @check("viscous-limit")
 def viscous_limit(machine: Machine) -> Numbers:
     p, layer = machine.numbers, machine.air_layer(R=1e-4)
@@ -141,14 +100,6 @@ def spring_and_damper(machine: Machine) -> Numbers:
     }
 
 
-@check("equation-of-motion-sign")
-def equation_of_motion_sign(machine: Machine) -> Numbers:
-    p, epsilon = machine.numbers, 0.01
-    closure = float(_contact(machine).closure(p.W0 * (1 + epsilon)))
-    printed = epsilon * p.lambda_z
-    return {"printed": printed, "derived": -printed, "independent": -closure}
-
-
 @check("borne-fraction-formula")
 def borne_fraction_formula(machine: Machine) -> Numbers:
     p, omega = machine.numbers, 2 * np.pi * machine.numbers.frequency
@@ -160,27 +111,7 @@ def borne_fraction_formula(machine: Machine) -> Numbers:
     return {"printed": printed, "independent": float(independent)}
 
 
-@check("pressure-equation-gap")
-def pressure_equation_gap(machine: Machine) -> Numbers:
-    p = machine.numbers
-    narrowest = p.h0 - machine.strongest * p.lambda_z
-    printed, derived = (h**2 / (12 * p.eta_air) for h in (narrowest, p.h0))
-    # Poiseuille's mass flow over rho0 h0, per pressure gradient, at vanishing amplitude.
-    gap, pressure, gradient = p.h0 * (1 - 1e-9), p.P0 * (1 + 1e-9), 1e-3
-    mass_flow = pressure / p.P0 * gap**3 / (12 * p.eta_air) * gradient
-    independent = mass_flow / (p.h0 * gradient)
-    shares = {"printed over it": printed / independent, "derived over it": derived / independent}
-    return {"printed": printed, "derived": derived, "independent": independent, **shares}
-
-
 # --- Stiffnesses, the borne fraction at 120 Hz, the shear of the air -----------------------------
-
-
-@check("squeeze-number")
-def squeeze_number(machine: Machine) -> Numbers:
-    layer = machine.air_layer()
-    value = complex(layer.gamma(2 * np.pi * machine.numbers.frequency) * layer.R)
-    return {"real": value.real, "imaginary": -value.imag}
 
 
 def _two_forces(machine: Machine) -> float:
@@ -214,10 +145,3 @@ def shear_negligible(machine: Machine) -> Numbers:
 
 
 # --- The control experiment in vacuo, and the patch of contacts ----------------------------------
-
-
-@check("vacuum-mean-free-path")
-def vacuum_mean_free_path(machine: Machine) -> Numbers:
-    p = machine.numbers
-    layer = machine.air_layer(P0=p.P_vacuum, temperature=p.gas_temperature)
-    return {"mean free path": float(layer.mean_free_path), "over the gap": float(layer.knudsen)}

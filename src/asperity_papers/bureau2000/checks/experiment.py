@@ -10,23 +10,16 @@ import numpy as np
 from scipy.optimize import brentq
 
 from asperity.air import NormalContact
-from asperity.ledger import check
-from asperity.orbit import PeriodicResponse
+from asperity.ledger import altered, check
 from asperity.theory import closed_forms as cf
+from asperity.units import from_si
 from asperity_papers.bureau2000.machine import (
     APPLIED,
     EXT,
-    LD,
-    READ,
-    RR,
-    SPEEDS,
     STRONGEST,
     Float,
     Machine,
-    Pair,
-    at,
     by_speed,
-    relative,
 )
 
 Numbers = dict[str, float]
@@ -35,53 +28,21 @@ Numbers = dict[str, float]
 # --- II.A: the machine, and the steadiness of sliding --------------------------------------------
 
 
-@check("away-from-resonance")
-def away_from_resonance(machine: Machine) -> Numbers:
-    p = machine.numbers
-    stiffness = {"spring": p.K, "tangential": p.W0 / p.lambda_, "normal": p.W0 / p.lambda_z}
-    hertz = {name: float(np.sqrt(k / p.M) / (2 * np.pi)) for name, k in stiffness.items()}
-    distance = {
-        f"{f:g} Hz": min(abs(f / resonance - 1) for resonance in hertz.values())
-        for f in (p.frequency, p.frequency_vacuum)
-    }
-    return distance | hertz
-
-
 @check("no-stick-slip-under-modulation")
 def no_stick_slip(machine: Machine) -> Numbers:
     Kc = float(cf.critical_stiffness(machine.small_modulation(machine.velocities[0])))
-    K = machine.numbers["K"].model_copy(
-        update={"value": Kc, "unit": machine.numbers["K"].si_unit, "uncertainty": None}
-    )
-    critical = Machine(
-        machine.numbers.model_copy(update={"numbers": {**machine.numbers.numbers, "K": K}})
-    )
-    multiplier = critical.curve(EXT).floquet_max
-    worst = {
-        name: max(at(multiplier, eps)[k] for eps in APPLIED if eps <= STRONGEST)
-        for k, name in enumerate(SPEEDS)
-    }
-    stable_from = by_speed(stabilising_amplitude(machine.curve(EXT)), "stable from, ")
-    return {**worst, "largest": max(worst.values()), **stable_from}
-
-
-def stabilising_amplitude(r: PeriodicResponse) -> Pair:
-    """Applied amplitude at which the leading multiplier of a curve enters the unit circle."""
-    # The logarithm falls with eps; np.interp wants its abscissae to rise.
-    slow, fast = (float(np.interp(0.0, row[::-1], APPLIED[::-1])) for row in np.log(r.floquet_max))
-    return slow, fast
+    K = from_si(Kc, machine.numbers["K"].unit, "stiffness")
+    critical = Machine(altered(machine.numbers, {"K": float(K)}))
+    judged = APPLIED.index(STRONGEST) + 1
+    worst = by_speed(critical.curve(EXT).floquet_max[:, :judged].max(1))
+    # Where the leading multiplier enters the unit circle: its logarithm falls with eps, and
+    # np.interp wants its abscissae to rise.
+    logarithms = np.log(machine.curve(EXT).floquet_max)
+    entered = [np.interp(0.0, row[::-1], APPLIED[::-1]) for row in logarithms]
+    return {**worst, "largest": max(worst.values()), **by_speed(entered, "stable from, ")}
 
 
 # --- II.B.1: the mean force ----------------------------------------------------------------------
-
-
-@check("systematic-lowering")
-def systematic_lowering(machine: Machine) -> Numbers:
-    curves = [machine.curve(law).delta_mu for law in (RR, LD, EXT)]
-    return {
-        "largest delta mu": max(float(np.max(drop)) for drop in curves),
-        "largest step": max(float(np.diff(drop, axis=1).max()) for drop in curves),
-    }
 
 
 def _line(machine: Machine) -> tuple[Float, Float, Float]:
@@ -104,50 +65,6 @@ def drop_not_through_zero(machine: Machine) -> Numbers:
     slope, intercept, residual = _line(machine)
     excess = by_speed(-intercept / np.abs(residual).max(1))
     return excess | by_speed(-intercept / slope, "zero, ")
-
-
-@check("drop-velocity-independent")
-def drop_velocity_independent(machine: Machine) -> Numbers:
-    r = machine.curve(EXT)
-    amplitudes = [e for e in machine.numbers["epsilon_figure3"].si_values or () if e > 0]
-    changes = {f"eps = {e:g}": relative(at(r.delta_mu, e)) for e in amplitudes}
-    # The slope of the mean with V is that of steady sliding and what the drop adds to it.
-    slopes = {
-        f"slope, eps = {e:g}": relative_slope(at(r.mu_ss), at(r.delta_mu, e)) for e in amplitudes
-    }
-    return changes | slopes
-
-
-def relative_slope(mu_ss: Pair, delta_mu: Pair) -> float:
-    """Relative change of d mu/d ln V by the modulation, between the two velocities."""
-    return (delta_mu[1] - delta_mu[0]) / (mu_ss[1] - mu_ss[0])
-
-
-# --- II.B.2: the harmonics -----------------------------------------------------------------------
-
-
-@check("mu2-over-mu1")
-def weakly_anharmonic(machine: Machine) -> Numbers:
-    r = machine.curve(EXT)
-    ratios = {
-        f"eps = {e:g}, {name}": at(r.mu2 / r.mu1, e)[k]
-        for k, name in enumerate(SPEEDS)
-        for e in READ
-    }
-    return ratios | {"largest": max(at(r.mu2 / r.mu1, e)[1] for e in READ)}
-
-
-@check("mu1-monotonic", "mu1")
-@check("mu2-monotonic", "mu2")
-def monotonic(machine: Machine, name: str) -> Numbers:
-    return by_speed(np.diff(getattr(machine.curve(EXT), name), axis=1).min(1))
-
-
-@check("mu1-velocity-independent", "mu1")
-@check("mu2-lower-when-slow", "mu2")
-def change_with_velocity(machine: Machine, name: str) -> Numbers:
-    values = getattr(machine.curve(EXT), name)
-    return {f"eps = {e:g}": relative(at(values, e)) for e in READ}
 
 
 # --- II.B.3: the air under the slider, and the control experiment in vacuo -----------------------

@@ -9,17 +9,8 @@ from scipy.integrate import quad
 
 from asperity.laws import LinkerDieterich
 from asperity.ledger import check
-from asperity.theory import ageing_response, closed_forms as cf
-from asperity_papers.bureau2000.checks.features import at_strongest, met, missed, over_the_range
-from asperity_papers.bureau2000.machine import (
-    EXT,
-    LD,
-    RR,
-    SPEEDS,
-    STRONGEST,
-    Machine,
-    by_speed,
-)
+from asperity_papers.bureau2000.checks.features import met, missed
+from asperity_papers.bureau2000.machine import EXT, LD, RR, Law, Machine, by_speed
 
 Numbers = dict[str, float]
 Mixed = dict[str, float | str]
@@ -30,41 +21,26 @@ Mixed = dict[str, float | str]
 
 @check("abstract-must-be-extended")
 def must_be_extended(machine: Machine) -> Mixed:
-    values = over_the_range(machine, RR)
-    return {"missed": len(missed(values)), "met": met(values)}
+    return {"missed": len(missed(machine, Law(RR))), "met": met(machine, Law(RR))}
 
 
 @check("abstract-excellent-agreement")
 def excellent_agreement(machine: Machine) -> Mixed:
-    values = over_the_range(machine, EXT)
-    measured = machine.outputs(EXT, lambda_=machine.numbers.lambda_quasi_static)
+    measured = {"lambda_": machine.numbers.lambda_quasi_static}
     return {
-        "missed": len(missed(values)),
-        "met": met(values),
-        "met at 0.5": met(at_strongest(machine.outputs(EXT))),
-        "met with measured lambda": met(at_strongest(measured)),
-        "met with inertia": met(at_strongest(machine.inertial_outputs())),
+        "missed": len(missed(machine, Law(EXT))),
+        "met": met(machine, Law(EXT)),
+        "met at 0.5": met(machine, Law(EXT, strongest=True)),
+        "met with measured lambda": met(machine, Law(EXT, measured, strongest=True)),
+        "met with inertia": met(machine, Law(EXT, inertia=True)),
     }
 
 
 @check("linker-dieterich-not-better", LD, RR)
 @check("plastic-rate", RR, EXT)
 def missed_beyond(machine: Machine, law: str, other: str) -> Mixed:
-    values, others = over_the_range(machine, law), over_the_range(machine, other)
-    return {
-        "difference": len(missed(values)) - len(missed(others)),
-        law: met(values),
-        other: met(others),
-    }
-
-
-@check("quasi-stationary-limit")
-def quasi_stationary(machine: Machine) -> Numbers:
-    V, p = machine.velocities[0], machine.numbers
-    slow = 1e-2 * V / p.D0
-    elastic = ageing_response(machine.small_modulation(V, omega=slow, lambda_=p.lambda_)).transfer
-    rigid = ageing_response(machine.small_modulation(V, omega=slow)).transfer
-    return {"relative change": float(abs(elastic)) / float(abs(rigid)) - 1}
+    beyond = len(missed(machine, Law(law))) - len(missed(machine, Law(other)))
+    return {"difference": beyond, law: met(machine, Law(law)), other: met(machine, Law(other))}
 
 
 # --- The laws and what they imply ----------------------------------------------------------------
@@ -98,23 +74,6 @@ def product_form_steady(machine: Machine) -> Numbers:
     return {"relative change": worst, "eta": p.A / p.mu0, "m": p.B / p.mu0}
 
 
-@check("product-form-response")
-def product_form_response(machine: Machine) -> Numbers:
-    fast = machine.velocities[1]
-    a, b = (machine.response(n, fast, [STRONGEST]) for n in (RR, "strength-area"))
-    return {
-        "drop": float((b.delta_mu / a.delta_mu - 1)[0]),
-        "mu1": float((b.mu1 / a.mu1 - 1)[0]),
-        "mu2": float((b.mu2 / a.mu2 - 1)[0]),
-    }
-
-
-@check("amontons-mean")
-def amontons_mean(machine: Machine) -> Numbers:
-    changes = machine.curve("amontons").delta_mu.ravel()
-    return {"largest change": max(abs(float(x)) for x in changes)}
-
-
 @check("age-jump")
 def age_jump(machine: Machine) -> Numbers:
     law = cast(LinkerDieterich, machine.slider(LD).law)
@@ -146,33 +105,3 @@ def greenwood_williamson_exponent(separation: float) -> float:
 
     # The derivative of s^p with the gap is -p s^(p - 1).
     return (moment(0.0) / moment(1.0)) / (1.5 * moment(0.5) / moment(1.5))
-
-
-# --- Concluding remarks --------------------------------------------------------------------------
-
-
-@check("velocity-controls", EXT)
-@check("age-negligible", RR)
-def changes_without_age(machine: Machine, law: str) -> Numbers:
-    return machine.ageless_changes(law)
-
-
-@check("high-frequency-no-tool")
-def not_a_good_tool(machine: Machine) -> Numbers:
-    ratios: Numbers = {}
-    for name, V in zip(SPEEDS, machine.velocities, strict=True):
-        critical = float(cf.critical_pulsation(machine.small_modulation(V)))
-        driven = 2 * np.pi * machine.numbers.frequency
-        ratios[name] = _signal(machine, V, critical) / _signal(machine, V, driven)
-    return ratios
-
-
-def _signal(machine: Machine, V: float, omega: float) -> float:
-    """Change of c1/eps by alpha = 0.02."""
-    p = machine.numbers
-    point = {"omega": omega, "lambda_": p.lambda_}
-    with_alpha, without = (
-        ageing_response(machine.small_modulation(V, alpha=alpha, **point)).transfer
-        for alpha in (p.alpha_low, 0.0)
-    )
-    return float(abs(with_alpha - without))

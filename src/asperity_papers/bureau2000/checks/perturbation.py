@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, Literal
+
 import numpy as np
 
 from asperity import Slider, perturbation_response
 from asperity.ledger import check
-from asperity.theory import ageing_response, closed_forms as cf
+from asperity.theory import SmallModulation, closed_forms as cf
 from asperity_papers.bureau2000.integration import IntegratedOrbit
-from asperity_papers.bureau2000.machine import RR, SPEEDS, Machine
+from asperity_papers.bureau2000.machine import RR, Machine
 
 Numbers = dict[str, float]
+Form = Literal["as_printed", "derived"]
 
 #: Amplitude of the integrations that check formulas of leading order: eps mu/A = 0.04.
 SMALL = 1e-3
@@ -51,66 +55,51 @@ def determinant_limit(machine: Machine) -> Numbers:
     return {"10 um/s": float(abs(cf.determinant(point))) / limit}
 
 
-@check("inertia-negligible-linear")
-def inertia_negligible(machine: Machine) -> Numbers:
-    _, top = machine.range_of("V_range")
-    velocities = dict(zip(SPEEDS, machine.velocities, strict=True)) | {"100 um/s": top}
-    changes: Numbers = {}
-    for name, V in velocities.items():
-        heavy, light = (
-            abs(ageing_response(machine.small_modulation(V, M=M)).transfer)
-            for M in (machine.numbers.M, 0.0)
-        )
-        changes[name] = float(heavy / light) - 1
-    return changes
-
-
 # --- Formulas, as printed and as derived, against an integration ---------------------------------
 
 
-def _fast(machine: Machine) -> float:
-    return machine.velocities[1]
+def _at(machine: Machine, V: float, **changes: float) -> tuple[SmallModulation, IntegratedOrbit]:
+    """Arguments of the closed forms, rigid asperities, and the orbit at a small amplitude."""
+    orbit = machine.orbit(machine.operating_point(V, **changes), SMALL)
+    return machine.small_modulation(V, **changes), orbit
 
 
-def _integrated(machine: Machine, **overrides: float) -> IntegratedOrbit:
-    """Rigid asperities at 10 um/s, small amplitude."""
-    return machine.orbit(machine.operating_point(_fast(machine), **overrides), SMALL)
+def _forms(formula: Callable[[Form], Any]) -> Numbers:
+    """A formula as printed and as derived."""
+    return {"printed": float(formula("as_printed")), "derived": float(formula("derived"))}
 
 
-def _position_amplitude(machine: Machine) -> complex:
-    """X1 (m) from the integration with inertia: x = V t - F/K."""
-    p = machine.numbers
-    return -_integrated(machine, M=p.M).c1 / SMALL * p.W0 / p.K
+def _position_amplitude(machine: Machine, orbit: IntegratedOrbit) -> complex:
+    """X1 (m) from an integration: x = V t - F/K."""
+    return -orbit.c1 / SMALL * machine.numbers.W0 / machine.numbers.K
 
 
 @check("steady-position")
 def steady_position(machine: Machine) -> Numbers:
-    p, point = machine.numbers, machine.small_modulation(_fast(machine))
-    steady = machine.orbit(machine.operating_point(_fast(machine)), 0.0)
-    return {
-        "printed": float(-cf.steady_position(point, 0.0, "as_printed") * p.K / p.W0),
-        "derived": float(-cf.steady_position(point, 0.0, "derived") * p.K / p.W0),
-        "independent": steady.mu + steady.delta_mu,
-    }
+    p, V = machine.numbers, machine.velocities[1]
+    point = machine.small_modulation(V)
+    steady = machine.orbit(machine.operating_point(V), 0.0)
+    forms = _forms(lambda form: -cf.steady_position(point, 0.0, form) * p.K / p.W0)
+    return forms | {"independent": steady.mu + steady.delta_mu}
 
 
 @check("exchanged-amplitudes")
 def exchanged_amplitudes(machine: Machine) -> Numbers:
-    p, V = machine.numbers, _fast(machine)
-    point = machine.small_modulation(V, M=p.M)
+    p, V = machine.numbers, machine.velocities[1]
+    point, orbit = _at(machine, V, M=p.M)
     return {
         "printed": float(abs(cf.age_amplitude(point))),
         "derived": float(abs(cf.position_amplitude(point))),
-        "independent": abs(_position_amplitude(machine)),
-        "age": abs(_integrated(machine, M=p.M).log_age1) / SMALL * p.D0 / V,
+        "independent": abs(_position_amplitude(machine, orbit)),
+        "age": abs(orbit.log_age1) / SMALL * p.D0 / V,
     }
 
 
 @check("linear-system")
 def linear_system(machine: Machine) -> Numbers:
-    p, V, w = machine.numbers, _fast(machine), 2 * np.pi * machine.numbers.frequency
-    orbit, X1 = _integrated(machine, M=p.M), _position_amplitude(machine)
-    Phi1 = orbit.log_age1 / SMALL * p.D0 / V
+    p, V, w = machine.numbers, machine.velocities[1], 2 * np.pi * machine.numbers.frequency
+    _, orbit = _at(machine, V, M=p.M)
+    X1, Phi1 = _position_amplitude(machine, orbit), orbit.log_age1 / SMALL * p.D0 / V
     force = (-p.M * w**2 + p.K + 1j * p.W0 * w * p.A / V) * X1 + p.W0 * p.B * V / p.D0 * Phi1
     ageing = 1j * w / V * X1 + (1j * w + V / p.D0) * Phi1
     return {
@@ -121,71 +110,55 @@ def linear_system(machine: Machine) -> Numbers:
 
 @check("determinant")
 def determinant(machine: Machine) -> Numbers:
-    p, V = machine.numbers, _fast(machine)
-    point = machine.small_modulation(V, M=p.M)
+    p, V = machine.numbers, machine.velocities[1]
+    point, orbit = _at(machine, V, M=p.M)
     numerator = p.W0 * float(point.mu) * (1j * float(point.omega) + V / p.D0)
-    return {
-        "printed": float(abs(cf.determinant(point, "as_printed"))),
-        "derived": float(abs(cf.determinant(point, "derived"))),
-        "independent": abs(-numerator / _position_amplitude(machine)),
-    }
+    forms = _forms(lambda form: abs(cf.determinant(point, form)))
+    return forms | {"independent": abs(-numerator / _position_amplitude(machine, orbit))}
 
 
 @check("first-harmonic")
 @check("linker-dieterich-first-harmonic", "alpha")
 def first_harmonic(machine: Machine, *parameters: str) -> Numbers:
-    V = _fast(machine)
-    overrides = {name: machine.numbers[name].si for name in parameters}
-    printed = float(cf.first_harmonic(machine.small_modulation(V, **overrides), SMALL))
-    independent = abs(machine.orbit(machine.operating_point(V, **overrides), SMALL).c1)
-    return {
-        "printed": printed,
-        "independent": independent,
-        "printed over eps": printed / SMALL,
-        "independent over eps": independent / SMALL,
-    }
+    changes = {name: machine.numbers[name].si for name in parameters}
+    point, orbit = _at(machine, machine.velocities[1], **changes)
+    both = {"printed": float(cf.first_harmonic(point, SMALL)), "independent": abs(orbit.c1)}
+    return both | {f"{name} over eps": value / SMALL for name, value in both.items()}
 
 
 @check("second-harmonic")
 def second_harmonic(machine: Machine) -> Numbers:
-    V = machine.velocities[0]
-    point = machine.small_modulation(V)
+    point, orbit = _at(machine, machine.velocities[0])
     scale = float(point.kappa) * SMALL**2
-    return {
-        "printed": float(cf.second_harmonic(point, SMALL, "as_printed")) / scale,
-        "derived": float(cf.second_harmonic(point, SMALL, "derived")) / scale,
-        "independent": abs(machine.orbit(machine.operating_point(V), SMALL).c2) / scale,
-    }
+    forms = _forms(lambda form: cf.second_harmonic(point, SMALL, form) / scale)
+    return forms | {"independent": abs(orbit.c2) / scale}
 
 
 @check("mean-shift")
 def mean_shift(machine: Machine) -> Numbers:
-    printed = float(cf.mean_shift(machine.small_modulation(_fast(machine)), SMALL))
-    independent = _integrated(machine).delta_mu
-    return {"printed": printed / SMALL**2, "independent": independent / SMALL**2}
+    point, orbit = _at(machine, machine.velocities[1])
+    printed = float(cf.mean_shift(point, SMALL))
+    return {"printed": printed / SMALL**2, "independent": orbit.delta_mu / SMALL**2}
 
 
 @check("mean-decreases")
 def mean_decreases(machine: Machine) -> Numbers:
-    printed = float(cf.mean_shift(machine.small_modulation(_fast(machine)), SMALL))
-    return {"integrated": _integrated(machine).delta_mu, "Eq. (22)": printed}
+    point, orbit = _at(machine, machine.velocities[1])
+    return {"integrated": orbit.delta_mu, "Eq. (22)": float(cf.mean_shift(point, SMALL))}
 
 
 @check("age-over-velocity")
 def age_over_velocity(machine: Machine) -> Numbers:
-    p, V = machine.numbers, _fast(machine)
-    point, orbit = machine.small_modulation(V), _integrated(machine)
+    p, V = machine.numbers, machine.velocities[1]
+    point, orbit = _at(machine, V)
     # v/V = 1 - (W0/(K V)) df/dt.
     velocity = abs(orbit.c1) * 2 * np.pi * p.frequency * p.W0 / (p.K * V)
-    return {
-        "printed": float(cf.age_to_velocity_ratio(point, "as_printed")),
-        "derived": float(cf.age_to_velocity_ratio(point, "derived")),
-        "independent": abs(orbit.log_age1) / velocity,
-    }
+    forms = _forms(lambda form: cf.age_to_velocity_ratio(point, form))
+    return forms | {"independent": abs(orbit.log_age1) / velocity}
 
 
 @check("velocity-modulation")
 def velocity_modulation(machine: Machine) -> Numbers:
-    point = machine.small_modulation(_fast(machine))
-    independent = abs(_integrated(machine).c1) / SMALL / float(point.kappa)
+    point, orbit = _at(machine, machine.velocities[1])
+    independent = abs(orbit.c1) / SMALL / float(point.kappa)
     return {"printed": float(cf.velocity_modulation(point, 1.0)), "independent": independent}

@@ -9,14 +9,6 @@ from asperity.experiment import hold_response
 from asperity.ledger import check
 from asperity_papers.marone1998.laboratory import AGEING, DECADE, Laboratory, Numbers, scans
 
-_DAY = 86400.0
-
-
-@check("velocity-slope-of-gouge")
-def velocity_slope(laboratory: Laboratory) -> Numbers:
-    printed = -laboratory.numbers.B_less_A_5 * DECADE
-    return {"slope": printed, "scan": scans()["figure_5"]["velocity_slope"]}
-
 
 @check("decade-of-velocity")
 def decade_of_velocity(laboratory: Laboratory) -> Numbers:
@@ -35,30 +27,12 @@ def decade_of_velocity(laboratory: Laboratory) -> Numbers:
     }
 
 
-@check("slopes-differ")
-def slopes_differ(laboratory: Laboratory) -> Numbers:
-    p, scan = laboratory.numbers, scans()
-    slopes = np.array(scan["figure_4"]["slopes"]) / abs(scan["figure_5"]["velocity_slope"])
-    return {"low": float(slopes[0]), "high": float(slopes[1]), "model": p.B_5 / p.B_less_A_5}
-
-
 @check("intrinsic-and-dilation")
 def intrinsic_and_dilation(laboratory: Laboratory) -> Numbers:
     scan = scans()["figure_7"]
     bare, gouge = scan["bare"][0], np.array(scan["gouge"])
     needed = gouge[:, 0] - bare
     return {"needed low": float(needed.min()), "needed high": float(needed.max())}
-
-
-@check("half-of-the-year")
-def half_of_the_year(laboratory: Laboratory) -> Numbers:
-    """U = alpha ln(1 + s t): s that makes half of a year's slip occur in 14 d, by its root."""
-    days = laboratory.numbers.half_year_afterslip / _DAY
-    # 2 ln(1 + 14 s) = ln(1 + 365 s) is quadratic: 1 + 28 s + 196 s^2 = 1 + 365 s.
-    rate = (365 - 2 * days) / days**2
-    share = np.log1p(rate * days) / np.log1p(rate * 365)
-    printed = np.log1p(1.72 * days) / np.log1p(1.72 * 365)
-    return {"share": float(printed), "rate": float(rate), "share, exact": float(share)}
 
 
 def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -116,24 +90,6 @@ def afterslip_relation(laboratory: Laboratory) -> Numbers:
         "worst": float(np.max(np.abs(fit.fun)) / (2 * scan["pixel"])),
         "alpha": float(alpha), "beta": float(alpha * rate), "rate": float(rate),
     }  # fmt: skip
-
-
-@check("afterslip-amplitude")
-def afterslip_amplitude(laboratory: Laboratory) -> Numbers:
-    """By what alpha changes when lengths are counted in mm and not in m, 1/k along with them."""
-    b, per_stiffness = laboratory.numbers.A_less_B_16, 1.0
-    a = 2 * b
-    metres, millimetres = per_stiffness, 1e3 * per_stiffness
-    return {
-        "printed": (a - b * millimetres) / (a - b * metres),
-        "derived": (a - b) * millimetres / ((a - b) * metres),
-        "independent": 1e3,
-    }
-
-
-@check("three-events")
-def three_events(laboratory: Laboratory) -> Numbers:
-    return {f"event {n}": 100 * slip for n, slip in enumerate(scans()["figure_13"]["afterslip"], 1)}
 
 
 @check("maximum-condition")
