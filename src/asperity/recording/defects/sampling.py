@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, at_row
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -78,17 +78,12 @@ def check_sampling(time: Float) -> list[Finding]:
     gap, missing = _gaps(steps, clean)
     if gap.size:
         longest = gap[np.argmax(missing)]
-        row = int(starts[longest])
-        findings.append(
-            Finding(
-                "gap",
-                "warning",
-                float(missing.sum()),
-                f"time, row {row}, t = {time[row]:.10g} s",
-                f"{_counted(gap.size, 'gap')} in the recording, {missing.sum():.4g} s missing in "
-                f"all; the longest step, {steps[longest]:.4g} s, follows row {row}.",
-            )
+        row, lost = int(starts[longest]), float(missing.sum())
+        text = (
+            f"{_counted(gap.size, 'gap')} in the recording, {lost:.4g} s missing in all; the "
+            f"longest step, {steps[longest]:.4g} s, follows row {row}."
         )
+        findings.append(Finding("gap", "warning", lost, at_row("time", row, time), text))
         steps, starts = np.delete(steps, gap), np.delete(starts, gap)
     if steps.size and not _are_even(steps, clean):
         findings.append(_uneven(steps, starts, time))
@@ -96,32 +91,25 @@ def check_sampling(time: Float) -> list[Finding]:
 
 
 def _backward_and_repeated(steps: Float, time: Float, rows: Index) -> list[Finding]:
+    """Findings on the steps from row to row, of the times `time` in the rows `rows`."""
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
         i = int(backward[np.argmin(steps[backward])])
-        findings.append(
-            Finding(
-                "backward time",
-                "error",
-                backward.size,
-                f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s",
-                f"Time runs backward {_counted(backward.size, 'time')}, the farthest by "
-                f"{-steps[i]:.4g} s at row {rows[i + 1]}.",
-            )
+        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
+        text = (
+            f"Time runs backward {_counted(backward.size, 'time')}, the farthest by "
+            f"{-steps[i]:.4g} s at row {rows[i + 1]}."
         )
+        findings.append(Finding("backward time", "error", backward.size, where, text))
     if repeated.size:
         i = int(repeated[0])
-        findings.append(
-            Finding(
-                "repeated time",
-                "warning",
-                repeated.size,
-                f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s",
-                f"{_counted(repeated.size, 'time stamp')} the same as the one before, the first in "
-                f"row {rows[i + 1]}.",
-            )
+        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
+        text = (
+            f"{_counted(repeated.size, 'time stamp')} the same as the one before, the first in "
+            f"row {rows[i + 1]}."
         )
+        findings.append(Finding("repeated time", "warning", repeated.size, where, text))
     return findings
 
 
@@ -200,26 +188,20 @@ def _usual(steps: Float, window: Index) -> tuple[Float, Float]:
 def _uneven(steps: Float, starts: Index, time: Float) -> Finding:
     median = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - median)))
-    row = int(starts[worst])
-    return Finding(
-        "uneven sampling",
-        "warning",
-        float(np.abs(steps[worst] - median) / median),
-        f"time, row {row}, t = {time[row]:.10g} s",
+    share, where = float(abs(steps[worst] - median) / median), at_row("time", starts[worst], time)
+    text = (
         f"Steps of time run from {steps.min():.4g} s to {steps.max():.4g} s with a median of "
-        f"{median:.4g} s; there is no one sampling rate.",
+        f"{median:.4g} s; there is no one sampling rate."
     )
+    return Finding("uneven sampling", "warning", share, where, text)
 
 
 def _rounded(grid: RoundedGrid) -> Finding:
-    return Finding(
-        "rounded time",
-        "note",
-        grid.quantum / grid.step,
-        "time",
+    text = (
         f"Time stamps are rounded to {grid.quantum:.3g} s; they were read as the even grid that "
-        f"they stand for, of {1 / grid.step:.8g} samples per second.",
+        f"they stand for, of {1 / grid.step:.8g} samples per second."
     )
+    return Finding("rounded time", "note", grid.quantum / grid.step, "time", text)
 
 
 def _are_even(steps: Float, time: Float) -> bool:
