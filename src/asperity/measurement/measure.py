@@ -220,7 +220,9 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         chosen = part or max(
             (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
         )
-        first, stop = _chosen(samples, chosen, start, DRIFTS[question.detrend])
+        first, stop = clean_run(chosen.first, chosen.stop, samples.defects)
+        inside, degree = slice(first, stop), DRIFTS[question.detrend]
+        first += settled(samples.time[inside], samples.force[inside], start, degree)
     else:
         first, stop = _given(samples.time, window)
         # F(0) is that next to the stretch that is read.
@@ -228,20 +230,20 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     if question.whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
-    time, force_values = samples.time[cut], samples.force[cut]
+    time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
     reading = lock_in(
         time,
-        samples.load[cut],
-        force_values,
+        load,
+        force,
         frequency=start,
         harmonics=question.harmonics,
         detrend=question.detrend,
         refine=not question.exact_frequency,
         settles=True,
     )
-    reading = with_rounding(reading, time, samples.load[cut], force_values)
+    steps = step_of(load), step_of(force)
+    reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if window is None else "user"
-    steps = step_of(force_values), step_of(samples.load[cut])
     before, after = _around(samples, parts, chosen, reading.W0, steps)
     rates = _rates(samples, (before, after))
     if after and before and rates[0] and rates[1]:
@@ -252,8 +254,6 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     pauses = [rates[0]] if rates[0] else []
     if before and after:
         pauses.append(rate_between(before[0], after[0]))
-    load_values = samples.load[cut]
-    steady_force = reading.without_settling(time, force_values)
     sides = [side[0] if side else None for side in (before, after)]
     answers = (
         checks.modulation(reading),
@@ -262,20 +262,20 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.contact(reading),
         checks.friction(reading.mean_friction),
         steadiness.leakage(reading),
-        checks.other_modulation(reading, time, load_values),
-        steadiness.steady_load(reading, time, load_values),
+        checks.other_modulation(reading, time, load),
+        steadiness.steady_load(reading, time, load),
         steadiness.steady_response(reading),
         checks.transient(reading, chosen_by, pauses),
-        checks.stick_slip(reading, time, steady_force),
+        checks.stick_slip(reading, time, reading.without_settling(time, force)),
         checks.load_harmonics(reading),
-        checks.resolution(reading, load_values, steady_force),
-        *instrument.made_force(reading, samples, time, load_values, force_values),
-        instrument.held_samples(reading, load_values, force_values),
-        instrument.flat_top(reading, time, load_values, force_values),
+        checks.resolution(reading, steps),
+        *instrument.made_force(reading, samples, time, load, force),
+        instrument.held_samples(reading, load, force),
+        instrument.flat_top(reading, time, load, force),
         instrument.mains(reading, samples, parts),
         *instrument.lines_in_the_pauses(reading, samples, parts),
-        instrument.hum(reading, time, force_values),
-        steadiness.shifting_response(reading, time, force_values),
+        instrument.hum(reading, time, force),
+        steadiness.shifting_response(reading, time, force),
         checks.drift(reading, *sides),
         *_findings(samples, first, stop, [before, after]),
     )
@@ -357,12 +357,6 @@ def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadI
     return parts if any(part.modulated for part in parts) else [whole]
 
 
-def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int) -> tuple[int, int]:
-    first, stop = clean_run(part.first, part.stop, samples.defects)
-    inside = slice(first, stop)
-    return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
-
-
 def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     start, end = window
     first = int(np.searchsorted(time, start, side="left"))
@@ -381,7 +375,7 @@ def _around(
     mean_load: float,
     steps: tuple[float, float],
 ) -> tuple[_Pause | None, _Pause | None]:
-    """The pauses before and after the stretch that is read; `steps` of force and load."""
+    """The pauses before and after the stretch that is read; `steps` of load and force."""
     at, most = parts.index(chosen), chosen.stop - chosen.first
     sides: list[_Pause | None] = []
     for step in (-1, 1):
@@ -435,15 +429,15 @@ def _pause(
             return None
     of_steps = [
         float(rounding_variance(step, float(np.std(values)))[0])
-        for step, values in zip(steps, (force, load), strict=True)
+        for step, values in zip(steps, (load, force), strict=True)
     ]
-    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[0])
+    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[1])
     level = level._replace(value=level.value + shift, uncertainty=float(np.linalg.norm(doubts)))
     # The ratio has the noise of both channels, less what they share.
     ratio = level.value / of_load.value
     noise = mean_level(time, force - ratio * load)
     doubt = float(np.hypot(noise.uncertainty, np.sqrt(variance))) / abs(of_load.value)
-    rounding = float(np.sqrt(of_steps[0] + ratio**2 * of_steps[1])) / abs(of_load.value)
+    rounding = float(np.sqrt(of_steps[1] + ratio**2 * of_steps[0])) / abs(of_load.value)
     return _Pause(level, of_load, noise._replace(value=ratio, uncertainty=doubt), rounding)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
-from asperity.lock_in.rounding import step_of
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import other_line
 from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
@@ -177,16 +176,21 @@ def other_modulation(reading: LockInReading, time: Float, load: Float) -> Check:
     return LOCK_IN.check("other modulation", number, sentence, significant=seen)
 
 
-def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
+def resolution(reading: LockInReading, steps: tuple[float, float]) -> Check:
     """Whether the steps of the recorder are small against the first harmonics.
 
     Noise of at least half a step smooths the steps; without noise, a harmonic smaller than a step
     cannot be measured.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    steps : (float, float)
+        Steps of the recorder of load and force.
     """
     heights = (reading.epsilon, reading.phasor(1).amplitude)
     answers = []
-    for c, (name, values) in enumerate((("load", load), ("force", force))):
-        step = step_of(values)
+    for c, (name, step) in enumerate(zip(("load", "force"), steps, strict=True)):
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
         answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))

@@ -289,11 +289,6 @@ def one_table(
 
 
 def _left_out(column: RawColumn, rows: int) -> Finding:
-    return Finding(
-        "other length",
-        "warning",
-        column.values.size,
-        column.label,
-        f"'{column.label}' has {column.values.size} values where the recording has {rows} rows, "
-        "and was left out.",
-    )
+    count = column.values.size
+    text = f"'{column.label}' has {count} values where the recording has {rows} rows"
+    return Finding("other length", "warning", count, column.label, f"{text}, and was left out.")
