@@ -134,8 +134,13 @@ def fit_frequency(
         size = int(min(size, max(_FEW_PERIODS / (start * span) * size, size / 64)))
     while True:
         at = (time.size - size) // 2
-        window = slice(at, at + size)
-        omega = _converged(time[window], load[window], omega, harmonics, degree, step)
+        t, x = time[at : at + size], load[at : at + size]
+        for _ in range(MOST_STEPS):
+            basis = window_basis(t, omega, harmonics, degree)
+            change = frequency_step(sums(basis, t, [x], step=step))
+            omega += change
+            if abs(change) * basis.half_width < CONVERGED:
+                break
         if size >= most:
             return omega / (2 * np.pi)
         size = min(4 * size, most)
@@ -169,16 +174,12 @@ def window_basis(time: Float, omega: float, harmonics: int, degree: int) -> Basi
     return Basis(omega, harmonics, degree, float(time[0]) + half, half)
 
 
-def _converged(
-    time: Float, load: Float, omega: float, harmonics: int, degree: int, step: float | None
-) -> float:
-    for _ in range(MOST_STEPS):
-        basis = window_basis(time, omega, harmonics, degree)
-        change = frequency_step(sums(basis, time, [load], step=step))
-        omega += change
-        if abs(change) * basis.half_width < CONVERGED:
-            break
-    return omega
+def load_columns(basis: Basis, load: Float, refine: bool) -> Float:
+    """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
+    selected = np.eye(basis.size)[:, : basis.linear + refine]
+    if refine:
+        selected[:, basis.linear] = frequency_direction(basis, load)
+    return selected
 
 
 def frequency_step(blocks: BlockSums) -> float:
@@ -186,8 +187,7 @@ def frequency_step(blocks: BlockSums) -> float:
     basis, linear = blocks.basis, blocks.basis.linear
     gram, moments = blocks.totals()
     beta = inverted(gram[:linear, :linear]) @ moments[:linear, 0]
-    columns = np.eye(basis.size)[:, : linear + 1]
-    columns[:, linear] = frequency_direction(basis, beta)
+    columns = load_columns(basis, beta, True)
     change = (inverted(columns.T @ gram @ columns) @ (columns.T @ moments[:, 0]))[linear]
     # Beyond a radian at the ends the linearisation is not valid.
     return float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))

@@ -56,11 +56,7 @@ def rounding_variance(
 
 
 def with_rounding(
-    reading: LockInReading,
-    time: Float,
-    load: Float,
-    force: Float,
-    steps: tuple[float, float],
+    reading: LockInReading, time: Float, load: Float, force: Float, steps: tuple[float, float]
 ) -> LockInReading:
     """The reading with the errors by the recorder's steps in its covariance.
 

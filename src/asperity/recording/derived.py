@@ -14,7 +14,7 @@ from asperity.parameters.arguments import number, typed
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
-from asperity.recording.roles import kinds_of, nouns, role_of
+from asperity.recording.roles import free_name, kinds_of, nouns, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS, to_si
 from asperity.units.scale import kind_of_dimension, unit_text
@@ -153,7 +153,7 @@ def _with_channel(
     channel = Channel(values, kind, unit, target, unit or unit_text(quantity.dimension))
     channels, findings, roles = dict(trace.channels), trace.findings, dict(trace.roles)
     if target in channels:
-        kept = _free_name(f"{target} (recorded)", channels)
+        kept = free_name(f"{target} (recorded)", channels)
         channels = {kept if name == target else name: c for name, c in channels.items()}
         findings = tuple(_renamed(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
@@ -208,11 +208,3 @@ def _inherited(
 def _renamed(finding: Finding, old: str, new: str) -> Finding:
     moved = new + finding.where.removeprefix(old)
     return replace(finding, where=moved) if finding.concerns(old) else finding
-
-
-def _free_name(name: str, taken: Mapping[str, object]) -> str:
-    number = 2
-    free = name
-    while free in taken:
-        free, number = f"{name} ({number})", number + 1
-    return free

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from asperity.arrays import Float, Index
 from asperity.recording.finding import Finding, at_row
@@ -156,33 +157,21 @@ def _gaps(steps: Float, time: Float) -> tuple[Index, Float]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
+    if not suspects.size:
+        return suspects, np.empty(0)
+    # Beyond the ends of a recording its steps are reflected.
+    runs = sliding_window_view(np.pad(steps, _SIDE, mode="reflect"), _SIDE)
     # After a change to a lower rate every step is a candidate; chunks bound the memory.
     gaps, missing = [], []
     for part in np.array_split(suspects, suspects.size // _CHUNK + 1):
-        before = part[:, None] + np.arange(-_SIDE, 0)
-        after = part[:, None] + np.arange(1, _SIDE + 1)
-        limit = np.fmax(_usual(steps, before)[1], _usual(steps, after)[1])
-        usual = np.fmin(_usual(steps, before)[0], _usual(steps, after)[0])
-        is_gap = steps[part] > limit
+        sides = np.stack([runs[part], runs[part + _SIDE + 1]])
+        middle = np.median(sides, axis=-1)
+        scatter = 1.4826 * np.median(np.abs(sides - middle[..., None]), axis=-1)
+        limit = np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
+        is_gap = steps[part] > limit.max(0)
         gaps.append(part[is_gap])
-        missing.append((steps[part] - usual)[is_gap])
+        missing.append((steps[part] - middle.min(0))[is_gap])
     return np.concatenate(gaps), np.concatenate(missing)
-
-
-def _usual(steps: Float, window: Index) -> tuple[Float, Float]:
-    """Median step of each window and the longest usual step; NaN for an empty window."""
-    if not window.size:
-        return np.empty(0), np.empty(0)
-    inside = (window >= 0) & (window < steps.size)
-    values = np.where(inside, steps[np.clip(window, 0, steps.size - 1)], np.nan)
-    empty = ~inside.any(axis=1)
-    values[empty] = np.inf
-    middle = np.nanmedian(values, axis=1)
-    scatter = np.zeros_like(middle)
-    filled = ~empty
-    scatter[filled] = 1.4826 * np.nanmedian(np.abs(values[filled] - middle[filled, None]), axis=1)
-    middle[empty] = np.nan
-    return middle, np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
 
 
 def _uneven(steps: Float, starts: Index, time: Float) -> Finding:

@@ -27,6 +27,7 @@ from asperity.recording.roles import (
     ROLES,
     candidates,
     find_channel,
+    free_name,
     kinds_of,
     nouns,
     recorded_as,
@@ -107,16 +108,12 @@ def assemble(
 def _unique(names: list[str], findings: list[Finding]) -> list[str]:
     """Unique names: repeated names get numbers."""
     unique: dict[str, None] = {}
-    times: dict[str, int] = {}
     for i, name in enumerate(names):
         plain = name or f"column {i}"
-        free, again = plain, times.get(plain, 1)
-        while free in unique:
-            again += 1
-            free = f"{plain} ({again})"
-        times[plain] = again
+        free = free_name(plain, unique)
         unique[free] = None
         if free != plain:
+            again = names[: i + 1].count(name)
             text = (
                 f"The name '{plain}' stands on more than one column; this one is called '{free}'."
             )
@@ -140,12 +137,10 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
         kind = known[name].kind if name in known else None
         fitting = kinds_of(role)
         if kind is not None and kind not in fitting:
-            raise InputError(
-                Argument("columns", role),
-                f"be {nouns(fitting)}",
-                f"'{name}', {nouns([kind])}",
-                f"choose another column, or correct its unit with {Argument('units', name, '...')}",
-            )
+            unit = Argument("units", name, "...")
+            advice = f"choose another column, or correct its unit with {unit}"
+            field, rule = Argument("columns", role), f"be {nouns(fitting)}"
+            raise InputError(field, rule, f"'{name}', {nouns([kind])}", advice)
 
 
 def _name_of(wanted: str | int, headings: Mapping[str, str], field: Argument) -> str:

@@ -98,13 +98,12 @@ def _from_first_column(
     numbers = values[first]
     rises = numbers.dtype.kind in "iuf" and numbers.size > 1 and bool(np.all(np.diff(numbers) > 0))
     if not (bare and rises and len(values) > 1):
-        raise InputError(
-            Argument("columns", "time"),
-            "be a column",
-            f"none among {listed(map(repr, values))} that is named like time",
+        got = f"none among {listed(map(repr, values))} that is named like time"
+        advice = (
             f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or, if one of them "
-            f"is time, its name with {Argument('columns', 'time', '...')}",
+            f"is time, its name with {Argument('columns', 'time', '...')}"
         )
+        raise InputError(Argument("columns", "time"), "be a column", got, advice)
     clock = _from_column(first, values, units)
     text = (
         "The file names no columns; the first, which only rises, was taken for time; say "

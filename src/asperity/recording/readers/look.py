@@ -22,12 +22,7 @@ import numpy as np
 
 from asperity.errors import Argument
 from asperity.recording.finding import Finding
-from asperity.recording.readers.raw import (
-    RawColumn,
-    RawRecording,
-    beginning,
-    refuse_truncated,
-)
+from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, refuse_truncated
 from asperity.recording.roles import candidates
 
 _START = struct.Struct(">20siiif")
