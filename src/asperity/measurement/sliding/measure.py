@@ -269,8 +269,10 @@ def _steps(
             # Friction is counted against the motion, whatever its direction.
             turned = -1.0 if np.median(part) < 0 else 1.0
             sides.append((signals.time[low:high], turned * part, velocity))
-        options = {"first_settling": settling, "recorded": recorded}
-        step = read_step(change.time, *sides, degree=degree, **options)
+        before, after = sides
+        step = read_step(
+            change.time, before, after, degree=degree, first_settling=settling, recorded=recorded
+        )
         if step is None:
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
             settling = np.inf
