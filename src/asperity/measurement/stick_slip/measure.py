@@ -478,8 +478,11 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
             "after a slip the mean force departs from the line of the stick by up to "
             f"{percent(ringing)} of the drop"
         )
-        doubt = ": the gauge or the slider rings or follows slowly; drops and ends are uncertain"
-        ask("ringing", ringing, text, f"{doubt} by as much")
+        doubt = (
+            ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
+            "much"
+        )
+        ask("ringing", ringing, text, doubt)
     hidden, error = _undetected_share(result, after)
     if np.isfinite(hidden):
         than = f"{percent(abs(hidden))} {'less' if hidden > 0 else 'more'} than"

@@ -36,9 +36,10 @@ def periods(reading: LockInReading) -> Check:
     """Whether the window holds enough periods of the modulation."""
     number = reading.periods
     text = (
-        f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell"
+        f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell "
+        "apart"
     )
-    return LOCK_IN.check("periods", number, f"{text} apart")
+    return LOCK_IN.check("periods", number, text)
 
 
 def signal(reading: LockInReading) -> Check:
@@ -219,8 +220,8 @@ def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
         if name in FINDINGS:
             checks.append(FINDINGS.check(name, number, sentence))
         else:
-            graver = Limits({name: limits[finding.severity]})
-            checks.append(graver.check(name, 1.0, sentence))
+            by_severity = Limits({name: limits[finding.severity]})
+            checks.append(by_severity.check(name, 1.0, sentence))
     return checks
 
 
