@@ -123,6 +123,20 @@ def test_noise_that_both_channels_share_is_known_to_be_shared(truth) -> None:
     assert both.uncertainty("im1") < 1e-3 * both.uncertainty("epsilon")
 
 
+def test_windows_of_few_periods_have_their_frequency() -> None:
+    """Of 1.1 to 8 periods, from the strongest line of their spectrum."""
+    off = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time = np.arange(int(50 * rng.uniform(1.1, 8))) / 50
+        wave = 0.1 * np.cos(2 * np.pi * time + rng.uniform(0, 2 * np.pi))
+        load = 7 * (1 + wave + 0.01 * rng.standard_normal(time.size))
+        force = 0.4 * load + 0.01 * rng.standard_normal(time.size)
+        reading = lock_in(time, load, force, harmonics=2)
+        off.append((reading.frequency - 1) / reading.uncertainty("frequency"))
+    assert np.abs(off).max() < 4.5
+
+
 def test_uncertainties_and_ellipse_follow_from_the_covariance() -> None:
     covariance = np.diag([1e-8, 4e-8])
     phasor = Phasor(3e-4 + 4e-4j, covariance, 60.0)

@@ -152,10 +152,16 @@ def test_noise_is_no_sideband_of_few_periods(made, trace) -> None:
         checks = {c.name: c for c in measure(trace(time, load, force)).checks}
         assert checks["leakage"].number > 0.01
         assert checks["leakage"].verdict == "ok"
+        assert checks["steady response"].verdict == "ok"
     time, load, force = (a[:1000] for a in made())
-    swelling = 0.2 * np.sin(2 * np.pi * 8 * time) * (load - load.mean())
-    checks = {c.name: c for c in measure(trace(time, load + swelling, force)).checks}
+    swelling = 0.2 * np.sin(2 * np.pi * 8 * time)
+    load_swells = load + swelling * (load - load.mean())
+    checks = {c.name: c for c in measure(trace(time, load_swells, force)).checks}
     assert checks["leakage"].verdict == "bad"
+    force_swells = force + swelling * (force - force.mean())
+    checks = {c.name: c for c in measure(trace(time, load, force_swells)).checks}
+    assert checks["steady response"].verdict == "suspicious"
+    assert checks["leakage"].verdict == "ok"
 
 
 def test_spikes_have_no_share_in_the_numbers(made, trace) -> None:

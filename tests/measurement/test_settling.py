@@ -120,6 +120,18 @@ def test_a_window_of_the_user_is_judged_as_it_is(trace) -> None:
     assert abs(errors(found)[0]) < 4
 
 
+def test_steps_of_the_recorder_are_seen_under_a_settling(trace) -> None:
+    """What is subtracted for the settling has no steps, and hides none."""
+    time, load, force = recording(np.random.default_rng(1), 4.0, 0.2, 0.03, sigma=1e-5)
+    begin = float(time[np.argmax(np.abs(load - 7) > 0.5)]) + 0.05
+    step = 0.5 * abs(MU1) * 7
+    found = measure(trace(time, load, step * np.round(force / step)), window=(begin, begin + 3.5))
+    assert found.reading.settling is not None
+    check = next(c for c in found.checks if c.name == "resolution")
+    assert check.verdict == "suspicious"
+    assert check.number == pytest.approx(0.5, rel=0.2)
+
+
 @draws(3, 8)
 def test_two_time_constants_are_not_taken_for_one(trace, draws) -> None:
     off = []

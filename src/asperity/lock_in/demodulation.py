@@ -37,6 +37,7 @@ from asperity.lock_in.reference import (
     fit_frequency,
     frequency_direction,
     frequency_step,
+    load_columns,
     require_modulated,
     strongest_line,
     window_basis,
@@ -109,7 +110,9 @@ def lock_in(
     _check_resolved(time, start, harmonics)
     step = even_step(time, 2 * np.pi * start * harmonics)
     if step is None:
-        _check_clock(time)
+        rule, got = "rise from sample to sample", "equal or decreasing times"
+        advice = "sort or cut the recording"
+        require((time[1:] > time[:-1]).all(), "lock_in.time", rule, got, advice)
     if refine:
         start = fit_frequency(
             time, load, start, harmonics=harmonics, degree=degree, step=step, share=_FIRST_SHARE
@@ -143,7 +146,7 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     gram, moments = blocks.totals()
     inner = inverted(gram[:linear, :linear])
     beta = inner @ moments[:linear]
-    selected = _load_columns(basis, beta[:, 0], refine)
+    selected = load_columns(basis, beta[:, 0], refine)
     outer = inverted(selected.T @ gram @ selected)
     slope, change = np.zeros(linear), 0.0
     if refine:
@@ -183,14 +186,6 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     )
 
 
-def _load_columns(basis: Basis, load: Float, refine: bool) -> Float:
-    """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
-    selected = np.eye(basis.size)[:, : basis.linear + refine]
-    if refine:
-        selected[:, basis.linear] = frequency_direction(basis, load)
-    return selected
-
-
 def _on_basis(basis: Basis, beta: Float, change: float) -> Float:
     """Coefficients of both fits on the whole basis, the frequency changed to first order."""
     full = np.zeros((basis.size, 2))
@@ -227,11 +222,6 @@ def _check_finite(blocks: BlockSums, field: str = "lock_in.load and force") -> B
     got, advice = "values that are not", "leave out their samples, as asperity.measure does"
     require(np.isfinite(blocks.moments).all(), field, "be finite", got, advice)
     return blocks
-
-
-def _check_clock(time: Float) -> None:
-    rule, got = "rise from sample to sample", "equal or decreasing times"
-    require((time[1:] > time[:-1]).all(), "lock_in.time", rule, got, "sort or cut the recording")
 
 
 def _check_resolved(time: Float, frequency: float, harmonics: int) -> None:

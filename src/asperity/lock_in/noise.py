@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Complex, Float, Index
+from asperity.arrays import Complex, Float
 from asperity.lock_in.normal_equations import Basis, BlockSums
 
 #: Lines averaged around a harmonic and next to zero frequency.
@@ -201,12 +201,6 @@ def _free_lines(k: int, periods: float, blocks: BlockSums, taken: int) -> Float:
     return lines[np.argsort(np.abs(lines - k * periods), kind="stable")[: 2 * wanted]]
 
 
-def column_harmonics(basis: Basis) -> Index:
-    """Harmonic of each column of the basis, 0 for the drift; (size,)."""
-    k = np.arange(1, basis.harmonics + 1)
-    return np.concatenate([np.zeros(basis.drift, dtype=np.intp), k, k, k, k])
-
-
 def quadrature(basis: Basis) -> Float:
     """The matrix that maps cos to sin and sin to -cos, (size, size); 0 for the drift."""
     n = basis.harmonics
@@ -238,7 +232,10 @@ def sum_covariance(
     """
     C = np.hstack(columns)
     channel = np.repeat([0, 1], [c.shape[1] for c in columns])
-    k = column_harmonics(basis)[np.argmax(np.abs(C), axis=0)]
+    # The harmonic of each column of the basis is 0 for the drift.
+    orders = np.tile(np.arange(1, basis.harmonics + 1), 4)
+    orders = np.concatenate([np.zeros(basis.drift, dtype=np.intp), orders])
+    k = orders[np.argmax(np.abs(C), axis=0)]
     product, across = C.T @ gram @ C, (quadrature(basis) @ C).T @ gram @ C
     level = np.sqrt(noise.spectra[k, channel, channel].real)
     # Noise of two channels is correlated within one harmonic only: in phase by the real part of the

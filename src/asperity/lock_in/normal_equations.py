@@ -231,12 +231,7 @@ def even_step(time: Float, omega: float) -> float | None:
 
 
 def sums(
-    basis: Basis,
-    time: Float,
-    channels: list[Float],
-    *,
-    blocks: int = 1,
-    step: float | None = None,
+    basis: Basis, time: Float, channels: list[Float], *, blocks: int = 1, step: float | None = None
 ) -> BlockSums:
     """Sum a recording in blocks of equally many samples.
 

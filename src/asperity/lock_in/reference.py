@@ -19,8 +19,8 @@ from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, inver
 
 #: Samples of the spectrum in which the line is searched.
 _SPECTRUM = 1 << 16
-#: With fewer periods the maximum of the line is too inaccurate: the residual of the fit is scanned.
-_FEW_PERIODS = 8.0
+#: Fewest periods of the first window of the fit.
+_FIRST_PERIODS = 8.0
 #: Largest last step, as phase (rad) at the ends of the window. Its square is the remaining error
 #: after that step, which `asperity.lock_in.demodulation.read` makes for the whole window.
 CONVERGED, MOST_STEPS = 1e-4, 12
@@ -125,17 +125,18 @@ def fit_frequency(
     """
     omega = 2 * np.pi * start
     most = int(share * time.size)
-    span = float(time[-1] - time[0])
-    size = time.size
-    if span * start < _FEW_PERIODS:
-        omega = _scanned(time, load, omega, degree)
-    else:
-        # An error of half a cycle over the first window, with a factor of safety.
-        size = int(min(size, max(_FEW_PERIODS / (start * span) * size, size / 64)))
+    periods = start * float(time[-1] - time[0])
+    # An error of half a cycle over the first window, with a factor of safety.
+    size = int(min(1.0, max(_FIRST_PERIODS / periods, 1 / 64)) * time.size)
     while True:
         at = (time.size - size) // 2
-        window = slice(at, at + size)
-        omega = _converged(time[window], load[window], omega, harmonics, degree, step)
+        t, x = time[at : at + size], load[at : at + size]
+        for _ in range(MOST_STEPS):
+            basis = window_basis(t, omega, harmonics, degree)
+            change = frequency_step(sums(basis, t, [x], step=step))
+            omega += change
+            if abs(change) * basis.half_width < CONVERGED:
+                break
         if size >= most:
             return omega / (2 * np.pi)
         size = min(4 * size, most)
@@ -169,16 +170,12 @@ def window_basis(time: Float, omega: float, harmonics: int, degree: int) -> Basi
     return Basis(omega, harmonics, degree, float(time[0]) + half, half)
 
 
-def _converged(
-    time: Float, load: Float, omega: float, harmonics: int, degree: int, step: float | None
-) -> float:
-    for _ in range(MOST_STEPS):
-        basis = window_basis(time, omega, harmonics, degree)
-        change = frequency_step(sums(basis, time, [load], step=step))
-        omega += change
-        if abs(change) * basis.half_width < CONVERGED:
-            break
-    return omega
+def load_columns(basis: Basis, load: Float, refine: bool) -> Float:
+    """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
+    selected = np.eye(basis.size)[:, : basis.linear + refine]
+    if refine:
+        selected[:, basis.linear] = frequency_direction(basis, load)
+    return selected
 
 
 def frequency_step(blocks: BlockSums) -> float:
@@ -186,29 +183,10 @@ def frequency_step(blocks: BlockSums) -> float:
     basis, linear = blocks.basis, blocks.basis.linear
     gram, moments = blocks.totals()
     beta = inverted(gram[:linear, :linear]) @ moments[:linear, 0]
-    columns = np.eye(basis.size)[:, : linear + 1]
-    columns[:, linear] = frequency_direction(basis, beta)
+    columns = load_columns(basis, beta, True)
     change = (inverted(columns.T @ gram @ columns) @ (columns.T @ moments[:, 0]))[linear]
     # Beyond a radian at the ends the linearisation is not valid.
     return float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))
-
-
-def _scanned(time: Float, load: Float, omega: float, degree: int) -> float:
-    """The frequency near an initial guess whose fit has the smallest residual."""
-    span = float(time[-1] - time[0])
-    width = min(0.5 * omega, 2 * np.pi / span)
-    tried = omega + np.linspace(-width, width, 41)
-    thin = slice(None, None, max(1, time.size // 512))
-    level = load - load.mean()
-
-    def residual(w: float) -> float:
-        # Without harmonics, because with them half the frequency would fit as well.
-        basis = window_basis(time[thin], w, 1, degree)
-        columns = basis.columns(time[thin])[: basis.linear]
-        beta = np.linalg.lstsq(columns.T, level[thin])[0]
-        return float(np.sum((level[thin] - beta @ columns) ** 2))
-
-    return float(tried[np.argmin([residual(w) for w in tried])])
 
 
 def _evenly(time: Float, values: Float, most: int) -> tuple[float, Float]:

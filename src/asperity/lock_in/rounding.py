@@ -55,7 +55,9 @@ def rounding_variance(
     return np.asarray(step**2 / (2 * np.pi**2) * np.sum(each**2, axis=1))
 
 
-def with_rounding(reading: LockInReading, time: Float, load: Float, force: Float) -> LockInReading:
+def with_rounding(
+    reading: LockInReading, time: Float, load: Float, force: Float, steps: tuple[float, float]
+) -> LockInReading:
     """The reading with the errors by the recorder's steps in its covariance.
 
     Parameters
@@ -63,6 +65,8 @@ def with_rounding(reading: LockInReading, time: Float, load: Float, force: Float
     reading : LockInReading
     time, load, force : array, (n,)
         Samples of the window.
+    steps : (float, float)
+        Steps of the recorder of load and force, from `step_of`.
     """
     count, scale = reading.harmonics.size, abs(reading.W0)
     variances = []
@@ -71,7 +75,7 @@ def with_rounding(reading: LockInReading, time: Float, load: Float, force: Float
         drift = float(np.sum(reading.drift[c] ** 2)) / 12
         left = float(np.var(reading.residual_of_piece(time, values)[1]))
         noise = float(np.sqrt(left + drift))
-        variances.append(rounding_variance(step_of(values), noise, size, count) / scale**2)
+        variances.append(rounding_variance(steps[c], noise, size, count) / scale**2)
     of_load, of_force = variances
     of_phase = of_load[1] / max(reading.epsilon, 1e-300) ** 2
     added = {

@@ -8,11 +8,7 @@ from typing import Any, TypeVar
 from asperity.errors import Argument, ConstantLoadError, InputError, require
 from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
-from asperity.measurement.stick_slip.measure import (
-    SLIDER,
-    StickSlipMeasurement,
-    measure_stick_slip,
-)
+from asperity.measurement.stick_slip.measure import SLIDER, StickSlipMeasurement, measure_stick_slip
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import OF_MODULATION, OF_SLIPS, Measurement as Question
 from asperity.recording import Trace
@@ -249,12 +245,9 @@ def _which_force(trace: Trace) -> InputError:
     (name,) = trace.channels
     friction, force = (Argument("columns", role, name) for role in ("friction", "F"))
     load = Argument("channels", "load", "1200 N")
-    return InputError(
-        Argument("columns", "friction"),
-        "name the friction in a recording of one column",
-        f"'{name}'",
-        f"where it is F/W write {friction}; where it is the force write {force} {load}",
-    )
+    rule = "name the friction in a recording of one column"
+    advice = f"where it is F/W write {friction}; where it is the force write {force} {load}"
+    return InputError(Argument("columns", "friction"), rule, f"'{name}'", advice)
 
 
 def _without_motion(
@@ -270,9 +263,5 @@ def _without_motion(
     if events is not None and events.kind == "cannot tell":
         got += f", and as slips {events.regimes[0].evidence}"
         advice += f"; {Argument('measure.stick_slip')} reads slips nevertheless"
-    return InputError(
-        "measure.trace",
-        "have a modulated load, velocity steps, holds, slips or steady friction",
-        got,
-        advice,
-    )
+    rule = "have a modulated load, velocity steps, holds, slips or steady friction"
+    return InputError("measure.trace", rule, got, advice)

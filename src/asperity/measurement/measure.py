@@ -220,7 +220,9 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         chosen = part or max(
             (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
         )
-        first, stop = _chosen(samples, chosen, start, DRIFTS[question.detrend])
+        first, stop = clean_run(chosen.first, chosen.stop, samples.defects)
+        inside, degree = slice(first, stop), DRIFTS[question.detrend]
+        first += settled(samples.time[inside], samples.force[inside], start, degree)
     else:
         first, stop = _given(samples.time, window)
         # F(0) is that next to the stretch that is read.
@@ -228,33 +230,30 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     if question.whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
-    time, force_values = samples.time[cut], samples.force[cut]
+    time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
     reading = lock_in(
         time,
-        samples.load[cut],
-        force_values,
+        load,
+        force,
         frequency=start,
         harmonics=question.harmonics,
         detrend=question.detrend,
         refine=not question.exact_frequency,
         settles=True,
     )
-    reading = with_rounding(reading, time, samples.load[cut], force_values)
+    steps = step_of(load), step_of(force)
+    reading = with_rounding(reading, time, load, force, steps)
     chosen_by = "program" if window is None else "user"
-    steps = step_of(force_values), step_of(samples.load[cut])
     before, after = _around(samples, parts, chosen, reading.W0, steps)
-    rates = _rates(samples, (before, after))
-    if after and before and rates[0] and rates[1]:
+    if after and before and before.rate and after.rate:
         # If a pause drifts while the pause before the modulation does not, it still recovers.
-        change = rates[1].beyond(rates[0]) * (after[0].end - after[0].start)
-        if change > LOCK_IN["transient"][0] * abs(after[0].value):
+        change = after.rate.beyond(before.rate) * (after.force.end - after.force.start)
+        if change > LOCK_IN["transient"][0] * abs(after.force.value):
             after = None
-    pauses = [rates[0]] if rates[0] else []
+    pauses = [before.rate] if before and before.rate else []
     if before and after:
-        pauses.append(rate_between(before[0], after[0]))
-    load_values = samples.load[cut]
-    steady_force = reading.without_settling(time, force_values)
-    sides = [side[0] if side else None for side in (before, after)]
+        pauses.append(rate_between(before.force, after.force))
+    levels = [side.force if side else None for side in (before, after)]
     answers = (
         checks.modulation(reading),
         checks.periods(reading),
@@ -262,21 +261,21 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.contact(reading),
         checks.friction(reading.mean_friction),
         steadiness.leakage(reading),
-        checks.other_modulation(reading, time, load_values),
-        steadiness.steady_load(reading, time, load_values),
+        checks.other_modulation(reading, time, load),
+        steadiness.steady_load(reading, time, load),
         steadiness.steady_response(reading),
         checks.transient(reading, chosen_by, pauses),
-        checks.stick_slip(reading, time, steady_force),
+        checks.stick_slip(reading, time, reading.without_settling(time, force)),
         checks.load_harmonics(reading),
-        checks.resolution(reading, load_values, steady_force),
-        *instrument.made_force(reading, samples, time, load_values, force_values),
-        instrument.held_samples(reading, load_values, force_values),
-        instrument.flat_top(reading, time, load_values, force_values),
+        checks.resolution(reading, steps),
+        *instrument.made_force(reading, samples, time, load, force),
+        instrument.held_samples(reading, load, force),
+        instrument.flat_top(reading, time, load, force),
         instrument.mains(reading, samples, parts),
         *instrument.lines_in_the_pauses(reading, samples, parts),
-        instrument.hum(reading, time, force_values),
-        steadiness.shifting_response(reading, time, force_values),
-        checks.drift(reading, *sides),
+        instrument.hum(reading, time, force),
+        steadiness.shifting_response(reading, time, force),
+        checks.drift(reading, *levels),
         *_findings(samples, first, stop, [before, after]),
     )
     static = _static_friction(reading, [b for b in (before, after) if b], pauses)
@@ -285,8 +284,8 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
     whole = float(np.hypot(doubt, static[1]))
     return Measurement(
         reading=reading,
-        before=before[0] if before else None,
-        after=after[0] if after else None,
+        before=levels[0],
+        after=levels[1],
         static_friction=static[0],
         delta_mu=reading.mean_friction - static[0],
         delta_mu_uncertainty=whole,
@@ -329,6 +328,8 @@ class _Pause(NamedTuple):
     friction: MeanLevel
     #: Standard error of the friction by the steps of the recorder, the same in all pauses.
     rounding: float
+    #: Rate at which the force changes; None of a short pause.
+    rate: Rate | None
 
 
 def _findings(samples: Samples, first: int, stop: int, sides: list[_Pause | None]) -> list[Check]:
@@ -357,12 +358,6 @@ def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadI
     return parts if any(part.modulated for part in parts) else [whole]
 
 
-def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int) -> tuple[int, int]:
-    first, stop = clean_run(part.first, part.stop, samples.defects)
-    inside = slice(first, stop)
-    return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
-
-
 def _given(time: Float, window: tuple[float, float]) -> tuple[int, int]:
     start, end = window
     first = int(np.searchsorted(time, start, side="left"))
@@ -381,13 +376,12 @@ def _around(
     mean_load: float,
     steps: tuple[float, float],
 ) -> tuple[_Pause | None, _Pause | None]:
-    """The pauses before and after the stretch that is read; `steps` of force and load."""
+    """The pauses before and after the stretch that is read; `steps` of load and force."""
     at, most = parts.index(chosen), chosen.stop - chosen.first
-    sides: list[_Pause | None] = []
-    for step in (-1, 1):
+    sides: list[_Pause | None] = [None, None]
+    for side, step in enumerate((-1, 1)):
         pause = parts[at + step] if 0 <= at + step < len(parts) else None
         if pause is None or pause.modulated or pause.stop - pause.first < 16:
-            sides.append(None)
             continue
         first, stop = pause.first, pause.stop
         # Parts of a pause that are far from the stretch are left out.
@@ -401,12 +395,10 @@ def _around(
             time = samples.time[first:stop]
             first += settled(time, samples.force[first:stop], _no_modulation(time), 1)
         first, stop = under_the_same_load(samples.load, first, stop, mean_load, before=step < 0)
-        if stop - first < 16:
-            sides.append(None)
-            continue
-        cut = slice(first, stop)
-        values = samples.time[cut], samples.force[cut], samples.load[cut]
-        sides.append(_pause(*values, steps, recovers=recovers))
+        if stop - first >= 16:
+            cut = slice(first, stop)
+            values = samples.time[cut], samples.force[cut], samples.load[cut]
+            sides[side] = _pause(*values, steps, recovers=recovers)
     return sides[0], sides[1]
 
 
@@ -422,6 +414,12 @@ def _pause(
 
     None if that level is not determined.
     """
+    rate = None
+    if time.size > _FEWEST:
+        at, means = bin_means(time, force)
+        fit = fit_trend(columns(at - at[0], 1), means)
+        doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
+        rate = Rate(float(fit.beta[1]), doubt, float(fit.dof))
     shift = variance = 0.0
     settling = settling_from(time, force, _no_modulation(time), 1) if recovers else None
     if settling is not None and settling.possible:
@@ -435,38 +433,21 @@ def _pause(
             return None
     of_steps = [
         float(rounding_variance(step, float(np.std(values)))[0])
-        for step, values in zip(steps, (force, load), strict=True)
+        for step, values in zip(steps, (load, force), strict=True)
     ]
-    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[0])
+    doubts = level.uncertainty, np.sqrt(variance), np.sqrt(of_steps[1])
     level = level._replace(value=level.value + shift, uncertainty=float(np.linalg.norm(doubts)))
     # The ratio has the noise of both channels, less what they share.
     ratio = level.value / of_load.value
     noise = mean_level(time, force - ratio * load)
     doubt = float(np.hypot(noise.uncertainty, np.sqrt(variance))) / abs(of_load.value)
-    rounding = float(np.sqrt(of_steps[0] + ratio**2 * of_steps[1])) / abs(of_load.value)
-    return _Pause(level, of_load, noise._replace(value=ratio, uncertainty=doubt), rounding)
-
-
-def _rates(samples: Samples, sides: tuple[_Pause | None, ...]) -> list[Rate | None]:
-    """Rates at which the force changes in the pauses."""
-    rates: list[Rate | None] = []
-    for side in sides:
-        rates.append(None)
-        if side is None:
-            continue
-        first, stop = np.searchsorted(samples.time, [side.force.start, side.force.end])
-        if stop - first > _FEWEST:
-            at, means = bin_means(samples.time[first:stop], samples.force[first:stop])
-            fit = fit_trend(columns(at - at[0], 1), means)
-            doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
-            rates[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
-    return rates
+    rounding = float(np.sqrt(of_steps[1] + ratio**2 * of_steps[0])) / abs(of_load.value)
+    friction = noise._replace(value=ratio, uncertainty=doubt)
+    return _Pause(level, of_load, friction, rounding, rate)
 
 
 def _static_friction(
-    reading: LockInReading,
-    sides: list[_Pause],
-    pauses: list[Rate],
+    reading: LockInReading, sides: list[_Pause], pauses: list[Rate]
 ) -> tuple[float, float, float]:
     """F(0)/W0, its standard uncertainty, drift between the sides included, and its dof."""
     if not sides:
@@ -478,18 +459,12 @@ def _static_friction(
     if len(sides) == 1:
         # F(0) at the other end was not recorded, but the force drifts in the window or the pause.
         level, load = sides[0].force, sides[0].load
-        rates = list(pauses)
-        if reading.drift.shape[1]:
-            rates.append(drift_rate(reading))
+        rates = [*pauses, drift_rate(reading)] if reading.drift.shape[1] else pauses
         rate = min(rates, key=lambda each: each.uncertainty, default=Rate(0.0, 0.0, 1.0))
         if abs(rate.value) > _DRIFTS * rate.uncertainty:
             away = (reading.start + reading.end - level.start - level.end) / 2
             drifted = abs(rate.value * away / load.value) / np.sqrt(3)
-    dof = effective_dof(
-        [
-            *((d, side.friction.dof) for d, side in zip(doubts, sides, strict=True)),
-            (float(drifted), 30.0),
-        ]
-    )
+    parts = [(doubt, side.friction.dof) for doubt, side in zip(doubts, sides, strict=True)]
+    dof = effective_dof([*parts, (float(drifted), 30.0)])
     whole = np.linalg.norm([*doubts, drifted, max(side.rounding for side in sides)])
     return float(np.mean(ratios)), float(whole), dof

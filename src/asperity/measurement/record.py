@@ -59,10 +59,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
         "harmonics": _pairs(reading.harmonics),
         "load_harmonics": _pairs(reading.load_harmonics),
         "covariance": {"names": list(reading.names), "matrix": reading.covariance.tolist()},
-        "observable_covariance": {
-            "names": list(joint[0]),
-            "matrix": joint[1].tolist(),
-        },
+        "observable_covariance": {"names": list(joint[0]), "matrix": joint[1].tolist()},
         "settlings": [
             {
                 "order": settling.order,

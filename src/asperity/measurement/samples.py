@@ -32,8 +32,6 @@ _CONTRADICTS = 0.1
 #: Samples that a lock-in needs.
 _FEWEST = 16
 
-_NONE: Index = np.empty(0, dtype=np.intp)
-
 #: The largest value of a channel must lie between the inverse of this number and this number: fits
 #: compute fourth powers of ratios, which must not overflow.
 _LARGEST = 1e30
@@ -119,22 +117,17 @@ def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None
     """
     if W.kind == F.kind:
         return
-    area = Argument("read.area", value="25 cm^2")
     unit = " and ".join(
         str(Argument("units", side.recorded_name, other.unit if other.kind else "N"))
         for side, other in ((F, W), (W, F))
         if side.kind is None
     )
-    raise InputError(
-        "measure.force",
-        "have the dimension of the load",
-        f"{_dimension_text(F, force)} and {_dimension_text(W, load)}",
-        f"give the area that makes the stress a force, like {area}"
-        if {W.kind, F.kind} == {"force", "pressure"}
-        else f"give the unit when reading, like {unit}"
-        if unit
-        else "name the units when reading",
-    )
+    advice = f"give the unit when reading, like {unit}" if unit else "name the units when reading"
+    if {W.kind, F.kind} == {"force", "pressure"}:
+        area = Argument("read.area", value="25 cm^2")
+        advice = f"give the area that makes the stress a force, like {area}"
+    got = f"{_dimension_text(F, force)} and {_dimension_text(W, load)}"
+    raise InputError("measure.force", "have the dimension of the load", got, advice)
 
 
 def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Float) -> None:
@@ -166,16 +159,11 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Flo
     # The sign of a shear is a convention of the recorder.
     if abs(abs(made) - abs(written)) <= _CONTRADICTS * abs(written):
         return
-    names = [trace.name_of(used) for used in (shear, recorded)]
-    raise InputError(
-        "measure.force",
-        "agree with the recorded friction",
-        f"{made:.4g} for the median of "
-        f"F/W with '{names[0]}' and {written:.4g} for that of '{names[1]}'",
-        "choose one, like "
-        f"{Argument('columns', 'F', names[0])} or {Argument('columns', 'friction', names[1])}, or "
-        "correct the unit of the force or the load",
-    )
+    one, other = (trace.name_of(used) for used in (shear, recorded))
+    got = f"{made:.4g} for the median of F/W with '{one}' and {written:.4g} for that of '{other}'"
+    like = f"{Argument('columns', 'F', one)} or {Argument('columns', 'friction', other)}"
+    advice = f"choose one, like {like}, or correct the unit of the force or the load"
+    raise InputError("measure.force", "agree with the recorded friction", got, advice)
 
 
 def _friction(trace: Trace) -> Channel | None:
@@ -277,9 +265,12 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     times the load, and its name says so.
     """
     W = named_channel(trace, load, "load")
-    F, name = _force(trace, force, W)
+    F, _ = shear_channel(trace, force, W)
+    names = (trace.name_of(W), trace.name_of(F))
+    if F.kind == "dimensionless" and W.kind != "dimensionless":
+        F = replace(W, values=F.values * W.values, recorded_name=names[1])
+        names = (names[0], f"{names[1]} x load")
     require_one_dimension(W, F, load, force)
-    names = (trace.name_of(W), name)
     if names[0] == names[1]:
         rule, got = "be another channel than the load", f"'{names[0]}' for both"
         raise InputError("measure.force", rule, got, "name the one that is the shear force")
@@ -302,8 +293,9 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
         recorded = {names[0]: W.values, names[1]: F.values}
         raise too_few(_FEWEST, time.size, trace.time, recorded)
     require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
-    seen = {"gap", "spike", "saturation"} & names_found
-    defects = rows_to_avoid(time, values, keep) if seen or keep is not None else _NONE
+    defects: Index = np.empty(0, dtype=np.intp)
+    if keep is not None or names_found & {"gap", "spike", "saturation"}:
+        defects = rows_to_avoid(time, values, keep)
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
 
@@ -325,13 +317,10 @@ def too_few(fewest: int, usable: int, time: Float, columns: Mapping[str, Float])
         for name, k in known.items()
         if k < time.size
     ]
-    advice = "choose another column" if lacking else "give a longer recording"
-    return InputError(
-        "measure.trace",
-        f"hold at least {fewest} usable samples",
-        f"{usable} of {time.size}" + (f": {', '.join(lacking)}" if lacking else ""),
-        f"{advice} or window",
-    )
+    got = f"{usable} of {time.size}" + (f": {', '.join(lacking)}" if lacking else "")
+    advice = ("choose another column" if lacking else "give a longer recording") + " or window"
+    rule = f"hold at least {fewest} usable samples"
+    return InputError("measure.trace", rule, got, advice)
 
 
 def require_computable(**channels: Float) -> None:
@@ -360,15 +349,6 @@ def about_window(samples: Samples, start: float, end: float) -> list[Finding]:
     if not samples.findings:
         return []
     return list(samples.trace.slice(start, np.nextafter(end, np.inf)).findings)
-
-
-def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
-    channel, _ = shear_channel(trace, name, load)
-    recorded = trace.name_of(channel)
-    if channel.kind != "dimensionless" or load.kind == "dimensionless":
-        return channel, recorded
-    product = replace(load, values=channel.values * load.values, recorded_name=recorded)
-    return product, f"{recorded} x load"
 
 
 def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:

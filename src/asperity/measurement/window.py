@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, merged, sums
+from asperity.lock_in.normal_equations import even_step, merged, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 from asperity.measurement.series import neighbour_scatter
@@ -105,9 +105,19 @@ def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
     (array (blocks,), int array (blocks + 1,))
         Amplitudes, and the samples where the blocks begin and end.
     """
-    blocks = local(time, [load], frequency)
+    basis = window_basis(time, 2 * np.pi * frequency, 1, 1)
+    periods = 2 * basis.half_width * frequency
+    # Blocks of one period to four or more.
+    wanted = max(periods / _PERIODS, min(periods, _FEW_BLOCKS, time.size / _SAMPLES))
+    wanted = int(min(_MOST_BLOCKS, max(1, wanted)))
+    step = even_step(time, basis.omega)
+    blocks = merged(sums(basis, time, [load], blocks=wanted, step=step), wanted)
     while True:
-        beta = _solved(blocks)
+        linear = basis.linear
+        gram = blocks.gram[:, :linear, :linear]
+        # The columns of a block next to a gap may be linearly dependent.
+        inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+        beta = inverse @ blocks.moments[:, :linear]
         amplitude = np.hypot(beta[:, 2, 0], beta[:, 3, 0])
         fewer = amplitude.size // 2
         if fewer < _FEWEST or neighbour_scatter(amplitude) < _SMOOTH * amplitude.max():
@@ -115,17 +125,6 @@ def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
         blocks = merged(blocks, fewer)
     edges = np.concatenate([[0], np.cumsum(blocks.count)]).astype(np.intp)
     return amplitude, edges
-
-
-def local(time: Float, channels: list[Float], frequency: float) -> BlockSums:
-    """Sums over short blocks, of one period to four or more."""
-    half = float(time[-1] - time[0]) / 2
-    basis = Basis(2 * np.pi * frequency, 1, 1, float(time[0]) + half, half)
-    periods = 2 * half * frequency
-    wanted = max(periods / _PERIODS, min(periods, _FEW_BLOCKS, time.size / _SAMPLES))
-    wanted = int(min(_MOST_BLOCKS, max(1, wanted)))
-    step = even_step(time, basis.omega)
-    return merged(sums(basis, time, channels, blocks=wanted, step=step), wanted)
 
 
 def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
@@ -210,13 +209,6 @@ def whole_periods(time: Float, frequency: float) -> int:
     step = span / (time.size - 1)
     whole = np.floor((span + step) * frequency * (1 + 1e-12)) / frequency
     return int(np.searchsorted(time, time[0] + whole - 0.5 * step, side="right"))
-
-
-def _solved(blocks: BlockSums) -> Float:
-    linear = blocks.basis.linear
-    gram = blocks.gram[:, :linear, :linear]
-    # The columns of a block next to a gap may be linearly dependent.
-    return np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ blocks.moments[:, :linear]
 
 
 def under_the_same_load(

@@ -6,13 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from asperity.errors import InputError, require
-from asperity.measurement.campaign import (
-    Row,
-    modulated_rows,
-    sliding_rows,
-    table_file,
-    write_rows,
-)
+from asperity.measurement.campaign import Row, modulated_rows, sliding_rows, table_file, write_rows
 from asperity.measurement.measure import Measurement
 from asperity.measurement.sliding.measure import SlidingMeasurement
 from asperity.parameters.arguments import FilePath, typed

@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.parameters.arguments import number, typed
-from asperity.recording.defects.check import CHECKED, check
+from asperity.recording.defects.check import check
 from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
-from asperity.recording.roles import kinds_of, nouns, role_of
-from asperity.recording.trace import Channel, Trace
+from asperity.recording.roles import free_name, kinds_of, nouns, role_of
+from asperity.recording.trace import Channel, Trace, checked
 from asperity.units import KINDS, to_si
 from asperity.units.scale import kind_of_dimension, unit_text
 
@@ -148,12 +147,13 @@ def _with_channel(
     rule, advice = "give numbers", "correct the expression"
     require(np.isfinite(values).any() or not values.size, field, rule, "no finite one", advice)
     if role == "time":
-        return _with_time(trace, values, text)
+        provenance = {**trace.provenance, "time": f"derived: {text}"}
+        return checked(replace(trace, time=values, provenance=provenance))
     unit = KINDS[kind].si if kind else ""
     channel = Channel(values, kind, unit, target, unit or unit_text(quantity.dimension))
     channels, findings, roles = dict(trace.channels), trace.findings, dict(trace.roles)
     if target in channels:
-        kept = _free_name(f"{target} (recorded)", channels)
+        kept = free_name(f"{target} (recorded)", channels)
         channels = {kept if name == target else name: c for name, c in channels.items()}
         findings = tuple(_renamed(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
@@ -165,13 +165,6 @@ def _with_channel(
     direct = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
     inherited = _inherited(findings, sources, target, {f.name for f in direct})
     return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
-
-
-def _with_time(trace: Trace, time: Float, text: str) -> Trace:
-    kept = [f for f in trace.findings if f.name not in CHECKED]
-    moved = replace(trace, time=time, findings=())
-    provenance = {**trace.provenance, "time": f"derived: {text}"}
-    return replace(moved, findings=(*kept, *check(moved)), provenance=provenance)
 
 
 def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: Argument) -> None:
@@ -208,11 +201,3 @@ def _inherited(
 def _renamed(finding: Finding, old: str, new: str) -> Finding:
     moved = new + finding.where.removeprefix(old)
     return replace(finding, where=moved) if finding.concerns(old) else finding
-
-
-def _free_name(name: str, taken: Mapping[str, object]) -> str:
-    number = 2
-    free = name
-    while free in taken:
-        free, number = f"{name} ({number})", number + 1
-    return free

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from asperity.arrays import Float
 from asperity.errors import InputError, printable
 
 Severity = Literal["note", "warning", "error"]
@@ -55,6 +56,11 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.name} ({self.where}): {self.sentence}"
+
+
+def at_row(channel: str, row: int, time: Float) -> str:
+    """Where a finding is: a channel or time, a row, and its time (s)."""
+    return f"{channel}, row {row}, t = {time[row]:.10g} s"
 
 
 def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:

@@ -181,6 +181,14 @@ def recorded_as(name: str, headings: Mapping[str, str]) -> str | None:
     return same[0] if len(same) == 1 else None
 
 
+def free_name(name: str, taken: Mapping[str, object]) -> str:
+    """A name that is not taken: the name itself, or with a number behind it."""
+    number, free = 2, name
+    while free in taken:
+        free, number = f"{name} ({number})", number + 1
+    return free
+
+
 def _bare(name: str) -> str:
     """A name without blanks, and without dots and underscores at its ends."""
     return name.replace(" ", "").strip("._")
@@ -223,27 +231,20 @@ def find_channel(
         return fitting[0]
     field = Argument("Trace.channel", role or name)
     if fitting:
-        raise InputError(
-            field,
-            "name one channel",
-            f"several, {' or '.join(map(repr, fitting))}",
-            f"choose when reading, like {Argument('columns', role or name, fitting[0])}",
-        )
+        got = f"several, {' or '.join(map(repr, fitting))}"
+        advice = f"choose when reading, like {Argument('columns', role or name, fitting[0])}"
+        raise InputError(field, "name one channel", got, advice)
     if role is None or not kinds:
         advice = closest(name, kinds) if kinds else "the recording has no column besides time"
         raise InputError(field, "name a channel", f"none like '{name}'", advice)
     for other, kind in kinds.items():
         if kind is not None and candidates(role, {other: None}):
             unit = Argument("units", other, "kgf" if kind == "mass" else "...")
-            raise InputError(
-                field,
-                f"be {nouns(ROLES[role].kinds)}",
-                f"'{other}', {nouns([kind])}",
-                f"say what its unit is, like {unit}, or choose another column",
-            )
-    raise InputError(
-        field, "name a channel", f"no column named like {_TITLES[role]}", _missing(role, kinds)
-    )
+            rule, got = f"be {nouns(ROLES[role].kinds)}", f"'{other}', {nouns([kind])}"
+            advice = f"say what its unit is, like {unit}, or choose another column"
+            raise InputError(field, rule, got, advice)
+    got = f"no column named like {_TITLES[role]}"
+    raise InputError(field, "name a channel", got, _missing(role, kinds))
 
 
 _TITLES = {

@@ -167,9 +167,7 @@ class Trace(Displayed):
             rule, got = "enclose samples", f"{start} to {end}"
             raise InputError("slice.start and slice.end", rule, got, f"{_extent(self.time)}")
         cut = {k: replace(c, values=c.values[inside]) for k, c in self.channels.items()}
-        kept = tuple(f for f in self.findings if f.name not in CHECKED)
-        part = replace(self, time=self.time[inside], channels=cut, findings=())
-        return replace(part, findings=kept + check(part))
+        return checked(replace(self, time=self.time[inside], channels=cut))
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled `xarray.Dataset` over ``time``: units, recorded names, findings, provenance."""
@@ -195,6 +193,12 @@ class Trace(Displayed):
                 "provenance": json.dumps(self.provenance, default=str),
             },
         )
+
+
+def checked(trace: Trace) -> Trace:
+    """A recording with findings of `check` as it is now, and its other findings."""
+    kept = tuple(f for f in trace.findings if f.name not in CHECKED)
+    return replace(trace, findings=kept + check(trace))
 
 
 def _column(values: Any, name: str) -> Float:

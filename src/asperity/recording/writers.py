@@ -28,10 +28,7 @@ _GROUP = "recording"
 
 
 def write(
-    trace: Trace,
-    path: str | os.PathLike[str],
-    *,
-    units: Mapping[str, str] | None = None,
+    trace: Trace, path: str | os.PathLike[str], *, units: Mapping[str, str] | None = None
 ) -> Path:
     """Write a recording to a file, which `asperity.recording.read` reads back.
 

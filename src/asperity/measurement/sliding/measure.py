@@ -21,12 +21,7 @@ from asperity.measurement.series import (
     steady_from,
 )
 from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
-from asperity.measurement.sliding.segments import (
-    Partition,
-    partition,
-    partition_at,
-    require_cuts,
-)
+from asperity.measurement.sliding.segments import Partition, partition, partition_at, require_cuts
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
@@ -37,8 +32,6 @@ from asperity.recording.defects.levels import recorder_step
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from asperity.recording.trace import Trace
 
 
@@ -173,12 +166,18 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
     steps, holds, detrend = question.steps, question.holds, question.detrend
     signals = sliding_signals(trace, question.load, question.force, question.window)
     time, friction = signals.time, signals.friction
-    times = _given_cuts(time, steps, holds)
-    if times is None:
+    # Without times of the user the displacement shows where to cut.
+    times = None
+    if steps is None and holds is None:
         cut = partition(time, signals.displacement)
     else:
+        times = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
+        require_cuts(time, times, f"measure.{'steps' if steps else 'holds'}")
         cut = partition_at(time, signals.displacement, np.array(times), question.velocities)
-        cut = _with_holds(cut, time, holds)
+        if holds is not None:
+            starts = {start for start, _ in holds}
+            edges = [float(time[0]), *(c.time for c in cut.cuts)]
+            cut = replace(cut, holds=tuple(edge in starts for edge in edges))
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
     # Spikes are named by a check; a peak of friction where the drive changes is none.
     wrong = away_from_changes(friction, spikes(friction), bounds[1:-1])
@@ -215,30 +214,6 @@ def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeas
         unread=len(trace.findings) - len(about),
         checks=tuple(checks),
     )
-
-
-def _given_cuts(
-    time: Float,
-    steps: Sequence[float] | None,
-    holds: Sequence[tuple[float, float]] | None,
-) -> list[float] | None:
-    """Times of all cuts that the user has given, in rising order; None if none are."""
-    if steps is None and holds is None:
-        return None
-    cuts = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
-    require_cuts(time, cuts, f"measure.{'steps' if steps else 'holds'}")
-    return cuts
-
-
-def _with_holds(
-    cut: Partition, time: Float, holds: Sequence[tuple[float, float]] | None
-) -> Partition:
-    """The same cuts, with the user's holds as the only holds."""
-    if holds is None:
-        return cut
-    starts = {start for start, _ in holds}
-    edges = [float(time[0]), *(c.time for c in cut.cuts)]
-    return Partition(cut.cuts, cut.velocities, tuple(e in starts for e in edges), cut.doubts)
 
 
 def _segment(
@@ -294,13 +269,9 @@ def _steps(
             # Friction is counted against the motion, whatever its direction.
             turned = -1.0 if np.median(part) < 0 else 1.0
             sides.append((signals.time[low:high], turned * part, velocity))
+        before, after = sides
         step = read_step(
-            change.time,
-            sides[0],
-            sides[1],
-            degree=degree,
-            first_settling=settling,
-            recorded=recorded,
+            change.time, before, after, degree=degree, first_settling=settling, recorded=recorded
         )
         if step is None:
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
@@ -414,10 +385,9 @@ def _checks(
     if steps:
         slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
         share = slow.settling_slip / slow.choices[0].window
-        ask(
-            "settling",
-            share,
+        text = (
             f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of the "
-            "slip that can be compared; a slower one cannot be distinguished from the trend",
+            "slip that can be compared; a slower one cannot be distinguished from the trend"
         )
+        ask("settling", share, text)
     return checks

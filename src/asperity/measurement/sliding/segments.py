@@ -171,10 +171,7 @@ def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
 
 
 def partition_at(
-    time: Float,
-    displacement: Float | None,
-    times: Float,
-    velocities: Sequence[float] | None = None,
+    time: Float, displacement: Float | None, times: Float, velocities: Sequence[float] | None = None
 ) -> Partition:
     """Cut a recording at given times.
 

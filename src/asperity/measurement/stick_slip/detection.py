@@ -168,16 +168,12 @@ def _evidence(peak: Index, trough: Index) -> tuple[int, float]:
     # A single event has a rise on each side.
     if longer if many else ratio > 4:
         return 2, ratio
-    return int(_returns(peak)), ratio
-
-
-def _returns(peak: Index) -> bool:
-    """Whether the peaks of a symmetrical signal come back regularly."""
+    # The peaks of a symmetrical signal may come back regularly.
     cycles = np.diff(peak)
     if cycles.size < _FEWEST_CYCLES:
-        return False
+        return 0, ratio
     low, middle, high = np.quantile(cycles, [0.16, 0.5, 0.84])
-    return bool((high - low) / 2 < _REGULAR * middle)
+    return int((high - low) / 2 < _REGULAR * middle), ratio
 
 
 class _Averages:

@@ -202,13 +202,7 @@ def measure_stick_slip(trace: Trace, question: Question = _DEFAULTS) -> StickSli
         period = 2 * np.pi * np.sqrt(machine.mass / machine.stiffness)
     share = impulses.size / time.size
     parts = regimes(
-        time,
-        friction,
-        events,
-        smallest,
-        falls=len(falls),
-        impulses=share,
-        natural_period=period,
+        time, friction, events, smallest, falls=len(falls), impulses=share, natural_period=period
     )
     slip_share = _slip_share(signals, events)
     slip, speed, energy = _slip_from_spring(events, machine)
@@ -463,52 +457,44 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
     drop = float(np.median(events.drop))
     step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
     near = float(np.mean(events.drop < _NEAR * least))
-    ask(
-        "threshold",
-        near,
+    text = (
         f"drops below {least:.2g}, {percent(least / drop)} of the median, may not be detected; "
-        f"{percent(near)} of the events are smaller than {_NEAR:g} times this limit",
-        ": some events below the limit may be missing",
+        f"{percent(near)} of the events are smaller than {_NEAR:g} times this limit"
     )
+    ask("threshold", near, text, ": some events below the limit may be missing")
     fast = float(np.mean(events.slip_duration < 2 * step))
-    ask(
-        "sampling",
-        fast,
+    text = (
         f"{percent(fast)} of the slips last for less than two samples: their durations and "
-        "velocities are bounds; a higher sampling rate resolves them",
+        "velocities are bounds; a higher sampling rate resolves them"
     )
+    ask("sampling", fast, text)
     drift = float(np.ptp(events.force_before + events.force_after)) / 2 / drop
     ask("drift", drift, f"the middle of the drops varies along the track by {drift:.2g} drops")
     trains = [np.arange(r.first + 1, r.stop) for r in result.regimes if r.sticks]
     after = np.concatenate([np.empty(0, np.intp), *trains])
     if after.size:
         ringing = _ringing(result, after)
-        ask(
-            "ringing",
-            ringing,
-            f"after a slip the mean force departs from the line of the stick by up to "
-            f"{percent(ringing)} of the drop",
-            ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
-            "much",
+        text = (
+            "after a slip the mean force departs from the line of the stick by up to "
+            f"{percent(ringing)} of the drop"
         )
+        doubt = (
+            ": the gauge or the slider rings or follows slowly; drops and ends are uncertain by as "
+            "much"
+        )
+        ask("ringing", ringing, text, doubt)
     hidden, error = _undetected_share(result, after)
     if np.isfinite(hidden):
-        ask(
-            "hidden events",
-            hidden,
-            f"the mean loading of the sticks is {percent(abs(hidden))} "
-            f"{'less' if hidden > 0 else 'more'} than the usual loading",
-            ": small events are missing, or drops are measured too small",
-            error,
-        )
+        than = f"{percent(abs(hidden))} {'less' if hidden > 0 else 'more'} than"
+        text = f"the mean loading of the sticks is {than} the usual loading"
+        doubt = ": small events are missing, or drops are measured too small"
+        ask("hidden events", hidden, text, doubt, error)
     stiffness, error = result.stiffness_from_slope
     given = result.machine.stiffness
     if given is not None and np.isfinite(stiffness):
-        ask(
-            "stiffness",
-            abs(stiffness / given - 1),
+        text = (
             f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
-            f"{error:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m",
-            error=error / given,
+            f"{error:.1g} N/m, {stiffness / given:.3g} times the stated {given:.4g} N/m"
         )
+        ask("stiffness", abs(stiffness / given - 1), text, error=error / given)
     return checks

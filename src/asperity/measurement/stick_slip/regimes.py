@@ -192,8 +192,7 @@ def _without_events(
     kind: Kind = "steady sliding" if share < _BLIND else "cannot tell"
     if kind == "cannot tell":
         seen += f", which is {100 * share:.2g} % of the mean: smaller drops cannot be seen"
-    tenth = max(force.size // 10, 1)
-    change = float(np.mean(force[-tenth:]) - np.mean(force[:tenth])) / 0.9
+    change = _rise(force)
     if abs(change) > max(_BLIND * mean, smallest_drop):
         kind = "cannot tell"
         seen += (
@@ -215,20 +214,19 @@ def _without_events(
     return Regime(kind, float(time[0]), float(time[-1]), 0, 0, seen)
 
 
+def _rise(force: Float) -> float:
+    """Change from the beginning to the end, from the means of its first and its last tenth."""
+    tenth = max(force.size // 10, 1)
+    return float(np.mean(force[-tenth:]) - np.mean(force[:tenth])) / 0.9
+
+
 def _between(
-    time: Float,
-    force: Float,
-    span: tuple[float, float],
-    event: int,
-    cycle: float,
-    slope: float,
+    time: Float, force: Float, span: tuple[float, float], event: int, cycle: float, slope: float
 ) -> list[Regime]:
     """The part before, between or after trains, if it is long."""
     if not span[1] - span[0] > _LONG * cycle:
         return []
-    a, b = np.searchsorted(time, span)
-    tenth = max((b - a) // 10, 1)
-    rise = float(np.mean(force[b - tenth : b]) - np.mean(force[a : a + tenth])) / 0.9
+    rise = _rise(force[slice(*np.searchsorted(time, span))])
     load = slope * (span[1] - span[0])
     share = rise / load if load else np.nan
     kind: Kind = "loading" if rise > _LOADED * load else "steady sliding"

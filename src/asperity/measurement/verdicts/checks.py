@@ -10,7 +10,6 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.lock_in.reading import LockInReading
-from asperity.lock_in.rounding import step_of
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import other_line
 from asperity.measurement.verdicts.verdict import FINDINGS, LOCK_IN, Check, Limits, percent
@@ -26,35 +25,32 @@ _LINE = 6.0
 def modulation(reading: LockInReading) -> Check:
     """Whether the load is modulated at all."""
     number = abs(reading.epsilon) / max(reading.uncertainty("epsilon"), 1e-300)
-    return LOCK_IN.check(
-        "modulation",
-        number,
+    text = (
         f"the load's amplitude is {_times(number)} its uncertainty, epsilon = "
-        f"{reading.epsilon:.4g} at {reading.frequency:.6g} Hz",
+        f"{reading.epsilon:.4g} at {reading.frequency:.6g} Hz"
     )
+    return LOCK_IN.check("modulation", number, text)
 
 
 def periods(reading: LockInReading) -> Check:
     """Whether the window holds enough periods of the modulation."""
     number = reading.periods
-    return LOCK_IN.check(
-        "periods",
-        number,
+    text = (
         f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell "
-        "apart",
+        "apart"
     )
+    return LOCK_IN.check("periods", number, text)
 
 
 def signal(reading: LockInReading) -> Check:
     """Whether the first harmonic stands out of the noise."""
     phasor = reading.phasor(1)
     number = phasor.amplitude / max(phasor.amplitude_uncertainty, 1e-300)
-    return LOCK_IN.check(
-        "signal",
-        number,
-        f"mu1 is {_times(number)} its standard uncertainty; below three its amplitude is "
-        "biased and its phase unknown",
+    text = (
+        f"mu1 is {_times(number)} its standard uncertainty; below three its amplitude is biased "
+        "and its phase unknown"
     )
+    return LOCK_IN.check("signal", number, text)
 
 
 def load_harmonics(reading: LockInReading) -> Check:
@@ -65,15 +61,14 @@ def load_harmonics(reading: LockInReading) -> Check:
     share = second.amplitude
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
     number = effect / max(response.amplitude, 1e-300)
-    return LOCK_IN.check(
-        "load harmonics",
-        number,
+    text = (
         f"the load's second harmonic is {share:.3g} W0; with the ratio mu1/epsilon of the first "
         f"harmonic it makes {effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
-        f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
-        significant=share > 4 * second.amplitude_uncertainty
-        and effect > response.amplitude_uncertainty,
+        f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once"
     )
+    present = share > 4 * second.amplitude_uncertainty
+    seen = present and effect > response.amplitude_uncertainty
+    return LOCK_IN.check("load harmonics", number, text, significant=seen)
 
 
 def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | None) -> Check:
@@ -177,27 +172,30 @@ def other_modulation(reading: LockInReading, time: Float, load: Float) -> Check:
     return LOCK_IN.check("other modulation", number, sentence, significant=seen)
 
 
-def resolution(reading: LockInReading, load: Float, force: Float) -> Check:
+def resolution(reading: LockInReading, steps: tuple[float, float]) -> Check:
     """Whether the steps of the recorder are small against the first harmonics.
 
     Noise of at least half a step smooths the steps; without noise, a harmonic smaller than a step
     cannot be measured.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    steps : (float, float)
+        Steps of the recorder of load and force.
     """
     heights = (reading.epsilon, reading.phasor(1).amplitude)
     answers = []
-    for c, (name, values) in enumerate((("load", load), ("force", force))):
-        step = step_of(values)
+    for c, (name, step) in enumerate(zip(("load", "force"), steps, strict=True)):
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
         answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
     seen, number, name, noisy = max(answers)
-    return LOCK_IN.check(
-        "resolution",
-        number,
+    text = (
         f"the {name} is recorded in steps of {number:.2g} of its first harmonic, with noise of "
-        f"{noisy:.2g} steps",
-        significant=seen,
+        f"{noisy:.2g} steps"
     )
+    return LOCK_IN.check("resolution", number, text, significant=seen)
 
 
 def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
@@ -211,21 +209,20 @@ def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
     span : float
         Length of the window (s).
     """
-    return [_finding(finding, samples, span) for finding in noticed]
-
-
-def _finding(finding: Finding, samples: int, span: float) -> Check:
-    sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
     # Factors that turn the number of a finding into a share of the window.
-    shares = {
-        **dict.fromkeys(("spike", "repeated time", "missing values", "infinite"), 1 / samples),
-        "gap": 1 / span,
-    }
-    if finding.name in FINDINGS:
-        number = finding.number * shares.get(finding.name, 1.0)
-        return FINDINGS.check(finding.name, number, sentence)
-    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[finding.severity]
-    return Limits({finding.name: grave}).check(finding.name, 1.0, sentence)
+    shares = dict.fromkeys(("spike", "repeated time", "missing values", "infinite"), 1 / samples)
+    shares["gap"] = 1 / span
+    limits = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}
+    checks = []
+    for finding in noticed:
+        name, number = finding.name, finding.number * shares.get(finding.name, 1.0)
+        sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
+        if name in FINDINGS:
+            checks.append(FINDINGS.check(name, number, sentence))
+        else:
+            by_severity = Limits({name: limits[finding.severity]})
+            checks.append(by_severity.check(name, 1.0, sentence))
+    return checks
 
 
 def _nonzero(value: float) -> float:
@@ -238,12 +235,11 @@ def _times(number: float) -> str:
 
 def contact(reading: LockInReading) -> Check:
     """Whether the load stays above zero."""
-    return LOCK_IN.check(
-        "contact",
-        reading.epsilon,
+    text = (
         f"the load falls to {1 - reading.epsilon:.3g} W0 in each period; below zero contact is "
-        "lost, or the load's zero or sign is not that of the recording",
+        "lost, or the load's zero or sign is not that of the recording"
     )
+    return LOCK_IN.check("contact", reading.epsilon, text)
 
 
 def friction(number: float) -> Check:

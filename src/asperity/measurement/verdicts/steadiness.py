@@ -87,34 +87,22 @@ def _below(time: Float, values: Float, highest: float) -> SpectralLine | None:
 
 def leakage(reading: LockInReading) -> Check:
     """Whether the load is one line, as the reading takes it to be."""
-    carrier = abs(reading.epsilon * reading.W0) * reading.samples / 2
-    near, far = _sidebands(reading, 0, carrier)
-    if near.size and not far.size:
-        # The sidebands of few periods reach to the next harmonic. Noise is that at the last one.
-        noise = float(reading.noise.spectra[-1, 0, 0].real)
-        far = np.full(_LINES, 2 * noise * reading.samples / carrier**2)
-    number = float(np.sqrt(near.sum()))
-    return LOCK_IN.check(
-        "leakage",
-        number,
+    number, seen = _sidebands(reading, 0, abs(reading.epsilon))
+    text = (
         f"sidebands of the load hold {percent(number)} of its amplitude; if much, it is no "
-        "steady line of one frequency: choose a window in which it is",
-        significant=_stands_out(near, far),
+        "steady line of one frequency: choose a window in which it is"
     )
+    return LOCK_IN.check("leakage", number, text, significant=seen)
 
 
 def steady_response(reading: LockInReading) -> Check:
     """Whether mu1 and its phase are the same in all of the window."""
-    carrier = reading.phasor(1).amplitude * abs(reading.W0) * reading.samples / 2
-    near, far = _sidebands(reading, 1, carrier)
-    number = float(np.sqrt(near.sum()))
-    return LOCK_IN.check(
-        "steady response",
-        number,
+    number, seen = _sidebands(reading, 1, reading.phasor(1).amplitude)
+    text = (
         f"sidebands of the force hold {percent(number)} of its first harmonic; mu1 changes within "
-        "the window, or another line is next to it, if that is much",
-        significant=_stands_out(near, far),
+        "the window, or another line is next to it, if that is much"
     )
+    return LOCK_IN.check("steady response", number, text, significant=seen)
 
 
 def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
@@ -123,40 +111,37 @@ def steady_load(reading: LockInReading, time: Float, load: Float) -> Check:
     drift = float(reading.drift[0].sum())
     number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
     motion = "drifts" if abs(drift) > slow else "wanders"
-    significant = seen if slow >= abs(drift) else abs(drift) > 10 * reading.uncertainty("W0")
-    return LOCK_IN.check(
-        "steady load",
-        number,
-        f"the mean load {motion} by {percent(number)} in the window, apart from its modulation",
-        significant=significant,
-    )
+    if abs(drift) > slow:
+        seen = abs(drift) > 10 * reading.uncertainty("W0")
+    text = f"the mean load {motion} by {percent(number)} in the window, apart from its modulation"
+    return LOCK_IN.check("steady load", number, text, significant=seen)
 
 
-def _sidebands(reading: LockInReading, channel: int, carrier: float) -> tuple[Float, Float]:
-    """Power of the lines next to the modulation, and of lines farther off, over that of the line.
+def _sidebands(reading: LockInReading, channel: int, amplitude: float) -> tuple[float, bool]:
+    """Amplitude of the sidebands over that of a line, and whether they exceed noise farther off.
 
     The power of both sides of the modulation is added.
     """
+    carrier = amplitude * abs(reading.W0) * reading.samples / 2
     blocks, basis = reading.blocks, reading.blocks.basis
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
     most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)
     offsets = np.arange(2, most + 1)
     if not offsets.size or not carrier:
-        return np.zeros(0), np.zeros(0)
+        return 0.0, False
     angle = 2 * np.pi * np.concatenate([-offsets, offsets])[:, None] * at
     turned = (np.cos(angle) - 1j * np.sin(angle)) @ reading.residual[:, 1, channel]
     power = (np.abs(turned / carrier) ** 2).reshape(2, -1).sum(0)
-    near = offsets <= _SIDEBANDS
-    return power[near], power[~near]
-
-
-def _stands_out(near: Float, far: Float) -> bool:
-    """Whether the power near a line exceeds that farther off, which is noise."""
-    if not near.size or not far.size:
-        return False
+    inside = offsets <= _SIDEBANDS
+    near, far = power[inside], power[~inside]
+    if not far.size:
+        # The sidebands of few periods reach to the next harmonic. Noise is that at the last one.
+        noise = float(reading.noise.spectra[-1, channel, channel].real)
+        far = np.full(_LINES, 2 * noise * reading.samples / carrier**2)
     # Either side of a line has a real and an imaginary part.
     chance = float(fdtri(4 * near.size, 4 * far.size, 1 - _CHANCE))
-    return bool(near.mean() > max(3.0, chance) * max(far.mean(), 1e-300))
+    seen = near.mean() > max(3.0, chance) * max(far.mean(), 1e-300)
+    return float(np.sqrt(near.sum())), bool(seen)
 
 
 def _wander(reading: LockInReading, time: Float, load: Float) -> tuple[float, bool]:
@@ -208,11 +193,9 @@ def shifting_response(reading: LockInReading, time: Float, force: Float) -> Chec
     freedom = 2 * (pieces - 1)
     seen = squares > freedom + _BEYOND * np.sqrt(2 * freedom)
     away = np.abs(phasors[:, None] - phasors[None, :])
-    number = float(away.max() / max(abs(mean), 1e-300))
-    return LOCK_IN.check(
-        "shifting response",
-        min(number, 1e300),
+    number = min(float(away.max() / max(abs(mean), 1e-300)), 1e300)
+    text = (
         f"read in {pieces} pieces, the first harmonic of the force shifts by {100 * number:.2g} % "
-        "within the window",
-        significant=bool(seen),
+        "within the window"
     )
+    return LOCK_IN.check("shifting response", number, text, significant=bool(seen))

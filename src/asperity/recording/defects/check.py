@@ -14,7 +14,7 @@ from asperity.arrays import Bool, Float, Index
 from asperity.recording.defects.levels import CROWDED, saturated
 from asperity.recording.defects.sampling import check_sampling, gap_rows
 from asperity.recording.defects.spikes import spikes
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, Severity, at_row
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
@@ -83,16 +83,9 @@ def _missing(values: Float, time: Float, name: str) -> list[Finding]:
             continue
         first = int(np.argmax(bad))
         what = "not a number" if slug == "missing values" else "infinite"
-        findings.append(
-            Finding(
-                slug,
-                "error" if count == values.size or name == "time" else "warning",
-                count,
-                f"{name}, row {first}, t = {time[first]:.10g} s",
-                f"{count} of {values.size} values of '{name}' are {what}, the first in row "
-                f"{first}.",
-            )
-        )
+        grave: Severity = "error" if count == values.size or name == "time" else "warning"
+        text = f"{count} of {values.size} values of '{name}' are {what}, the first in row {first}."
+        findings.append(Finding(slug, grave, count, at_row(name, first, time), text))
     return findings
 
 
@@ -111,27 +104,18 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
     if finite.size < 2:
         return []
     if finite.min() == finite.max():
-        return [
-            Finding(
-                "constant",
-                "note",
-                float(finite[0]),
-                f"{name}, row 0, t = {time[0]:.10g} s",
-                f"'{name}' has one and the same value in the whole recording.",
-            )
-        ]
-    return [
-        Finding(
-            "saturation",
-            "warning",
-            level.rows.size / values.size,
-            f"{name}, row {level.rows[0]}, t = {time[level.rows[0]]:.10g} s",
-            f"{level.rows.size} of {values.size} samples of '{name}' have exactly its "
-            f"{level.side} value, {level.value:.6g}, and at most {level.usual} have a neighbouring "
-            "value: saturated, or held constant by the machine.",
+        text = f"'{name}' has one and the same value in the whole recording."
+        return [Finding("constant", "note", float(finite[0]), at_row(name, 0, time), text)]
+    findings = []
+    for side, value, rows, usual in saturated(values, crowded):
+        text = (
+            f"{rows.size} of {values.size} samples of '{name}' have exactly its {side} value, "
+            f"{value:.6g}, and at most {usual} have a neighbouring value: saturated, or held "
+            "constant by the machine."
         )
-        for level in saturated(values, crowded)
-    ]
+        share, where = rows.size / values.size, at_row(name, int(rows[0]), time)
+        findings.append(Finding("saturation", "warning", share, where, text))
+    return findings
 
 
 def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
@@ -139,21 +123,16 @@ def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
 
     A step, a slip event or a change of the amplitude differs on one side only, and is no spike.
     """
-    at = np.array(spikes(values), dtype=np.intp)
+    at = spikes(values)
     if not at.size:
         return []
     first = int(at[0])
     usual = np.nanmedian(values[max(0, first - 100) : first + 100])
-    return [
-        Finding(
-            "spike",
-            "warning",
-            at.size,
-            f"{name}, row {first}, t = {time[first]:.10g} s",
-            f"{at.size} of {values.size} samples of '{name}' jump out and back, the first, "
-            f"{values[first]:.6g} where {usual:.6g} is usual, in row {first}.",
-        )
-    ]
+    text = (
+        f"{at.size} of {values.size} samples of '{name}' jump out and back, the first, "
+        f"{values[first]:.6g} where {usual:.6g} is usual, in row {first}."
+    )
+    return [Finding("spike", "warning", at.size, at_row(name, first, time), text)]
 
 
 def usable_rows(time: Float, columns: Sequence[Float]) -> Bool:

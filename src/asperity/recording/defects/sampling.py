@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from asperity.arrays import Float, Index
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, at_row
 
 #: Steps that differ by less than this part of their median are even.
 _EVEN = 0.01
@@ -78,17 +79,12 @@ def check_sampling(time: Float) -> list[Finding]:
     gap, missing = _gaps(steps, clean)
     if gap.size:
         longest = gap[np.argmax(missing)]
-        row = int(starts[longest])
-        findings.append(
-            Finding(
-                "gap",
-                "warning",
-                float(missing.sum()),
-                f"time, row {row}, t = {time[row]:.10g} s",
-                f"{_counted(gap.size, 'gap')} in the recording, {missing.sum():.4g} s missing in "
-                f"all; the longest step, {steps[longest]:.4g} s, follows row {row}.",
-            )
+        row, lost = int(starts[longest]), float(missing.sum())
+        text = (
+            f"{_counted(gap.size, 'gap')} in the recording, {lost:.4g} s missing in all; the "
+            f"longest step, {steps[longest]:.4g} s, follows row {row}."
         )
+        findings.append(Finding("gap", "warning", lost, at_row("time", row, time), text))
         steps, starts = np.delete(steps, gap), np.delete(starts, gap)
     if steps.size and not _are_even(steps, clean):
         findings.append(_uneven(steps, starts, time))
@@ -96,32 +92,25 @@ def check_sampling(time: Float) -> list[Finding]:
 
 
 def _backward_and_repeated(steps: Float, time: Float, rows: Index) -> list[Finding]:
+    """Findings on the steps from row to row, of the times `time` in the rows `rows`."""
     findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
         i = int(backward[np.argmin(steps[backward])])
-        findings.append(
-            Finding(
-                "backward time",
-                "error",
-                backward.size,
-                f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s",
-                f"Time runs backward {_counted(backward.size, 'time')}, the farthest by "
-                f"{-steps[i]:.4g} s at row {rows[i + 1]}.",
-            )
+        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
+        text = (
+            f"Time runs backward {_counted(backward.size, 'time')}, the farthest by "
+            f"{-steps[i]:.4g} s at row {rows[i + 1]}."
         )
+        findings.append(Finding("backward time", "error", backward.size, where, text))
     if repeated.size:
         i = int(repeated[0])
-        findings.append(
-            Finding(
-                "repeated time",
-                "warning",
-                repeated.size,
-                f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s",
-                f"{_counted(repeated.size, 'time stamp')} the same as the one before, the first in "
-                f"row {rows[i + 1]}.",
-            )
+        where = f"time, row {rows[i + 1]}, t = {time[i + 1]:.10g} s"
+        text = (
+            f"{_counted(repeated.size, 'time stamp')} the same as the one before, the first in "
+            f"row {rows[i + 1]}."
         )
+        findings.append(Finding("repeated time", "warning", repeated.size, where, text))
     return findings
 
 
@@ -168,58 +157,40 @@ def _gaps(steps: Float, time: Float) -> tuple[Index, Float]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
+    if not suspects.size:
+        return suspects, np.empty(0)
+    # Beyond the ends of a recording its steps are reflected.
+    runs = sliding_window_view(np.pad(steps, _SIDE, mode="reflect"), _SIDE)
     # After a change to a lower rate every step is a candidate; chunks bound the memory.
     gaps, missing = [], []
     for part in np.array_split(suspects, suspects.size // _CHUNK + 1):
-        before = part[:, None] + np.arange(-_SIDE, 0)
-        after = part[:, None] + np.arange(1, _SIDE + 1)
-        limit = np.fmax(_usual(steps, before)[1], _usual(steps, after)[1])
-        usual = np.fmin(_usual(steps, before)[0], _usual(steps, after)[0])
-        is_gap = steps[part] > limit
+        sides = np.stack([runs[part], runs[part + _SIDE + 1]])
+        middle = np.median(sides, axis=-1)
+        scatter = 1.4826 * np.median(np.abs(sides - middle[..., None]), axis=-1)
+        limit = np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
+        is_gap = steps[part] > limit.max(0)
         gaps.append(part[is_gap])
-        missing.append((steps[part] - usual)[is_gap])
+        missing.append((steps[part] - middle.min(0))[is_gap])
     return np.concatenate(gaps), np.concatenate(missing)
-
-
-def _usual(steps: Float, window: Index) -> tuple[Float, Float]:
-    """Median step of each window and the longest usual step; NaN for an empty window."""
-    if not window.size:
-        return np.empty(0), np.empty(0)
-    inside = (window >= 0) & (window < steps.size)
-    values = np.where(inside, steps[np.clip(window, 0, steps.size - 1)], np.nan)
-    empty = ~inside.any(axis=1)
-    values[empty] = np.inf
-    middle = np.nanmedian(values, axis=1)
-    scatter = np.zeros_like(middle)
-    filled = ~empty
-    scatter[filled] = 1.4826 * np.nanmedian(np.abs(values[filled] - middle[filled, None]), axis=1)
-    middle[empty] = np.nan
-    return middle, np.maximum(_GAP * middle, middle + _OUTSIDE * scatter)
 
 
 def _uneven(steps: Float, starts: Index, time: Float) -> Finding:
     median = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - median)))
-    row = int(starts[worst])
-    return Finding(
-        "uneven sampling",
-        "warning",
-        float(np.abs(steps[worst] - median) / median),
-        f"time, row {row}, t = {time[row]:.10g} s",
+    share, where = float(abs(steps[worst] - median) / median), at_row("time", starts[worst], time)
+    text = (
         f"Steps of time run from {steps.min():.4g} s to {steps.max():.4g} s with a median of "
-        f"{median:.4g} s; there is no one sampling rate.",
+        f"{median:.4g} s; there is no one sampling rate."
     )
+    return Finding("uneven sampling", "warning", share, where, text)
 
 
 def _rounded(grid: RoundedGrid) -> Finding:
-    return Finding(
-        "rounded time",
-        "note",
-        grid.quantum / grid.step,
-        "time",
+    text = (
         f"Time stamps are rounded to {grid.quantum:.3g} s; they were read as the even grid that "
-        f"they stand for, of {1 / grid.step:.8g} samples per second.",
+        f"they stand for, of {1 / grid.step:.8g} samples per second."
     )
+    return Finding("rounded time", "note", grid.quantum / grid.step, "time", text)
 
 
 def _are_even(steps: Float, time: Float) -> bool:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from asperity.arrays import Bool, Float, Index
 
@@ -62,16 +63,12 @@ def _standing_out(piece: Float, distance: int) -> Index:
 
 def _locally(sizes: Float, at: Index, distance: int) -> Bool:
     """Whether spikes exceed the usual differences on both sides, as a modulation may begin here."""
-    jump = np.minimum(sizes[at - distance], sizes[at])
-    out = np.ones(at.size, dtype=bool)
+    room = _SIDE + 2 * distance
+    runs = sliding_window_view(np.pad(sizes, room), _SIDE)
     # The steps of the spike itself end where it is one step away.
-    for side in (np.arange(-_SIDE, 0) - 2 * distance + 1, np.arange(_SIDE) + distance):
-        for part in np.array_split(np.arange(at.size), at.size // _CHUNK + 1):
-            near = at[part, None] + side
-            inside = (near >= 0) & (near < sizes.size)
-            near_sizes = np.where(inside, sizes[np.clip(near, 0, sizes.size - 1)], 0.0)
-            out[part] &= jump[part] > _OUT * np.median(near_sizes, axis=1)
-    return out
+    sides = np.stack([runs[at + 1], runs[at + room + distance]])
+    usual = np.median(sides, axis=-1).max(0)
+    return np.asarray(np.minimum(sizes[at - distance], sizes[at]) > _OUT * usual)
 
 
 def _usual(steps: Float) -> float:

@@ -27,6 +27,7 @@ from asperity.recording.roles import (
     ROLES,
     candidates,
     find_channel,
+    free_name,
     kinds_of,
     nouns,
     recorded_as,
@@ -35,7 +36,7 @@ from asperity.recording.roles import (
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
-    from asperity.recording.readers.raw import RawColumn, RawRecording
+    from asperity.recording.readers.raw import RawRecording
 
 
 #: Largest length of a column's name.
@@ -56,7 +57,12 @@ def assemble(
     split = split_labels([c.label for c in recorded.columns])
     # Names of a damaged file may hold anything.
     names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
-    texts = dict(zip(names, map(_unit_text, recorded.columns, split), strict=True))
+    texts = {}
+    for name, column, (_, unit_in_heading) in zip(names, recorded.columns, split, strict=True):
+        # The unit that the format states for the column goes before that in the heading.
+        stated_unit = "" if column.unit is None else column.unit
+        bare = stated_unit.strip().strip("[](){}").strip()
+        texts[name] = unit_in_heading if is_empty(stated_unit) else bare
     headings = {name: c.label for name, c in zip(names, recorded.columns, strict=True)}
     try:
         roles = _chosen_roles(columns or {}, headings)
@@ -99,36 +105,19 @@ def assemble(
     return Trace(clock.time, channels, (*findings, *check(trace)), provenance, roles)
 
 
-def _unit_text(column: RawColumn, split: tuple[str, str]) -> str:
-    """The unit that the format states for the column, else the unit in the heading."""
-    if column.unit is not None and not is_empty(column.unit):
-        return column.unit.strip().strip("[](){}").strip()
-    return split[1]
-
-
 def _unique(names: list[str], findings: list[Finding]) -> list[str]:
     """Unique names: repeated names get numbers."""
     unique: dict[str, None] = {}
-    times: dict[str, int] = {}
     for i, name in enumerate(names):
         plain = name or f"column {i}"
-        free, again = plain, times.get(plain, 1)
-        while free in unique:
-            again += 1
-            free = f"{plain} ({again})"
-        times[plain] = again
+        free = free_name(plain, unique)
         unique[free] = None
         if free != plain:
-            findings.append(
-                Finding(
-                    "repeated name",
-                    "warning",
-                    again,
-                    f"column {i}",
-                    f"The name '{plain}' stands on more than one column; this one is called "
-                    f"'{free}'.",
-                )
+            again = names[: i + 1].count(name)
+            text = (
+                f"The name '{plain}' stands on more than one column; this one is called '{free}'."
             )
+            findings.append(Finding("repeated name", "warning", again, f"column {i}", text))
     return list(unique)
 
 
@@ -148,12 +137,10 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
         kind = known[name].kind if name in known else None
         fitting = kinds_of(role)
         if kind is not None and kind not in fitting:
-            raise InputError(
-                Argument("columns", role),
-                f"be {nouns(fitting)}",
-                f"'{name}', {nouns([kind])}",
-                f"choose another column, or correct its unit with {Argument('units', name, '...')}",
-            )
+            unit = Argument("units", name, "...")
+            advice = f"choose another column, or correct its unit with {unit}"
+            field, rule = Argument("columns", role), f"be {nouns(fitting)}"
+            raise InputError(field, rule, f"'{name}', {nouns([kind])}", advice)
 
 
 def _name_of(wanted: str | int, headings: Mapping[str, str], field: Argument) -> str:
@@ -193,16 +180,10 @@ def _known_units(
         if name in stated:
             wanted = required(stated[name], name)
             if unit is not None and unit != wanted:
-                findings.append(
-                    Finding(
-                        "unit overridden",
-                        "note",
-                        float(wanted.factor),
-                        name,
-                        f"The file gives '{name}' in '{text}'; it was read in '{stated[name]}', as "
-                        "asked.",
-                    )
-                )
+                read = f"it was read in '{stated[name]}', as asked."
+                text = f"The file gives '{name}' in '{text}'; {read}"
+                factor = float(wanted.factor)
+                findings.append(Finding("unit overridden", "note", factor, name, text))
             unit = wanted
         elif unit is None and is_empty(text) and candidates("friction", {name: "dimensionless"}):
             # A coefficient of friction is dimensionless.
@@ -214,13 +195,9 @@ def _known_units(
 
 def _left_out(names: list[str]) -> Finding:
     named = listed(map(repr, names), most=12)
-    return Finding(
-        "text column",
-        "note",
-        len(names),
-        named,
-        f"{named} {'holds' if len(names) == 1 else 'hold'} text and no numbers, and was left out.",
-    )
+    holds = "holds" if len(names) == 1 else "hold"
+    text = f"{named} {holds} text and no numbers, and was left out."
+    return Finding("text column", "note", len(names), named, text)
 
 
 def _folded(findings: list[Finding]) -> list[Finding]:
@@ -236,20 +213,13 @@ def _folded(findings: list[Finding]) -> list[Finding]:
 
 
 def _unknown(channels: Mapping[str, Channel]) -> list[Finding]:
-    return [
-        Finding(
-            "unknown unit",
-            "warning",
-            1.0,
-            name,
-            (
-                f"The unit '{c.recorded_unit}' of '{name}' is not known"
-                if c.recorded_unit
-                else f"The file states no unit of '{name}'"
-            )
-            + "; its values are as recorded, until "
-            f"{Argument('units', name, '...')} says what they are.",
-        )
-        for name, c in channels.items()
-        if c.kind is None
-    ]
+    findings = []
+    for name, c in channels.items():
+        if c.kind is None:
+            text = f"The file states no unit of '{name}'"
+            if c.recorded_unit:
+                text = f"The unit '{c.recorded_unit}' of '{name}' is not known"
+            unit = Argument("units", name, "...")
+            text += f"; its values are as recorded, until {unit} says what they are."
+            findings.append(Finding("unknown unit", "warning", 1.0, name, text))
+    return findings

@@ -98,22 +98,18 @@ def _from_first_column(
     numbers = values[first]
     rises = numbers.dtype.kind in "iuf" and numbers.size > 1 and bool(np.all(np.diff(numbers) > 0))
     if not (bare and rises and len(values) > 1):
-        raise InputError(
-            Argument("columns", "time"),
-            "be a column",
-            f"none among {listed(map(repr, values))} that is named like time",
+        got = f"none among {listed(map(repr, values))} that is named like time"
+        advice = (
             f"give the sampling rate, like {Argument('rate', value='10 kHz')}, or, if one of them "
-            f"is time, its name with {Argument('columns', 'time', '...')}",
+            f"is time, its name with {Argument('columns', 'time', '...')}"
         )
+        raise InputError(Argument("columns", "time"), "be a column", got, advice)
     clock = _from_column(first, values, units)
-    assumed = Finding(
-        "no header",
-        "warning",
-        len(values),
-        first,
+    text = (
         "The file names no columns; the first, which only rises, was taken for time; say "
-        f"{Argument('columns', 'time', '0')} to confirm, and name the units.",
+        f"{Argument('columns', 'time', '0')} to confirm, and name the units."
     )
+    assumed = Finding("no header", "warning", len(values), first, text)
     return Clock(clock.time, clock.source, first, [assumed, *clock.findings])
 
 
@@ -122,17 +118,14 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
     if raw.dtype.kind not in "iufb":
         return _from_dates(name, raw)
     unit = units.get(name)
+    findings = []
     if unit is None:
-        assumed = Finding(
-            "unknown unit",
-            "warning",
-            1.0,
-            name,
+        text = (
             f"The file states no unit of '{name}' that is known; seconds were assumed, until "
-            f"{Argument('units', name, '...')} says otherwise.",
+            f"{Argument('units', name, '...')} says otherwise."
         )
-        return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [assumed])
-    return Clock(in_si(raw, unit), f"column '{name}'", name)
+        findings.append(Finding("unknown unit", "warning", 1.0, name, text))
+    return Clock(in_si(raw, unit), f"column '{name}'", name, findings)
 
 
 def _from_dates(name: str, raw: NDArray[Any]) -> Clock:

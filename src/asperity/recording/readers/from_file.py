@@ -31,7 +31,7 @@ from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive, stress_to_force
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
-from asperity.recording.readers.raw import RawRecording
+from asperity.recording.readers.raw import RawRecording, refuse_truncated
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
@@ -152,13 +152,9 @@ def raw_recording(
         raise InputError("recording.path", "fit into memory", got, "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
-        raise InputError(
-            "recording.path",
-            f"be a whole file of format '{name}'",
-            f"'{path.name}', which may "
-            f"be cut or damaged: its reader could not read it ({type(error).__name__}: {error})",
-            "copy it again from where it was recorded",
-        ) from None
+        rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {error}"
+        why = f"which may be cut or damaged: its reader could not read it ({why})"
+        raise refuse_truncated(path, why, rule) from None
     if not isinstance(recorded, RawRecording):
         rule, advice = "be a reader that returns a RawRecording", "correct the reader"
         raise InputError("read.format", rule, f"{type(recorded).__name__} of '{name}'", advice)

@@ -422,13 +422,10 @@ def layout_of(
         scored, key=lambda s: (s[0][0], s[1][0] is not None and s[0][1] > 1, s[0][1])
     )
     if not sample or score < 0.5:
-        raise InputError(
-            "recording.path",
-            "hold a table of numbers",
-            f"'{path.name}' without one that is understood",
-            f"give {Argument('delimiter', value='...')} and {Argument('decimal', value='...')}, "
-            "or another file",
-        )
+        named = [Argument(name, value="...") for name in ("delimiter", "decimal")]
+        got = f"'{path.name}' without one that is understood"
+        advice = f"give {named[0]} and {named[1]}, or another file"
+        raise InputError("recording.path", "hold a table of numbers", got, advice)
     rows = [cells_of(text, separators[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]
     closed = width > 1 and separators[0] is not None and not any(row[-1] for row in rows)

@@ -22,12 +22,7 @@ import numpy as np
 
 from asperity.errors import Argument
 from asperity.recording.finding import Finding
-from asperity.recording.readers.raw import (
-    RawColumn,
-    RawRecording,
-    beginning,
-    refuse_truncated,
-)
+from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, refuse_truncated
 from asperity.recording.roles import candidates
 
 _START = struct.Struct(">20siiif")
@@ -64,6 +59,11 @@ class _Header:
     channels: tuple[_Channel, ...]
     size: int
 
+    @property
+    def elements(self) -> int:
+        """Numbers behind the header."""
+        return sum(channel.elements for channel in self.channels)
+
 
 def is_format(path: Path) -> bool:
     """Whether the beginning of a file makes sense as a header."""
@@ -76,7 +76,12 @@ def read(path: Path) -> RawRecording:
     readings = _headers(raw[: 1 << 12].tobytes())
     if not readings:
         raise refuse_truncated(path, "whose LOOK header is not whole or not one")
-    pairs = [(h, t) for h in readings for t in _TYPES if _needed(h, t) == raw.size]
+    pairs = [
+        (header, dtype)
+        for header in readings
+        for dtype in _TYPES
+        if header.size + header.elements * np.dtype(dtype).itemsize == raw.size
+    ]
     if not pairs:
         raise refuse_truncated(path, "which has not as many numbers as its LOOK header says")
     scores = [_sense(raw, *pair) for pair in pairs]
@@ -88,15 +93,8 @@ def read(path: Path) -> RawRecording:
         data = raw[header.size :].view(dtype).astype(np.float64)
     columns, findings = _columns(header, data)
     if not sure:
-        findings.append(
-            Finding(
-                "byte order",
-                "warning",
-                np.dtype(dtype).itemsize,
-                "data",
-                f"The numbers were read as {dtype}, but another format makes as much sense.",
-            )
-        )
+        text = f"The numbers were read as {dtype}, but another format makes as much sense."
+        findings.append(Finding("byte order", "warning", np.dtype(dtype).itemsize, "data", text))
     columns, counted = _in_seconds(columns, header.dtime)
     findings += counted
     provenance = {
@@ -109,22 +107,20 @@ def read(path: Path) -> RawRecording:
     return RawRecording(columns, findings, provenance)
 
 
-def _header_size(slots: int) -> int:
-    """Bytes before the data."""
-    return _START.size + slots * _CHANNEL.size
-
-
 def _headers(head: bytes) -> list[_Header]:
     """Every reading of `head` that makes sense, with 32 slots and with 16."""
-    read = (_header(head, slots) for slots in _SLOTS if len(head) >= _header_size(slots))
+    read = (_header(head, slots) for slots in _SLOTS)
     return [header for header in read if header is not None]
 
 
 def _header(head: bytes, slots: int) -> _Header | None:
+    size = _START.size + slots * _CHANNEL.size
+    if len(head) < size:
+        return None
     title, records, channels, _, dtime = _START.unpack_from(head)
     if records < 1 or not 1 <= channels <= slots or _text(title) is None:
         return None
-    behind = head[_header_size(slots) :][: len(_UNUSED)]
+    behind = head[size:][: len(_UNUSED)]
     if behind and _UNUSED.encode().startswith(behind):
         # The header is cut: a file of 32 slots that ends within them.
         return None
@@ -141,18 +137,13 @@ def _header(head: bytes, slots: int) -> _Header | None:
             used.append(_Channel(name, units, comment or "", elements or records))
     if not used:
         return None
-    return _Header(_text(title) or "", records, dtime, tuple(used), _header_size(slots))
+    return _Header(_text(title) or "", records, dtime, tuple(used), size)
 
 
 def _text(raw: bytes) -> str | None:
     """Text up to its NUL; None if it holds control characters."""
     text = raw.partition(b"\0")[0]
     return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
-
-
-def _needed(header: _Header, dtype: str) -> int:
-    elements = sum(c.elements for c in header.channels)
-    return header.size + elements * np.dtype(dtype).itemsize
 
 
 def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
@@ -187,16 +178,12 @@ def _columns(header: _Header, data: np.ndarray[Any, Any]) -> tuple[list[RawColum
         at += channel.elements
         columns.append(RawColumn(channel.name, values, channel.units))
         if channel.elements < rows:
-            findings.append(
-                Finding(
-                    "short column",
-                    "warning",
-                    rows - channel.elements,
-                    f"{channel.name}, row {channel.elements}",
-                    f"'{channel.name}' has {channel.elements} values where others have {rows}; "
-                    "the missing values are NaN.",
-                )
+            where, lacking = f"{channel.name}, row {channel.elements}", rows - channel.elements
+            text = (
+                f"'{channel.name}' has {channel.elements} values where others have {rows}; the "
+                "missing values are NaN."
             )
+            findings.append(Finding("short column", "warning", lacking, where, text))
     return columns, findings
 
 
@@ -215,17 +202,12 @@ def _in_seconds(columns: list[RawColumn], period: float) -> tuple[list[RawColumn
             made.append(column)
             continue
         made.append(RawColumn(column.label, column.values * period, "s"))
-        findings.append(
-            Finding(
-                "sample count",
-                "warning",
-                period,
-                column.label,
-                f"'{column.label}' counts samples, and the header states a period of {period:.9g} "
-                f"s; times are the count times this period. If the column is in seconds after all, "
-                f"read with {Argument('rate', value='1 Hz')}.",
-            )
+        text = (
+            f"'{column.label}' counts samples, and the header states a period of {period:.9g} s; "
+            "times are the count times this period. If the column is in seconds after all, read "
+            f"with {Argument('rate', value='1 Hz')}."
         )
+        findings.append(Finding("sample count", "warning", period, column.label, text))
     return made, findings
 
 

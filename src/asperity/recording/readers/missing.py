@@ -42,14 +42,12 @@ def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
         return values, None
     rows = np.flatnonzero(np.isin(values, codes))
     listed = " or ".join(f"{code:.12g}" for code in codes)
-    return np.where(np.isin(values, codes), np.nan, values), Finding(
-        "missing code",
-        "warning",
-        rows.size,
-        f"{name}, row {rows[0]}",
+    text = (
         f"{rows.size} of {values.size} values of '{name}' {'is' if rows.size == 1 else 'are'} "
-        f"{listed}, the first in row {rows[0]}, far from all others: read as missing.",
+        f"{listed}, the first in row {rows[0]}, far from all others: read as missing."
     )
+    finding = Finding("missing code", "warning", rows.size, f"{name}, row {rows[0]}", text)
+    return np.where(np.isin(values, codes), np.nan, values), finding
 
 
 def _code_among(values: Float, kept: np.ndarray) -> float | None:

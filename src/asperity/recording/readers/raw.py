@@ -113,14 +113,10 @@ def truncated(number: float, where: str, sentence: str, sure: bool = True) -> Fi
     return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
 
-def refuse_truncated(path: Path, why: str) -> InputError:
+def refuse_truncated(path: Path, why: str, rule: str = "be a whole file") -> InputError:
     """The error for a file of which nothing can be used."""
-    return InputError(
-        "recording.path",
-        "be a whole file",
-        f"'{path.name}', {why}",
-        "copy it again from where it was recorded",
-    )
+    advice = "copy it again from where it was recorded"
+    return InputError("recording.path", rule, f"'{path.name}', {why}", advice)
 
 
 def plain(name: str) -> str:
@@ -266,22 +262,14 @@ def one_table(
             refused = InputError("read.group", "be a group with columns", f"'{chosen}'", advice)
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
-    if not filled:
-        raise InputError(
-            "recording.path",
-            "hold columns of numbers",
-            f"'{path.name}' with none",
-            "give a recording",
-        )
+    rule, got = "hold columns of numbers", f"'{path.name}' with none"
+    require(filled, "recording.path", rule, got, "give a recording")
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:
         listed = ", ".join(f"{name!r} ({rows} rows)" for name, rows in longest.items())
-        raise InputError(
-            "read.group",
-            "be chosen in a file of several recordings",
-            f"none for {listed}",
-            f"choose one, like group='{max(longest, key=longest.__getitem__)}'",
-        )
+        advice = f"choose one, like group='{max(longest, key=longest.__getitem__)}'"
+        rule = "be chosen in a file of several recordings"
+        raise InputError("read.group", rule, f"none for {listed}", advice)
     rows = max(longest.values())
     kept = [c for columns in filled.values() for c in columns if c.values.size == rows]
     short = [c for columns in filled.values() for c in columns if c.values.size != rows]
@@ -289,11 +277,6 @@ def one_table(
 
 
 def _left_out(column: RawColumn, rows: int) -> Finding:
-    return Finding(
-        "other length",
-        "warning",
-        column.values.size,
-        column.label,
-        f"'{column.label}' has {column.values.size} values where the recording has {rows} rows, "
-        "and was left out.",
-    )
+    count = column.values.size
+    text = f"'{column.label}' has {count} values where the recording has {rows} rows"
+    return Finding("other length", "warning", count, column.label, f"{text}, and was left out.")

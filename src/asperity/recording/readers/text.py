@@ -150,15 +150,15 @@ def _load(
     frame, left_out = _without_text_rows(frame, layout.width)
     findings += left_out
     columns = []
-    for (i, column), _ in zip(frame.items(), range(layout.width), strict=False):
-        values, texts = _numbers_of(column, layout.headings.names[i] or f"column {i}")
+    for i, name in enumerate(layout.headings.names):
+        values, texts = _numbers_of(frame[i], name or f"column {i}")
         unit = layout.headings.units[i] if layout.headings.units else None
-        columns.append(RawColumn(layout.headings.names[i], values, unit))
+        columns.append(RawColumn(name, values, unit))
         findings += texts
     if layout.headings.names_in_file is not None:
         findings.insert(0, _mismatch(layout))
-    step = layout.headings.step
-    if step is not None and len(columns) > 1 and _is_empty(columns[0].values):
+    step, first = layout.headings.step, columns[0].values
+    if step is not None and len(columns) > 1 and first.dtype.kind == "f" and np.isnan(first).all():
         # LabVIEW may write the interval in the header, and no times.
         del columns[0]
     else:
@@ -185,18 +185,14 @@ def _mismatch(layout: Layout) -> Finding:
         if count == width + 1
         else f"the last {count - width} names belong to no column"
     )
-    commas = width == 2 * count and layout.delimiter == ","
-    return Finding(
-        "heading mismatch",
-        "warning",
-        abs(count - width),
-        "the heading",
+    text = (
         f"The heading has {count} names for {width} columns; the first {first} columns were given "
         f"the first {first} names, and {others}. Where the names stopped to fit is not in the "
         "file: check that each column holds what its name says."
-        + commas
-        * " Commas seem to be decimal marks, too: save it with semicolons between cells.",
     )
+    if width == 2 * count and layout.delimiter == ",":
+        text += " Commas seem to be decimal marks, too: save it with semicolons between cells."
+    return Finding("heading mismatch", "warning", abs(count - width), "the heading", text)
 
 
 def _layout(
@@ -216,10 +212,6 @@ def _layout(
             if start + head >= size or head == _HEADS[-1]:
                 raise
     raise AssertionError
-
-
-def _is_empty(values: np.ndarray[Any, Any]) -> bool:
-    return values.dtype.kind == "f" and bool(np.isnan(values).all())
 
 
 def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, list[Finding]]:
@@ -262,7 +254,14 @@ def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, lis
             frame = parsed(low_memory=False)
     longer = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
     longer = [*range(-layout.longer + 1, 1), *longer]
-    return frame, [_malformed(longer)] if longer else []
+    if not longer:
+        return frame, []
+    text = (
+        f"{len(longer)} {'row has' if len(longer) == 1 else 'rows have'} more cells than the table "
+        "has columns, and could not be read."
+    )
+    where = f"line {max(longer[0], 1)} of the table"
+    return frame, [Finding("malformed row", "error", len(longer), where, text)]
 
 
 @dataclass(frozen=True)
@@ -336,18 +335,6 @@ def _is_whole(cells: list[str], layout: Layout) -> bool | None:
     return usual == {last}
 
 
-def _malformed(lines: list[int]) -> Finding:
-    """The finding of rows, by their lines, that have too many cells."""
-    return Finding(
-        "malformed row",
-        "error",
-        len(lines),
-        f"line {max(lines[0], 1)} of the table",
-        f"{len(lines)} {'row has' if len(lines) == 1 else 'rows have'} more cells than the table "
-        "has columns, and could not be read.",
-    )
-
-
 def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, list[Finding]]:
     """A table of numbers without rows of words, such as headings between parts and remarks.
 
@@ -373,14 +360,11 @@ def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, l
         return frame, []
     first = int(np.argmax(words))
     line = " ".join(cell for cell in frame.iloc[first] if isinstance(cell, str))[:_SHOWN]
-    left_out = Finding(
-        "text row",
-        "note",
-        count,
-        f"row {first}",
+    text = (
         f"{count} {'row holds' if count == 1 else 'rows hold'} words and no number, the first "
-        f"'{line}' in row {first}, and {'was' if count == 1 else 'were'} left out.",
+        f"'{line}' in row {first}, and {'was' if count == 1 else 'were'} left out."
     )
+    left_out = Finding("text row", "note", count, f"row {first}", text)
     return frame[~words].reset_index(drop=True), [left_out]
 
 
@@ -397,13 +381,10 @@ def _numbers_of(column: pd.Series[Any], name: str) -> tuple[np.ndarray[Any, Any]
     if not texts.size:
         return numbers, []
     first = int(texts[0])
+    text = (
+        f"{texts.size} of {numbers.size} cells of '{name}' hold text, the first '"
+        f"{column.iloc[first]}' in row {first}; they were read as missing."
+    )
     return numbers, [
-        Finding(
-            "text in numbers",
-            "warning",
-            texts.size,
-            f"{name}, row {first}",
-            f"{texts.size} of {numbers.size} cells of '{name}' hold text, the first '"
-            f"{column.iloc[first]}' in row {first}; they were read as missing.",
-        )
+        Finding("text in numbers", "warning", texts.size, f"{name}, row {first}", text)
     ]

@@ -153,13 +153,11 @@ def required(text: str, name: str) -> Unit:
     match = _NUMBERED.fullmatch(text)
     unit = understood(match[2] if match else text)
     if unit is None:
-        raise InputError(
-            Argument("units", name),
-            "be a unit",
-            f"'{text}'",
-            "write it like 'N', 'MPa', 'um', '-' "
-            "for a pure number, or '12.5 N' for what one recorded unit is",
+        advice = (
+            "write it like 'N', 'MPa', 'um', '-' for a pure number, or '12.5 N' for what one "
+            "recorded unit is"
         )
+        raise InputError(Argument("units", name), "be a unit", f"'{text}'", advice)
     if match is None:
         return unit
     try:
