@@ -105,7 +105,12 @@ def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> 
         radiation_damping=curve.damping or None,
         **options,
     )
-    rows = pd.DataFrame(
+    solved = {name: getattr(response, name) for name in _SOLVED}
+    # Steady sliding: zeros but for round-off, and no phases.
+    still = (applied == 0) & response.converged
+    exact = {**dict.fromkeys(("delta_mu", "mu1", "mu2"), 0.0), "phase1": np.nan, "phase2": np.nan}
+    solved |= {name: np.where(still, x, solved[name]) for name, x in exact.items()}
+    return pd.DataFrame(
         {
             "curve": curve.name,
             "law": curve.law,
@@ -117,14 +122,9 @@ def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> 
             "frequency": frequency,
             "epsilon_applied": applied,
             "epsilon_eff": curve.share * applied,
-            **{name: getattr(response, name) for name in _SOLVED},
+            **solved,
         }
     )
-    # Steady sliding: zeros but for round-off, and no phases.
-    still = (applied == 0) & rows["converged"]
-    rows.loc[still, ["delta_mu", "mu1", "mu2"]] = 0.0
-    rows.loc[still, ["phase1", "phase2"]] = np.nan
-    return rows
 
 
 def speed_curves(
