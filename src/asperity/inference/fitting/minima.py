@@ -218,10 +218,9 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
         if minima and end.chi2 > ends[0].chi2 + _CONTINUED:
             break
         near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        if len(distinct([*before, near], _SAME_COARSE)) == len(before):
+            continue  # the minimum of an earlier end
         before.append(near)
-        if len(distinct(before, _SAME_COARSE)) < len(before):
-            before.pop()
-            continue
         far_off = _far_off(coarser, near)
         if not far_off and not math.isfinite(objective.chi2(near.u)):
             # Transients do not reach orbits that are hardly stable; continuation does, in up to

@@ -142,6 +142,3 @@ def shear_viscosity(machine: Machine) -> Numbers:
 @check("shear-negligible")
 def shear_negligible(machine: Machine) -> Numbers:
     return {"100 um/s": _two_forces(machine)}
-
-
-# --- The control experiment in vacuo, and the patch of contacts ----------------------------------
