@@ -425,7 +425,8 @@ class Objective:
             ending = max(tolerance, _COARSE)
             near = ahead.minimise(point, kept, tolerance=ending, evaluations=evaluations)
             self.unsolved += ahead.unsolved
-            if self.chi2(near.u) <= self.chi2(point):
+            # The last evaluation is kept: usually that of the approached minimum is needed again.
+            if self.chi2(point) >= self.chi2(near.u):
                 point = near.u
         if not moving or not math.isfinite(self.chi2(point)):
             return Minimum(point, self.chi2(point))

@@ -130,8 +130,9 @@ class KnownOrbits:
     known : bool array, shape (points,)
         Whether an orbit of each point is known.
     near : bool array, shape (points,)
-        Whether the known orbit belongs to parameters so similar that a coarse search tries no other
-        initial guess where Newton's method fails from this orbit.
+        Whether the known orbit belongs to parameters so similar that a direct search tries no
+        initial guess but a transient where Newton's method fails from this orbit: of 204 such rows
+        of twelve tables the other guesses found two orbits, and transients 126.
     """
 
     points: int
@@ -317,7 +318,7 @@ def search_orbits(
     rows = left()
     if known is not None and known.orbit is not None:
         follow(known.orbit, rows[known.known[rows]])
-        ended[: known.points] = known.near & (not motions)
+        ended[: known.points] = known.near
     slow = follows_steady_sliding(problem, left())
     series, exact = series_orbits(problem, slow, (*meshes, FIRST_MESH)[0], _FEW_NODES)
     read = partial(_numbers, harmonics=harmonics)
@@ -328,6 +329,7 @@ def search_orbits(
     follow(series, np.setdiff1d(slow, exact))
     if len(rows := left()):
         follow(*orbits_from_averaged_limit(problem, rows, _PATIENCE if coarse else math.inf))
+    ended[:] = False
     rows = left()
     hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
     if len(rows) and motions and not hopeless:
