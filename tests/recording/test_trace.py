@@ -48,8 +48,8 @@ def test_nothing_is_found_in_a_clean_recording(rng):
 
 
 @pytest.mark.parametrize("decimals", [3, 4, 5, 6])
-def test_time_stamps_with_few_digits_are_even(rng, decimals):
-    """At 3 kHz no step is a whole number of decimals; with three decimals, three stamps are equal."""
+def test_time_stamps_with_few_decimals_are_even(decimals):
+    """Steps of 1/3 ms have no end; rounded to three decimals, three stamps are equal."""
     time = np.round(np.arange(N) / 3000, decimals)
     assert list(findings_of(trace_of(time))) == (["rounded time"] if decimals == 3 else [])
     assert trace_of(time).sample_rate == pytest.approx(3000, rel=1e-3)
