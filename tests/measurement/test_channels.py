@@ -69,13 +69,13 @@ def channels(**values):
 @pytest.mark.parametrize("signs", [*itertools.product((1, -1), (1, -1))])
 def test_sliding_reports_opposite_signs_and_reads_a_positive_load(signs) -> None:
     time, slip, load, shear, friction = stepped(0)
-    made = channels(slip=slip, sigma=signs[0] * load, tau=signs[1] * shear)
-    measurement = measure_sliding(Trace(time, made))
+    signals = channels(slip=slip, sigma=signs[0] * load, tau=signs[1] * shear)
+    measurement = measure_sliding(Trace(time, signals))
     assert measurement.load.value == pytest.approx(5e6, rel=1e-3)
     assert measurement.friction.value == pytest.approx(friction.mean(), rel=1e-6)
     verdicts = [c.verdict for c in measurement.checks if c.name == "sign"]
     assert verdicts == {(1, 1): [], (-1, -1): ["ok"]}.get(signs, ["suspicious"])
-    run = recorded_run(Trace(time, made))
+    run = recorded_run(Trace(time, signals))
     assert pytest.approx(5e6, rel=5e-3) == run.W0
 
 
@@ -120,11 +120,11 @@ def test_a_friction_that_agrees_with_force_and_load_changes_nothing() -> None:
 @pytest.mark.parametrize("factor", [1e-3, 0.5, -3.0, 1e3])
 def test_a_friction_that_contradicts_force_and_load_is_refused(factor) -> None:
     time, slip, load, shear, friction = stepped(0)
-    made = channels(slip=slip, sigma=load, tau=factor * shear, mu=friction)
+    signals = channels(slip=slip, sigma=load, tau=factor * shear, mu=friction)
     with pytest.raises(InputError, match="must agree with the recorded friction") as refused:
-        measure_sliding(Trace(time, made))
+        measure_sliding(Trace(time, signals))
     # The sentence names both remedies, and each works.
     for role, name, mean in (("F", "tau", abs(factor)), ("friction", "mu", 1.0)):
         assert f"columns={{'{role}': '{name}'}}" in str(refused.value)
-        measurement = measure_sliding(Trace(time, made, roles={role: name}))
+        measurement = measure_sliding(Trace(time, signals, roles={role: name}))
         assert measurement.friction.value == pytest.approx(mean * friction.mean(), rel=1e-6)

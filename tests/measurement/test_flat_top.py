@@ -33,14 +33,14 @@ def measured(rng, cycle, noise, *, frequency=37.013, rate=2000.0, level=None, si
     load = load + 1e-3 * rng.standard_normal(time.size)
     friction = friction + noise * rng.standard_normal(time.size)
     force = W0 * (0.4 + MU1 * friction + 0.1 * MU1 * (time / time[-1] - 0.5))
-    made = Trace(
+    trace = Trace(
         time,
         {
             "W": Channel(W0 * (1 + EPSILON * load), "force", "N", "W", "N"),
             "F": Channel(force, "force", "N", "F", "N"),
         },
     )
-    measurement = measure(replace(made, findings=check(made)))
+    measurement = measure(replace(trace, findings=check(trace)))
     return measurement, next(c for c in measurement.checks if c.name == "flat top")
 
 
@@ -61,7 +61,7 @@ def test_a_signal_cut_off_before_its_noise_is_named(seed, cut) -> None:
     assert flat_top.verdict != "ok"
     end = "top" if side > 0 else "bottom"
     assert f"of the {cut} is cut off flat at its {end} " in flat_top.sentence
-    # It lasts arccos(level)/pi of the period; each end is known to a bin of 128.
+    # The cut lasts arccos(level)/pi of the period; each end is known to a bin of 128.
     assert flat_top.number == pytest.approx(np.arccos(level) / np.pi, abs=2.5 / 128)
     assert measurement.verdict != "ok"
 

@@ -101,7 +101,7 @@ CHECKS = {"held samples", "flat top", "mains", "lines in the pauses", "hum", "sh
 def test_a_clean_recording_is_not_suspected(clean, trace, seed, frequency) -> None:
     measurement = measure(trace(*clean(seed, frequency=frequency)))
     assert not named(measurement) & CHECKS
-    # Each check was made, and gives a sentence.
+    # Each check is in the list, and gives a sentence.
     assert {c.name for c in measurement.checks} >= CHECKS
     assert all(c.sentence for c in measurement.checks)
 
@@ -166,8 +166,8 @@ def test_a_force_made_from_friction_is_named_and_a_mean_load_suspected(clean, se
             "W": Channel(load, "force", "N", "W", "N"),
             "mu": Channel(friction, "dimensionless", "", "mu"),
         }
-        made = Trace(time, channels)
-        return measure(replace(made, findings=check(made)))
+        trace = Trace(time, channels)
+        return measure(replace(trace, findings=check(trace)))
 
     right, wrong = measured(force / load), measured(force / 7.0)
     for measurement in (right, wrong):

@@ -44,7 +44,7 @@ def test_a_clean_recording_passes_every_check(truth, protocol, trace) -> None:
 def test_the_window_lies_in_the_modulation_after_the_transient(truth, protocol, trace) -> None:
     measurement = measure(trace(*protocol(truth)))
     reading = measurement.reading
-    # Eight decay times of 0.3 s, and blocks of 0.07 s: 0.08 e^-8 is within the noise of a block.
+    # After eight decay times of 0.3 s, 0.08 e^-8 is within the noise of a block of 0.07 s.
     assert 6.9 < reading.start < 10.0
     assert 25.7 < reading.end < 26.0
     assert measurement.chosen_by == "program"
@@ -208,7 +208,7 @@ PLANTED = {
 
 #: Defect: the number of its check, and the relative tolerance.
 NUMBERS = {
-    # A line between two lines of the window is seen up to 15 % too low.
+    # A line between two frequencies of the spectrum is measured up to 15 % too low.
     "stick-slip": (0.02 / (0.32 * 7), 0.15),
     # F(0) is averaged over 0-6 s and about 29-36 s; the middles are 29.5 s apart.
     "drift": (2e-3 * 29.5, 0.1),
@@ -269,14 +269,14 @@ def test_a_recording_without_modulation_is_refused(truth, trace) -> None:
     force = 2.8 + 1e-2 * rng.standard_normal(time.size)
     with pytest.raises(InputError, match=r"must be modulated.*choose modulated=False"):
         measure(trace(time, load, force))
-    # With a frequency of the user, the verdict says so.
+    # If the user gives a frequency, the verdict says so.
     assert verdicts(measure(trace(time, load, force), frequency=60.0))["modulation"] == "bad"
 
 
 def test_a_short_modulation_of_a_long_recording_is_found(truth, protocol, trace) -> None:
     # Averages over the whole would hide the line, and the middle has none.
-    made = protocol(truth, rate=2000.0, on=(88.0, 96.0), end=100.0)
-    measurement = measure(trace(*made))
+    signals = protocol(truth, rate=2000.0, on=(88.0, 96.0), end=100.0)
+    measurement = measure(trace(*signals))
     assert measurement.reading.frequency == pytest.approx(truth.frequency, abs=1e-4)
     assert 88 < measurement.reading.start < measurement.reading.end < 96
 
@@ -342,5 +342,5 @@ def test_delta_mu_uncertainty_includes_noise_of_the_load_in_the_pauses(
     if shared:
         assert np.median(variances) < (0.05 * expected) ** 2
     else:
-        # Median of chi-squared of eight degrees of freedom; that of eight draws is good to 22 %.
+        # The median of chi-squared of eight degrees of freedom, which eight draws give to 22 %.
         assert np.median(variances) == pytest.approx(7.34 / 8 * expected**2, rel=0.5)

@@ -143,11 +143,11 @@ def test_only_the_window_of_the_user_is_read() -> None:
         ({"shear_stress": 1, "slip": 1}, {"load": "slip"}, "dimension of the load"),
     ],
 )
-def test_bad_input_is_one_sentence(channels, options, message) -> None:
+def test_bad_input_is_refused(channels, options, message) -> None:
     time, _, friction = velocity_step()
-    made = recorded(time, **dict.fromkeys(channels, friction))
+    trace = recorded(time, **dict.fromkeys(channels, friction))
     with pytest.raises(InputError, match=message):
-        measure_sliding(made, **options)
+        measure_sliding(trace, **options)
 
 
 def test_samples_with_an_infinite_load_are_left_out() -> None:
@@ -167,7 +167,7 @@ def test_samples_with_an_infinite_load_are_left_out() -> None:
         measure_sliding(no_load)
 
 
-def test_friction_is_measured_where_the_load_is_never_a_number() -> None:
+def test_friction_is_measured_where_every_load_is_missing() -> None:
     time, slip, friction = velocity_step()
     nothing = np.full(time.size, np.nan)
     trace = recorded(time, friction=friction, slip=slip, normal_stress=nothing)
@@ -212,7 +212,7 @@ def test_holds_are_found_and_read(held, sliding_trace) -> None:
         assert abs(hold.healing - healing) < 4 * hold.healing_uncertainty + 2e-4
         assert abs(hold.relaxation - relaxation) < 4 * hold.relaxation_uncertainty + 2e-4
         assert 0 < hold.healing_uncertainty < 2e-3
-        # The first half of the rise is elastic but for the creep of the contact.
+        # The first half of the rise is elastic, apart from creep of the contact.
         assert hold.reload_slope == pytest.approx(STIFFNESS, rel=0.1)
         assert hold.velocity == pytest.approx(V, rel=1e-2)
     true_slope = np.polyfit(np.log10(HOLDS), true_readings(held)[:, 0], 1)[0]
@@ -249,11 +249,10 @@ def faulty(friction, fault, seed):
 def test_intervals_of_holds_cover_faults_of_the_recorder(pulled, sliding_trace, fault) -> None:
     scores = []
     for seed in range(3):
-        made = pulled(
+        time, slip, clean, friction, bounds = pulled(
             (V, 0.0, V, 0.0, V), (400e-6, 20.0 + seed, 400e-6, 200.0, 400e-6), (50,) * 5,
             noise=1e-4, seed=seed, resolution=2e-8,
         )  # fmt: skip
-        time, slip, clean, friction, bounds = made
         measurement = measure_sliding(sliding_trace(time, faulty(friction, fault, seed), slip))
         for hold, start, end in zip(measurement.holds, bounds[1:-1:2], bounds[2::2], strict=True):
             level, rested = clean[time < start][-1], clean[time < end][-1]
@@ -319,12 +318,12 @@ def test_the_loading_before_the_first_hold_is_left_out(pulled, sliding_trace) ->
         (V, 0.0, V), (400e-6, 20.0, 400e-6), (100,) * 3, noise=1e-4, resolution=2e-8
     )
     loading = np.arange(0, 15, 0.01)
-    made = sliding_trace(
+    trace = sliding_trace(
         np.concatenate([loading, time + 15]),
         np.concatenate([clean[0] * loading / 15, friction]),
         np.concatenate([V * loading, slip + 15 * V]),
     )
-    (hold,) = measure_sliding(made).holds
+    (hold,) = measure_sliding(trace).holds
     healing = clean[time > bounds[2]].max() - clean[time < bounds[1]][-1]
     assert abs(hold.healing - healing) < hold.interval_95 < 2e-3
 
@@ -340,5 +339,5 @@ def test_noise_alone_makes_no_healing(sliding_trace, draws) -> None:
         friction = 0.6 + 1e-3 * rng.standard_normal(time.size)
         (hold,) = measure_sliding(sliding_trace(time, friction, slip)).holds
         heals.append(hold.healing)
-    # Of 2000 samples the largest stands 3.4 standard deviations out.
+    # The largest of 2000 samples lies 3.4 standard deviations above the mean.
     assert np.mean(heals) < 1e-3

@@ -371,7 +371,7 @@ def test_healing_is_fitted_to_recordings_at_several_velocities() -> None:
     result = of_campaign(stick, noisy, np.full(V.size, 1e-4))
     assert not result.reason
     assert result.interval_95[0] < 2 * B < result.interval_95[1]
-    # The scatter of the drops counts, ten times the uncertainty that is given for them.
+    # The uncertainty follows from the scatter of the drops, ten times what is stated for each.
     assert result.drop_uncertainty > 4e-4 / (np.std(np.log(stick)) * np.sqrt(V.size))
     assert "e-folds" in of_campaign(stick[:3] ** 0.01, drop[:3], np.full(3, 1e-4)).reason
     assert "too few" in of_campaign(stick[:2], drop[:2], np.full(2, 1e-4)).reason

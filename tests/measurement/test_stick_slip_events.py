@@ -228,7 +228,7 @@ def test_random_recordings_are_read_right_or_flagged() -> None:
 
 
 def test_onsets_of_damped_slips_lie_within_their_uncertainty():
-    """A slider damped by 0.3 slips between the shapes of a free one and of an exponential fall."""
+    """A slip with a damping ratio of 0.3 lies between a free slip and an exponential fall."""
     half, damping, loading, slips = 30, 0.3, 1 / 900, 40
     w = np.pi / half
     wd = w * np.sqrt(1 - damping**2)

@@ -68,8 +68,8 @@ def test_longer_and_shorter_windows_agree(pulled, sliding_trace) -> None:
 @pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
 def test_signs_of_friction_and_displacement_do_not_matter(pulled, sliding_trace, signs) -> None:
     time, slip, _, friction, _ = pulled((1e-6, 10e-6), (200e-6, 200e-6), (10, 50))
-    made = sliding_trace(time, signs[0] * friction, signs[1] * slip)
-    step = only_step(measure_sliding(made))
+    trace = sliding_trace(time, signs[0] * friction, signs[1] * slip)
+    step = only_step(measure_sliding(trace))
     reference = only_step(measure_sliding(sliding_trace(time, friction, slip)))
     assert step.rate_dependence == pytest.approx(reference.rate_dependence, rel=1e-9)
     assert step.peak == pytest.approx(reference.peak, rel=1e-9)
@@ -139,12 +139,12 @@ def test_the_loading_before_a_step_is_left_out(pulled, sliding_trace) -> None:
     )
     loading = np.arange(0, 20, 0.01)
     elastic = np.minimum(3e3 * 10e-6 * loading, clean[0])
-    made = sliding_trace(
+    trace = sliding_trace(
         np.concatenate([loading, time + 20]),
         np.concatenate([elastic, friction]),
         np.concatenate([10e-6 * loading, slip + 200e-6]),
     )
-    step = only_step(measure_sliding(made))
+    step = only_step(measure_sliding(trace))
     assert abs(step.rate_dependence - TRUE) < step.rate_interval_95 < 0.001
 
 

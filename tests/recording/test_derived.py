@@ -62,39 +62,38 @@ CASES = {
 @pytest.mark.parametrize("text", CASES)
 def test_expressions_give_the_numbers_and_units_of_their_formula(rig, text):
     truth, unit = CASES[text]
-    made = derive(rig, {"made": text})
+    derived = derive(rig, {"new": text})
     expected = truth({name: c.values for name, c in rig.channels.items()})
-    assert np.allclose(values(made, "made"), expected, rtol=1e-13, atol=0)
-    assert made.channels["made"].unit == unit
-    assert made.provenance["derived channels"] == {"made": text}
+    assert np.allclose(values(derived, "new"), expected, rtol=1e-13, atol=0)
+    assert derived.channels["new"].unit == unit
+    assert derived.provenance["derived channels"] == {"new": text}
 
 
 def test_an_expression_may_be_a_long_sum(rig):
-    made = derive(rig, {"made": "+".join(["slip"] * 390)})
-    assert np.allclose(values(made, "made"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)
+    derived = derive(rig, {"new": "+".join(["slip"] * 390)})
+    assert np.allclose(values(derived, "new"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)
 
 
 def test_the_integral_of_a_derivative_is_the_change(rig):
-    made = derive(rig, {"change": "integral(derivative(slip))"})
+    derived = derive(rig, {"change": "integral(derivative(slip))"})
     # The trapezoidal rule is exact for a linear slope; the end slopes are one-sided differences.
-    assert np.allclose(values(made, "change"), values(rig, "slip"), atol=2e-8)
-    assert made.channels["change"].unit == "m"
+    assert np.allclose(values(derived, "change"), values(rig, "slip"), atol=2e-8)
+    assert derived.channels["change"].unit == "m"
 
 
 def test_a_derived_channel_named_as_a_role_takes_the_role(rig):
-    made = derive(rig, {"load": "Conf.Press - Up.Pore.Press", "force": "'Axial force'/(5 cm^2)"})
-    assert made.channel("W") is made.channels["load"]
-    assert made.channel("shear stress") is made.channels["force"]
-    later = derive(made, {"friction": "force / load"})
-    assert np.array_equal(
-        later.channel("mu").values, values(later, "force") / values(later, "load")
-    )
+    derived = derive(rig, {"load": "Conf.Press - Up.Pore.Press", "force": "'Axial force'/(5 cm^2)"})
+    assert derived.channel("W") is derived.channels["load"]
+    assert derived.channel("shear stress") is derived.channels["force"]
+    with_friction = derive(derived, {"friction": "force / load"})
+    ratio = values(derived, "force") / values(derived, "load")
+    assert np.array_equal(with_friction.channel("mu").values, ratio)
 
 
 def test_a_recorded_channel_of_the_same_name_is_kept(rig):
-    made = derive(rig, {"Axial force": "2 * 'Axial force'"})
-    assert np.array_equal(values(made, "Axial force"), 2 * values(rig, "Axial force"))
-    assert np.array_equal(values(made, "Axial force (recorded)"), values(rig, "Axial force"))
+    derived = derive(rig, {"Axial force": "2 * 'Axial force'"})
+    assert np.array_equal(values(derived, "Axial force"), 2 * values(rig, "Axial force"))
+    assert np.array_equal(values(derived, "Axial force (recorded)"), values(rig, "Axial force"))
 
 
 def test_time_is_derived_from_a_column_of_intervals():
@@ -102,9 +101,9 @@ def test_time_is_derived_from_a_column_of_intervals():
     trace = Trace(
         np.arange(20.0), {"dt": Channel(steps, "time", "s"), "F": Channel(steps, "force")}
     )
-    made = derive(trace, {"time": "cumulative(dt) - 0.25 s"})
-    assert np.allclose(made.time, 0.25 * np.arange(20))
-    assert made.sample_rate == pytest.approx(4.0)
+    derived = derive(trace, {"time": "cumulative(dt) - 0.25 s"})
+    assert np.allclose(derived.time, 0.25 * np.arange(20))
+    assert derived.sample_rate == pytest.approx(4.0)
 
 
 def test_a_derived_channel_inherits_the_findings_of_its_sources(rig):
@@ -113,10 +112,10 @@ def test_a_derived_channel_inherits_the_findings_of_its_sources(rig):
     trace = Trace(TIME, channels, check(Trace(TIME, channels)))
     assert "saturation" in {f.name for f in trace.findings}
     # The noise of the other channel hides the flat top.
-    made = derive(trace, {"force": "1 N/V * Gauge + 'Axial force' / 1000"})
-    names = {f.name for f in made.findings if f.where.startswith("force")}
+    derived = derive(trace, {"force": "1 N/V * Gauge + 'Axial force' / 1000"})
+    names = {f.name for f in derived.findings if f.where.startswith("force")}
     assert names == {"source saturation"}
-    assert "source saturation" in {f.name for f in made.slice("1 s", "4 s").findings}
+    assert "source saturation" in {f.name for f in derived.slice("1 s", "4 s").findings}
 
 
 @pytest.mark.parametrize(
@@ -146,7 +145,7 @@ def test_a_derived_channel_inherits_the_findings_of_its_sources(rig):
 )
 def test_a_wrong_expression_is_refused_in_one_line(rig, text, rule):
     with pytest.raises(InputError, match=rule) as refused:
-        derive(rig, {"made": text})
+        derive(rig, {"new": text})
     assert "\n" not in str(refused.value)
 
 

@@ -49,7 +49,7 @@ def test_nothing_is_found_in_a_clean_recording(rng):
 
 @pytest.mark.parametrize("decimals", [3, 4, 5, 6])
 def test_time_stamps_with_few_decimals_are_even(decimals):
-    """Steps of 1/3 ms have no end; rounded to three decimals, three stamps are equal."""
+    """1/3 ms has infinitely many decimals; rounded to three, three stamps are equal."""
     time = np.round(np.arange(N) / 3000, decimals)
     assert list(findings_of(trace_of(time))) == (["rounded time"] if decimals == 3 else [])
     assert trace_of(time).sample_rate == pytest.approx(3000, rel=1e-3)
@@ -303,9 +303,9 @@ def test_stresses_become_forces_only_with_an_area(rock):
 
 
 def test_friction_times_load_is_a_force(rock):
-    made = derive(rock, {"force": "friction * load"})
-    assert np.allclose(made.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
-    assert made.provenance["derived channels"] == {"force": "friction * load"}
+    derived = derive(rock, {"force": "friction * load"})
+    assert np.allclose(derived.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
+    assert derived.provenance["derived channels"] == {"force": "friction * load"}
 
 
 @pytest.mark.parametrize("text", ["1e-3 /um", "1e-3 1/um", "1e-3 friction/um", "1 /mm", 1000.0])

@@ -18,7 +18,7 @@ def test_saturation_is_found_on_its_side():
     np.testing.assert_array_equal(top.rows, np.flatnonzero(values >= 0.9))
     sides = [level.side for level in saturated(np.clip(values, -0.8, 0.9))]
     assert sides == ["largest", "smallest"]
-    # Three equal samples in a row are no chance where no others are equal.
+    # Three equal samples in a row are no coincidence where no others are equal.
     values[[500, 501, 502]] = 2.0
     assert [level.rows.tolist() for level in saturated(values)] == [[500, 501, 502]]
     values[501] = 1.9
@@ -82,7 +82,7 @@ def test_unusable_rows_are_left_out_and_rows_next_to_defects_avoided():
     assert avoided.tolist() == [100, 298, 398, 698]
 
 
-def test_stretches_of_one_rate_are_told_apart():
+def test_stretches_of_one_sampling_rate_are_separated():
     steps = np.concatenate([np.full(500, 0.1), np.full(300, 0.01), np.full(200, 0.1)])
     steps[250] = 3.0
     time = np.concatenate([[0.0], np.cumsum(steps)])

@@ -51,9 +51,10 @@ def matlab(version: str, compressed: bool = False) -> bytes:
 
 def hdf5() -> bytes:
     file = io.BytesIO()
-    with h5py.File(file, "w") as made:
+    with h5py.File(file, "w") as output:
         for name, values in (("time", TIME), ("W", LOAD), ("F", SHEAR)):
-            made.create_dataset(name, data=values).attrs["units"] = "s" if name == "time" else "N"
+            dataset = output.create_dataset(name, data=values)
+            dataset.attrs["units"] = "s" if name == "time" else "N"
     return file.getvalue()
 
 
