@@ -1,4 +1,4 @@
-"""Sums over blocks: tables against plain columns, pieces against the whole."""
+"""Normal equations summed over blocks, and a lock-in that reads a recording in pieces."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ BASIS = Basis(2 * np.pi * 61.3, 3, 2, 13.0, 10.005)
 
 
 def plain(basis, time):
-    """The columns, written down one by one."""
+    """The columns of the basis by their definition."""
     u = (time - basis.centre) / basis.half_width
     phi = basis.omega * (time - basis.centre)
     k = np.arange(1, basis.harmonics + 1)[:, None]
@@ -32,16 +32,16 @@ def test_columns_are_those_of_their_definition() -> None:
 
 @pytest.mark.parametrize("blocks", [1, 7, 300, 6000])
 @pytest.mark.parametrize("tables", [True, False])
-def test_sums_of_blocks_are_the_sums_of_all(blocks, tables) -> None:
+def test_sums_of_blocks_add_up_to_those_of_the_whole(blocks, tables) -> None:
     step = even_step(TIME, BASIS.omega * 3) if tables else None
     assert (step is not None) == tables
     columns, values = plain(BASIS, TIME), channels(TIME)
-    found = sums(BASIS, TIME, values, blocks=blocks, step=step)
-    gram, moments = found.totals()
+    block_sums = sums(BASIS, TIME, values, blocks=blocks, step=step)
+    gram, moments = block_sums.totals()
     assert abs(gram - columns @ columns.T).max() < 1e-9 * TIME.size / 1e3
     assert abs(moments - columns @ np.stack(values, axis=1)).max() < 1e-8
-    assert found.count.sum() == TIME.size
-    assert found.middle @ found.count / TIME.size == pytest.approx(TIME.mean(), rel=1e-12)
+    assert block_sums.count.sum() == TIME.size
+    assert block_sums.middle @ block_sums.count / TIME.size == pytest.approx(TIME.mean(), rel=1e-12)
 
 
 def jittering(time):
@@ -59,18 +59,18 @@ def at_random(time):
 @pytest.mark.parametrize("clock", [jittering, with_gaps, at_random])
 @pytest.mark.parametrize("harmonics", [1, 4, 40])
 @pytest.mark.parametrize("degree", [0, 1, 2])
-def test_uneven_clocks_are_summed_as_written_down(clock, harmonics, degree) -> None:
+def test_sums_over_uneven_clocks_are_those_of_the_definition(clock, harmonics, degree) -> None:
     time = clock(TIME)
     half = float(time[-1] - time[0]) / 2
     basis = Basis(2 * np.pi * 6.3, harmonics, degree, float(time[0]) + half, half)
     columns, values = plain(basis, time), channels(time)
-    found = sums(basis, time, values, blocks=3)
-    cuts = np.cumsum(found.count[:-1]).astype(int)
-    # A thousand roundings of a phase of 400 rad times the harmonic, in units of the samples.
-    allowed = 1e-12 * harmonics * found.count[0]
+    block_sums = sums(basis, time, values, blocks=3)
+    cuts = np.cumsum(block_sums.count[:-1]).astype(int)
+    # Rounding of phases of up to 400 rad times the harmonic, per sample.
+    allowed = 1e-12 * harmonics * block_sums.count[0]
     for gram, moments, part, *parts in zip(
-        found.gram,
-        found.moments,
+        block_sums.gram,
+        block_sums.moments,
         np.split(columns, cuts, axis=1),
         *(np.split(v, cuts) for v in values),
         strict=True,
@@ -80,10 +80,10 @@ def test_uneven_clocks_are_summed_as_written_down(clock, harmonics, degree) -> N
 
 
 def test_merged_blocks_have_the_same_sums() -> None:
-    found = sums(BASIS, TIME, channels(TIME), blocks=900)
-    fewer = merged(found, 50)
+    block_sums = sums(BASIS, TIME, channels(TIME), blocks=900)
+    fewer = merged(block_sums, 50)
     assert 45 <= fewer.count.size <= 55
-    for a, b in zip(found.totals(), fewer.totals(), strict=True):
+    for a, b in zip(block_sums.totals(), fewer.totals(), strict=True):
         assert a == pytest.approx(b, rel=1e-9, abs=1e-9)
 
 
@@ -107,7 +107,7 @@ def test_a_clock_is_even_up_to_a_small_phase() -> None:
     assert even_step(late, BASIS.omega) is None
 
 
-def test_a_stream_reads_what_one_call_reads(truth) -> None:
+def test_a_stream_gives_the_reading_of_one_call(truth) -> None:
     rng = np.random.default_rng(4)
     time = np.arange(30_000) * 1e-3
     load = truth.load(time) + 0.02 * rng.standard_normal(time.size)
@@ -116,39 +116,39 @@ def test_a_stream_reads_what_one_call_reads(truth) -> None:
     stream = LockInStream(whole.frequency, start=time[0], end=time[-1])
     for piece in np.array_split(np.arange(time.size), 17):
         stream.add(time[piece], load[piece], force[piece])
-    found = stream.read()
-    assert abs(found.harmonics - whole.harmonics).max() < 1e-14
-    assert found.frequency == pytest.approx(whole.frequency, rel=1e-13)
-    assert found.mean_friction == pytest.approx(whole.mean_friction, rel=1e-13)
-    # Blocks differ, and with them the noise at a distance from the harmonics, a little.
+    reading = stream.read()
+    assert abs(reading.harmonics - whole.harmonics).max() < 1e-14
+    assert reading.frequency == pytest.approx(whole.frequency, rel=1e-13)
+    assert reading.mean_friction == pytest.approx(whole.mean_friction, rel=1e-13)
+    # Other blocks give slightly other noise between the harmonics.
     for name in ("W0", "frequency", "mu1", "mu2", "mean_friction"):
-        assert found.uncertainty(name) == pytest.approx(whole.uncertainty(name), rel=0.02)
+        assert reading.uncertainty(name) == pytest.approx(whole.uncertainty(name), rel=0.02)
 
 
 def test_a_stream_corrects_its_frequency_to_first_order(truth) -> None:
     time = np.arange(30_000) * 1e-3
-    off = 1e-2 / (np.pi * 30)  # Hz: a hundredth of a radian at the ends
-    stream = LockInStream(truth.frequency + off, start=time[0], end=time[-1])
+    error = 1e-2 / (np.pi * 30)  # Hz: a hundredth of a radian at the ends
+    stream = LockInStream(truth.frequency + error, start=time[0], end=time[-1])
     stream.add(time, truth.load(time), truth.force(time))
-    found = stream.read()
-    # The square of what it was off is left, as a share of the phase at the ends.
-    assert abs(found.frequency - truth.frequency) < 1e-2 * off
-    assert abs(found.harmonics[0] - truth.harmonics[0]) < 1e-4 * abs(truth.harmonics[0])
+    reading = stream.read()
+    # The relative error that is left is the phase error at the ends.
+    assert abs(reading.frequency - truth.frequency) < 1e-2 * error
+    assert abs(reading.harmonics[0] - truth.harmonics[0]) < 1e-4 * abs(truth.harmonics[0])
 
 
-def test_a_stream_refuses_what_it_cannot_read(truth) -> None:
+def test_a_stream_refuses_bad_input_and_a_wrong_frequency(truth) -> None:
     time = np.arange(30_000) * 1e-3
     load, force = truth.load(time), truth.force(time)
-    off = LockInStream(truth.frequency * (1 + 2e-4), start=0.0, end=time[-1])
+    stream = LockInStream(truth.frequency * (1 + 2e-4), start=0.0, end=time[-1])
     with pytest.raises(InputError, match="must be called before read"):
-        off.read()
-    off.add(time, load, force)
+        stream.read()
+    stream.add(time, load, force)
     with pytest.raises(InputError, match="start again with that"):
-        off.read()
+        stream.read()
     with pytest.raises(InputError, match="must get times from"):
-        off.add(time + 1, load, force)
+        stream.add(time + 1, load, force)
     with pytest.raises(InputError, match=r"LockInStream\.add must be finite"):
-        off.add(time, load, np.where(time == time[100], np.nan, force))
+        stream.add(time, load, np.where(time == time[100], np.nan, force))
     with pytest.raises(InputError, match="end must follow start"):
         LockInStream(60.0, start=1.0, end=0.0)
     with pytest.raises(InputError, match="detrend must be"):
@@ -157,7 +157,7 @@ def test_a_stream_refuses_what_it_cannot_read(truth) -> None:
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-4])
 @pytest.mark.parametrize("frequency", [60.013, 0.0713, 471.3])
-def test_a_long_recording_is_read_once_and_exactly(truth, jitter, frequency) -> None:
+def test_a_long_recording_is_read_exactly(truth, jitter, frequency) -> None:
     truth = truth.but(frequency=frequency)
     rng = np.random.default_rng(0)
     time = np.arange(140_000) * 5e-4
@@ -168,7 +168,7 @@ def test_a_long_recording_is_read_once_and_exactly(truth, jitter, frequency) -> 
 
 
 def test_a_long_recording_whose_frequency_wanders_is_still_read(truth) -> None:
-    # A part of it says something else than the whole.
+    # Parts of it have other frequencies than the whole.
     time = np.arange(140_000) * 5e-4
     phase = 2 * np.pi * 60 * time + 3.0 * np.cos(2 * np.pi * time / 70)
     load = 7 * (1 + 0.2 * np.cos(phase))

@@ -1,4 +1,4 @@
-"""Stated uncertainties are the true scatter, for white and for coloured noise."""
+"""Uncertainties of the lock-in agree with the true scatter, in white and in coloured noise."""
 
 import numpy as np
 import pytest
@@ -31,16 +31,16 @@ def test_intervals_contain_the_truth_as_often_as_they_state(truth, red_noise, ca
     truth = truth.but(frequency=frequency, drift=1e-3)
     rng = np.random.default_rng(20)
     pairs = (red_noise(rng, rho, 2, n) for _ in range(SEEDS))
-    noises = [(of_load * own, of_force * other + shared * of_load * own) for own, other in pairs]
+    noises = [(of_load * a, of_force * b + shared * of_load * a) for a, b in pairs]
     hits = covered(truth, noises, 1 / dt, NAMES)
     shares = np.array(list(hits.values()))
-    # All together as required; each within what 200 seeds can tell, at 1e-3, of 92 to 98 %.
+    # The mean lies in 92 to 98 %; each share agrees with this range at a significance of 1e-3.
     assert 0.92 < shares.mean() < 0.98, hits
     assert shares.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
     assert shares.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
 
 
-def test_white_noise_has_the_textbook_s_variances(truth) -> None:
+def test_variances_in_white_noise_are_those_of_the_textbook(truth) -> None:
     n, dt, sigma = 3000, 1e-3, 0.02
     time = np.arange(n) * dt
     rng = np.random.default_rng(1)
@@ -53,14 +53,14 @@ def test_white_noise_has_the_textbook_s_variances(truth) -> None:
     # Rife and Boorstyn (1974): the Cramer-Rao bound of a line's frequency.
     amplitude = truth.epsilon * truth.W0
     bound = 24 * sigma**2 / (amplitude**2 * n * (n * dt) ** 2) / (2 * np.pi) ** 2
-    # Twenty estimates of 40 degrees of freedom are good to 5 %, of 12 to 9 %.
+    # The mean of 20 estimates is known to 5 % with 40 degrees of freedom each, to 9 % with 12.
     assert frequency == pytest.approx(bound, rel=0.15)
     assert third == pytest.approx(2 * sigma**2 / n / truth.W0**2, rel=0.15)
     assert mean == pytest.approx(sigma**2 / n, rel=0.3)
 
 
 @pytest.mark.long
-def test_the_frequency_is_as_good_as_theory_allows(truth) -> None:
+def test_the_scatter_of_the_frequency_is_the_cramer_rao_bound(truth) -> None:
     n, dt, sigma = 2000, 1e-3, 0.1
     time = np.arange(n) * dt
     load, force = truth.load(time), truth.force(time)
@@ -91,12 +91,12 @@ def test_coloured_noise_is_estimated_at_each_harmonic(truth, red_noise) -> None:
         angle = 2 * np.pi * k * truth.frequency * dt
         theory = sigma**2 * (1 - rho**2) / abs(1 - rho * np.exp(-1j * angle)) ** 2
         assert spectra[k] == pytest.approx(theory, rel=0.12)
-    # The formula for white noise would be wrong by a factor of 30 in the variance at 4f.
+    # At 4f the variance of white noise would be wrong by a factor of 30.
     assert spectra[4] < sigma**2 / 25
 
 
 @draws(30, 100)
-def test_noise_of_the_load_reaches_the_phase(truth, draws) -> None:
+def test_the_uncertainty_of_the_phase_includes_noise_of_the_load(truth, draws) -> None:
     n = 2000
     time = np.arange(n) * 1e-3
     rng = np.random.default_rng(5)
@@ -106,26 +106,26 @@ def test_noise_of_the_load_reaches_the_phase(truth, draws) -> None:
         reading = lock_in(time, load + 0.3 * rng.standard_normal(n), force, harmonics=2)
         phases.append(reading.phasor(2).phase)
         stated.append(reading.uncertainty("phase2"))
-    # The force has no noise: all of this is the load's, twice over at 2f.
+    # Only the load has noise: twice its phase error is that of the phase at 2f.
     assert np.std(phases) == pytest.approx(np.mean(stated), rel=0.2)
     expected = 2 * 0.3 * np.sqrt(2 / n) / (truth.epsilon * truth.W0)
     assert np.mean(stated) == pytest.approx(expected, rel=0.1)
 
 
-def test_noise_that_both_channels_share_is_known_to_be_shared(truth) -> None:
+def test_noise_that_both_channels_share_cancels_in_their_ratio(truth) -> None:
     n = 2000
     time = np.arange(n) * 1e-3
     common = 0.05 * np.random.default_rng(6).standard_normal(n)
     load = truth.load(time)
-    both = lock_in(time, load + common, 0.4 * (load + common))
-    # F = 0.4 W sample by sample: nothing of the noise is left in the ratio.
-    assert both.uncertainty("mean_friction") < 1e-3 * both.uncertainty("W0") / truth.W0
-    assert both.uncertainty("im1") < 1e-3 * both.uncertainty("epsilon")
+    reading = lock_in(time, load + common, 0.4 * (load + common))
+    # F = 0.4 W in each sample: the ratio has no noise.
+    assert reading.uncertainty("mean_friction") < 1e-3 * reading.uncertainty("W0") / truth.W0
+    assert reading.uncertainty("im1") < 1e-3 * reading.uncertainty("epsilon")
 
 
-def test_windows_of_few_periods_have_their_frequency() -> None:
-    """Of 1.1 to 8 periods, from the strongest line of their spectrum."""
-    off = []
+def test_the_frequency_of_a_few_periods_agrees_with_its_uncertainty() -> None:
+    """1.1 to 8 periods; the search starts at the strongest line of the spectrum."""
+    scores = []
     for seed in range(40):
         rng = np.random.default_rng(seed)
         time = np.arange(int(50 * rng.uniform(1.1, 8))) / 50
@@ -133,8 +133,8 @@ def test_windows_of_few_periods_have_their_frequency() -> None:
         load = 7 * (1 + wave + 0.01 * rng.standard_normal(time.size))
         force = 0.4 * load + 0.01 * rng.standard_normal(time.size)
         reading = lock_in(time, load, force, harmonics=2)
-        off.append((reading.frequency - 1) / reading.uncertainty("frequency"))
-    assert np.abs(off).max() < 4.5
+        scores.append((reading.frequency - 1) / reading.uncertainty("frequency"))
+    assert np.abs(scores).max() < 4.5
 
 
 def test_uncertainties_and_ellipse_follow_from_the_covariance() -> None:

@@ -1,4 +1,4 @@
-"""Errors by the steps of a recorder: closed form against rounding, and coverage."""
+"""Errors by the steps of a recorder: the closed form, and their part in the uncertainties."""
 
 import numpy as np
 import pytest
@@ -9,29 +9,29 @@ from asperity.lock_in.rounding import rounding_variance, step_of
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.3, 1.7, 6.2])
-def test_the_variance_is_that_of_rounded_waves(amplitude) -> None:
-    """Over levels within a step, from the sums of rounded cosines."""
+def test_the_variance_is_that_of_rounded_cosines(amplitude) -> None:
+    """Against means of rounded cosines over all levels within a step."""
     step, phi = 0.5, 2 * np.pi * (np.arange(4096) + 0.5) / 4096
     levels = step * (np.arange(512) + 0.5) / 512
     exact = levels[:, None] + amplitude * np.cos(phi)
-    off = step * np.round(exact / step) - exact
-    found = rounding_variance(step, 0.0, amplitude, 3)
+    errors = step * np.round(exact / step) - exact
+    variance = rounding_variance(step, 0.0, amplitude, 3)
     for k in range(4):
-        harmonic = (2 if k else 1) * np.mean(off * np.cos(k * phi), axis=1)
-        # Fifty terms of the sum lack 1.2 % of the variance of a constant.
-        assert found[k] == pytest.approx(np.mean(harmonic**2), rel=0.02, abs=1e-8)
+        harmonic = (2 if k else 1) * np.mean(errors * np.cos(k * phi), axis=1)
+        # Fifty terms of the closed form lack 1.2 % of the variance of a constant.
+        assert variance[k] == pytest.approx(np.mean(harmonic**2), rel=0.02, abs=1e-8)
 
 
 def test_noise_smooths_the_steps() -> None:
-    """Of the recorded noise, step^2/12 is the rounding."""
+    """The variance of the recorded noise includes step^2/12 of the rounding."""
     rng, step = np.random.default_rng(1), 1.0
     for noise in (0.1, 0.2, 0.3):
-        off = []
+        errors = []
         for level in (np.arange(64) + 0.5) / 64:
             recorded = np.round(level + noise * rng.standard_normal(20_000))
-            off.append(recorded.mean() - level)
-        found = rounding_variance(step, np.hypot(noise, step / np.sqrt(12)))[0]
-        assert found == pytest.approx(np.mean(np.square(off)), rel=0.1)
+            errors.append(recorded.mean() - level)
+        variance = rounding_variance(step, np.hypot(noise, step / np.sqrt(12)))[0]
+        assert variance == pytest.approx(np.mean(np.square(errors)), rel=0.1)
     assert rounding_variance(step, 1.0)[0] < 1e-7
 
 
@@ -41,35 +41,37 @@ def test_a_constant_has_no_step() -> None:
 
 
 def coarse(truth, protocol, seed):
-    """Arrays of a recorder whose steps are a twentieth of the first harmonics, or smaller."""
+    """Truth and arrays of a recorder with steps of up to half of mu1 and a sixth of epsilon."""
     rng = np.random.default_rng(seed)
     source = truth.but(mean_friction=rng.uniform(0.4, 0.5), W0=rng.uniform(6.9, 7.1))
     time, load, force = protocol(source, noise=1e-4, seed=seed, decay=1e-3)
     step = source.W0 * 1e-3 * rng.uniform(0.1, 1)
-    found = time, 40 * step * np.round(load / step / 40), step * np.round(force / step)
-    return source, found
+    return source, (time, 40 * step * np.round(load / step / 40), step * np.round(force / step))
 
 
-def off_by(found, source):
-    reading = found.reading
+def scores(measurement, source):
+    """Errors in standard uncertainties."""
+    reading = measurement.reading
     first = reading.phasor(1)
     return [
         (reading.mean_friction - source.mean_friction + 0.08)
         / reading.uncertainty("mean_friction"),
         (reading.epsilon - source.epsilon) / reading.uncertainty("epsilon"),
         (first.amplitude - abs(source.harmonics[0])) / first.amplitude_uncertainty,
-        (found.delta_mu + 0.08) / found.delta_mu_uncertainty,
+        (measurement.delta_mu + 0.08) / measurement.delta_mu_uncertainty,
     ]
 
 
-def test_uncertainties_hold_the_rounding(truth, protocol, trace, monkeypatch) -> None:
-    def errors():
-        made = [coarse(truth, protocol, seed) for seed in range(10)]
-        return np.array(
-            [off_by(asp.measure(trace(*found), modulated=True), source) for source, found in made]
-        )
+def test_uncertainties_include_the_rounding(truth, protocol, trace, monkeypatch) -> None:
+    def rms_score():
+        recordings = [coarse(truth, protocol, seed) for seed in range(10)]
+        squares = [
+            np.square(scores(asp.measure(trace(*signals), modulated=True), source))
+            for source, signals in recordings
+        ]
+        return np.sqrt(np.mean(squares))
 
-    assert np.sqrt(np.mean(errors() ** 2)) < 1.6
+    assert rms_score() < 1.6
     monkeypatch.setattr(rounding, "step_of", lambda values: 0.0)
     monkeypatch.setattr("asperity.measurement.measure.step_of", lambda values: 0.0)
-    assert np.sqrt(np.mean(errors() ** 2)) > 5
+    assert rms_score() > 5

@@ -1,4 +1,4 @@
-"""Velocity steps and holds with known truth: a spring-slider integrated by SciPy, and lab noise."""
+"""Velocity steps and holds of a spring-slider integrated by SciPy, with noise of a laboratory."""
 
 import numpy as np
 import pytest
@@ -11,10 +11,10 @@ LAW = {"A": 0.010, "B": 0.014, "D0": 8e-6, "k": 3e3}
 
 
 def rig_noise(rng, size, rate, white=4e-4, red=3e-4, samples=100):
-    """White noise, noise whose integrated autocorrelation is so many samples, and two lines."""
+    """White noise, red noise with an integrated autocorrelation of `samples`, and two lines."""
     keep = np.exp(-2 / samples)
-    made = rng.standard_normal(size + 20 * samples)
-    slow = lfilter([np.sqrt(1 - keep**2)], [1, -keep], made)[20 * samples :]
+    steps = rng.standard_normal(size + 20 * samples)
+    slow = lfilter([np.sqrt(1 - keep**2)], [1, -keep], steps)[20 * samples :]
     time = np.arange(size) / rate
     lines = sum(
         amplitude * np.sin(2 * np.pi * f * time + rng.uniform(0, 2 * np.pi))
@@ -25,13 +25,10 @@ def rig_noise(rng, size, rate, white=4e-4, red=3e-4, samples=100):
 
 @pytest.fixture(scope="session")
 def pulled():
-    """Function that pulls a slider: slips of zero are holds of that many seconds."""
+    """Function that integrates a slider pulled at one velocity after another."""
 
     def make(velocities, lengths, rates, *, resolution=5e-8, seed=0, noise=None, slope=0.0, **law):
-        """Time, displacement, friction without noise, the same with noise, and the bounds.
-
-        Parts as in `pulled_in_parts`.
-        """
+        """Time, displacement, friction without and with noise, and bounds of `pulled_in_parts`."""
         rng = np.random.default_rng(seed)
         bounds, time, slip, _ = pulled_in_parts(velocities, lengths, rates)
         clean = spring_slider(velocities, bounds, time, **LAW | law) + slope * slip

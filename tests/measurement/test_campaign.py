@@ -1,4 +1,4 @@
-"""Many recordings in one table: rows, reasons, interruption and going on."""
+"""One table of many recordings: its rows, the reasons of failures, and resuming."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes
 from asperity.outputs import Interrupted
-from asperity.questions.recording import Measurement, Measurement as Question, Source
+from asperity.questions.recording import Measurement as Question, Source
 from asperity.recording.readers.from_file import read
 
 AMPLITUDES, STARTS = (0.05, 0.1, 0.2), (5.0, 17.0, 29.0)
@@ -22,7 +22,7 @@ AMPLITUDES, STARTS = (0.05, 0.1, 0.2), (5.0, 17.0, 29.0)
 
 @pytest.fixture(scope="module")
 def amplitudes(tmp_path_factory) -> Path:
-    """Three amplitudes of 6 s between rests; the drop of friction is a fifth of each."""
+    """A recording of three amplitudes between pauses; each lowers friction by a fifth of it."""
     rng = np.random.default_rng(0)
     time = np.arange(41_000) * 1e-3
     load, friction = np.full(time.size, 7.0), np.full(time.size, 0.5)
@@ -42,20 +42,17 @@ def amplitudes(tmp_path_factory) -> Path:
     return path
 
 
-def options(**changes) -> Question:
-    chosen = {
-        "modulated": True,
-        "frequency": None,
-        "exact_frequency": False,
-        "harmonics": 2,
-        "window": None,
-        "whole_periods": False,
-        "detrend": "linear",
-    }
-    return Question(**(chosen | changes))
+OPTIONS = Question(modulated=True, harmonics=2)
+ROWS = FileRows(Source(), OPTIONS)
 
 
-ROWS = FileRows(Source(), options())
+def copies(source: Path, folder: Path, names: str, lines: int | None = None) -> list[Path]:
+    """Files of the first lines of a recording, one for each letter of `names`."""
+    content = b"".join(source.read_bytes().splitlines(keepends=True)[:lines])
+    files = [folder / f"{name}.csv" for name in names]
+    for file in files:
+        file.write_bytes(content)
+    return files
 
 
 def table_of(path: Path) -> list[dict[str, str]]:
@@ -63,10 +60,10 @@ def table_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def test_every_amplitude_of_a_recording_has_its_delta_mu(amplitudes) -> None:
-    found = measure_amplitudes(read(amplitudes), Measurement(harmonics=2))
-    assert len(found) == 3
-    for measurement, epsilon, start in zip(found, AMPLITUDES, STARTS, strict=True):
+def test_delta_mu_is_measured_at_every_amplitude(amplitudes) -> None:
+    measurements = measure_amplitudes(read(amplitudes), OPTIONS)
+    assert len(measurements) == 3
+    for measurement, epsilon, start in zip(measurements, AMPLITUDES, STARTS, strict=True):
         reading = measurement.reading
         assert start < reading.start < reading.end < start + 6.1
         assert abs(reading.epsilon - epsilon) < 5 * reading.uncertainty("epsilon")
@@ -104,15 +101,12 @@ def test_a_table_has_a_row_for_each_part_and_a_reason_for_each_failure(
     assert {p.name for p in tmp_path.iterdir()} == {"broken.csv", "campaign.csv", "campaign.nc"}
 
 
-def test_a_campaign_of_which_a_process_ends_says_so_and_goes_on(amplitudes, tmp_path) -> None:
-    files = [tmp_path / f"{name}.csv" for name in "ab"]
-    part = b"".join(amplitudes.read_bytes().splitlines(keepends=True)[:14_000])
-    for file in files:
-        file.write_bytes(part)
+def test_a_campaign_whose_process_dies_is_refused_and_can_be_resumed(amplitudes, tmp_path) -> None:
+    files = copies(amplitudes, tmp_path, "ab", lines=14_000)
 
     def rows_of(path: Path) -> list:
         if path.name == "b.csv":
-            os._exit(9)  # as the system ends a process for want of memory
+            os._exit(9)  # as when the system kills a process that takes too much memory
         return ROWS(path)
 
     out = tmp_path / "campaign.csv"
@@ -123,13 +117,9 @@ def test_a_campaign_of_which_a_process_ends_says_so_and_goes_on(amplitudes, tmp_
     assert (done.files, done.failed) == (2, 0)
 
 
-def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
-    files = [tmp_path / f"{name}.csv" for name in "abc"]
-    # The first amplitude alone.
-    part = b"".join(amplitudes.read_bytes().splitlines(keepends=True)[:14_000])
-    for file in files:
-        file.write_bytes(part)
-    out, asked = tmp_path / "campaign.csv", []
+def test_an_interrupted_campaign_is_resumed_where_it_stopped(amplitudes, tmp_path) -> None:
+    files = copies(amplitudes, tmp_path, "abc", lines=14_000)
+    out, measured = tmp_path / "campaign.csv", []
 
     def stop(done: int, total: int, label: str) -> None:
         if done == 2:
@@ -140,29 +130,27 @@ def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
     assert not out.exists()
     with pytest.raises(InputError, match="go on with --resume"):
         run_campaign(files, ROWS, out, inputs=ROWS.inputs())
-    other = FileRows(Source(), options(harmonics=3))
+    changed = FileRows(Source(), Question(modulated=True, harmonics=3))
     with pytest.raises(InputError, match=r"options\.harmonics"):
-        run_campaign(files, other, out, inputs=other.inputs(), resume=True)
+        run_campaign(files, changed, out, inputs=changed.inputs(), resume=True)
 
-    def counted(path: Path):
-        asked.append(path)
+    def listed(path: Path):
+        measured.append(path)
         return ROWS(path)
 
-    done = run_campaign(files, counted, out, inputs=ROWS.inputs(), resume=True)
-    assert asked == files[2:]
+    done = run_campaign(files, listed, out, inputs=ROWS.inputs(), resume=True)
+    assert measured == files[2:]
     assert done.rows == 3
-    straight = tmp_path / "straight.csv"
-    run_campaign(files, ROWS, straight, inputs=ROWS.inputs())
-    assert out.read_bytes() == straight.read_bytes()
+    uninterrupted = tmp_path / "uninterrupted.csv"
+    run_campaign(files, ROWS, uninterrupted, inputs=ROWS.inputs())
+    assert out.read_bytes() == uninterrupted.read_bytes()
 
 
-def test_a_changed_reduction_file_is_noticed(amplitudes, tmp_path) -> None:
+def test_resuming_with_a_changed_reduction_file_is_refused(amplitudes, tmp_path) -> None:
     recipe = tmp_path / "recipe.toml"
     recipe.write_text('[channels]\nload = "1 * normal force"\n', encoding="utf-8")
-    files = [tmp_path / f"{name}.csv" for name in "ab"]
-    for file in files:
-        file.write_bytes(amplitudes.read_bytes())
-    rows_of = FileRows(Source(recipe=recipe), options())
+    files = copies(amplitudes, tmp_path, "ab")
+    rows_of = FileRows(Source(recipe=recipe), OPTIONS)
     out = tmp_path / "campaign.csv"
 
     def stop(done: int, total: int, label: str) -> None:
@@ -176,14 +164,14 @@ def test_a_changed_reduction_file_is_noticed(amplitudes, tmp_path) -> None:
         run_campaign(files, rows_of, out, inputs=rows_of.inputs(), resume=True)
 
 
-def test_steps_and_holds_are_rows(pulled, tmp_path) -> None:
+def test_each_velocity_step_and_hold_has_a_row(pulled, tmp_path) -> None:
     velocities, lengths = (3e-6, 10e-6, 0.0, 10e-6), (200e-6, 300e-6, 20.0, 300e-6)
     time, slip, _, friction, bounds = pulled(velocities, lengths, (20,) * 4, noise=2e-4)
     file = tmp_path / "sliding.txt"
     header = "Time(s)\tDispl(microns)\tFriction"
     values = np.stack([time, 1e6 * slip, friction], axis=1)
     np.savetxt(file, values, "%.6f", "\t", header=header, comments="")
-    rows_of = FileRows(Source(), options(modulated=False, harmonics=4))
+    rows_of = FileRows(Source(), Question(modulated=False))
     out = tmp_path / "campaign.csv"
     run_campaign([file], rows_of, out, inputs=rows_of.inputs())
     step, hold = table_of(out)
@@ -196,14 +184,13 @@ def test_steps_and_holds_are_rows(pulled, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["campaign.txt", "campaign"])
-def test_a_table_is_csv_or_netcdf(amplitudes, tmp_path, name) -> None:
+def test_a_table_must_be_csv_or_netcdf(amplitudes, tmp_path, name) -> None:
     with pytest.raises(InputError, match="--out must be a CSV or a NetCDF file"):
         run_campaign([amplitudes], ROWS, tmp_path / name, inputs={})
 
 
 def test_a_recording_is_not_overwritten(amplitudes, tmp_path) -> None:
-    file = tmp_path / "a.csv"
-    file.write_bytes(amplitudes.read_bytes())
+    (file,) = copies(amplitudes, tmp_path, "a")
     with pytest.raises(InputError, match=r"a\.csv"):
         run_campaign([file], ROWS, file, inputs={})
     assert file.read_bytes() == amplitudes.read_bytes()

@@ -19,38 +19,37 @@ UM = 1e-6
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_a_load_is_read_as_compression_whatever_the_recorder_calls_it(
-    truth, protocol, trace, seed
-) -> None:
+def test_a_load_of_either_sign_is_read_as_compression(truth, protocol, trace, seed) -> None:
     rng = np.random.default_rng(seed)
-    made = truth.but(W0=rng.uniform(2, 40), mean_friction=rng.uniform(0.2, 0.9))
-    time, load, force = protocol(made, seed=seed)
-    right = measure(trace(time, load, force))
+    source = truth.but(W0=rng.uniform(2, 40), mean_friction=rng.uniform(0.2, 0.9))
+    time, load, force = protocol(source, seed=seed)
+    reference = measure(trace(time, load, force))
+    right = reference.reading
     for signs in itertools.product((1, -1), (1, -1)):
-        found = measure(trace(time, signs[0] * load, signs[1] * force))
-        said = {c.name: c for c in found.checks}
-        assert pytest.approx(made.W0, rel=1e-3) == found.reading.W0
-        assert np.allclose(abs(found.reading.harmonics), abs(right.reading.harmonics), rtol=1e-6)
+        measurement = measure(trace(time, signs[0] * load, signs[1] * force))
+        reading, checks = measurement.reading, {c.name: c for c in measurement.checks}
+        assert pytest.approx(source.W0, rel=1e-3) == reading.W0
+        assert np.allclose(abs(reading.harmonics), abs(right.harmonics), rtol=1e-6)
         if signs == (-1, -1):
-            # One convention: nothing else differs, and the recording is as good as it was.
-            assert np.allclose(found.reading.harmonics, right.reading.harmonics, rtol=1e-6)
-            assert found.reading.mean_friction == pytest.approx(right.reading.mean_friction)
-            assert said["sign"].verdict == "ok"
-            assert "other sign" in said["sign"].sentence
-            assert [f.name for f in found.samples.findings] == ["sign"]
-            assert found.verdict == right.verdict
+            # Both channels have the other sign: every number and the verdict stay as they are.
+            assert np.allclose(reading.harmonics, right.harmonics, rtol=1e-6)
+            assert reading.mean_friction == pytest.approx(right.mean_friction)
+            assert checks["sign"].verdict == "ok"
+            assert "other sign" in checks["sign"].sentence
+            assert [f.name for f in measurement.samples.findings] == ["sign"]
+            assert measurement.verdict == reference.verdict
         elif signs == (-1, 1):
-            assert found.reading.mean_friction == pytest.approx(right.reading.mean_friction)
-            assert said["sign"].verdict == "suspicious"
+            assert reading.mean_friction == pytest.approx(right.mean_friction)
+            assert checks["sign"].verdict == "suspicious"
         elif signs == (1, -1):
-            assert found.reading.mean_friction == pytest.approx(-right.reading.mean_friction)
-            assert said["friction"].verdict == "suspicious"
+            assert reading.mean_friction == pytest.approx(-right.mean_friction)
+            assert checks["friction"].verdict == "suspicious"
         else:
-            assert "sign" not in said
+            assert "sign" not in checks
 
 
 def stepped(seed):
-    """Time, displacement, load, shear and friction of a velocity step, as Channels make them."""
+    """Time, displacement, normal and shear stress, and friction of a velocity step."""
     rng = np.random.default_rng(seed)
     time = np.arange(0, 200, 0.05)
     slip = UM * (time + 9 * np.clip(time - 100, 0, None))
@@ -68,18 +67,15 @@ def channels(**values):
 
 
 @pytest.mark.parametrize("signs", [*itertools.product((1, -1), (1, -1))])
-def test_signs_of_sliding_are_said_and_the_load_is_positive(signs) -> None:
+def test_sliding_reports_opposite_signs_and_reads_a_positive_load(signs) -> None:
     time, slip, load, shear, friction = stepped(0)
-    made = channels(slip=slip, sigma=signs[0] * load, tau=signs[1] * shear)
-    found = measure_sliding(Trace(time, made))
-    assert found.load.value == pytest.approx(5e6, rel=1e-3)
-    assert found.friction.value == pytest.approx(friction.mean(), rel=1e-6)
-    said = [c for c in found.checks if c.name == "sign"]
-    assert [c.verdict for c in said] == {
-        (1, 1): [],
-        (-1, -1): ["ok"],
-    }.get(signs, ["suspicious"])
-    run = recorded_run(Trace(time, made))
+    signals = channels(slip=slip, sigma=signs[0] * load, tau=signs[1] * shear)
+    measurement = measure_sliding(Trace(time, signals))
+    assert measurement.load.value == pytest.approx(5e6, rel=1e-3)
+    assert measurement.friction.value == pytest.approx(friction.mean(), rel=1e-6)
+    verdicts = [c.verdict for c in measurement.checks if c.name == "sign"]
+    assert verdicts == {(1, 1): [], (-1, -1): ["ok"]}.get(signs, ["suspicious"])
+    run = recorded_run(Trace(time, signals))
     assert pytest.approx(5e6, rel=5e-3) == run.W0
 
 
@@ -93,21 +89,21 @@ def written(tmp_path, columns):
 
 @pytest.mark.parametrize("seed", population(3))
 @pytest.mark.parametrize("columns", [None, {"friction": "mu"}])
-def test_a_friction_beside_a_shear_without_its_load_is_read(tmp_path, seed, columns) -> None:
+def test_recorded_friction_is_read_if_no_load_divides_the_shear(tmp_path, seed, columns) -> None:
     rng = np.random.default_rng(seed)
     time, slip, load, shear, friction = stepped(seed)
     table = {
         "displacement (um)": slip / UM,
         "tau (MPa)": shear / 1e6,
         "mu": friction,
-        # In newton it cannot be divided by.
+        # A stress cannot be divided by a load in newton.
         "Fn (N)": load * 25e-4,
     }
     names = rng.permutation(list(table)[: 3 + seed % 2])
     path = written(tmp_path, {"time (s)": time} | {n: table[n] for n in names})
-    found = measure_sliding(read(path, columns=columns))
-    assert found.friction.value == pytest.approx(friction.mean(), rel=1e-6)
-    (step,) = found.steps
+    measurement = measure_sliding(read(path, columns=columns))
+    assert measurement.friction.value == pytest.approx(friction.mean(), rel=1e-6)
+    (step,) = measurement.steps
     assert step.time == pytest.approx(100, abs=0.2)
     assert recorded_run(read(path, columns=columns)).friction == pytest.approx(friction, rel=1e-6)
 
@@ -115,20 +111,20 @@ def test_a_friction_beside_a_shear_without_its_load_is_read(tmp_path, seed, colu
 def test_a_friction_that_agrees_with_force_and_load_changes_nothing() -> None:
     time, slip, load, shear, friction = stepped(0)
     alone = measure_sliding(Trace(time, channels(slip=slip, sigma=load, tau=shear)))
-    # A correction for a seal of some percent, rounded.
-    written = np.round(0.97 * friction, 3)
-    both = Trace(time, channels(slip=slip, sigma=load, tau=shear, mu=written))
-    assert measure_sliding(both).friction == alone.friction
+    # Friction corrected for a seal by some percent, and rounded.
+    rounded = np.round(0.97 * friction, 3)
+    with_friction = Trace(time, channels(slip=slip, sigma=load, tau=shear, mu=rounded))
+    assert measure_sliding(with_friction).friction == alone.friction
 
 
 @pytest.mark.parametrize("factor", [1e-3, 0.5, -3.0, 1e3])
-def test_a_friction_that_contradicts_force_and_load_is_asked_about(factor) -> None:
+def test_a_friction_that_contradicts_force_and_load_is_refused(factor) -> None:
     time, slip, load, shear, friction = stepped(0)
-    made = channels(slip=slip, sigma=load, tau=factor * shear, mu=friction)
+    signals = channels(slip=slip, sigma=load, tau=factor * shear, mu=friction)
     with pytest.raises(InputError, match="must agree with the recorded friction") as refused:
-        measure_sliding(Trace(time, made))
-    # Both ways out are in the sentence, and each is one.
+        measure_sliding(Trace(time, signals))
+    # The sentence names both remedies, and each works.
     for role, name, mean in (("F", "tau", abs(factor)), ("friction", "mu", 1.0)):
         assert f"columns={{'{role}': '{name}'}}" in str(refused.value)
-        found = measure_sliding(Trace(time, made, roles={role: name}))
-        assert found.friction.value == pytest.approx(mean * friction.mean(), rel=1e-6)
+        measurement = measure_sliding(Trace(time, signals, roles={role: name}))
+        assert measurement.friction.value == pytest.approx(mean * friction.mean(), rel=1e-6)

@@ -1,4 +1,4 @@
-"""Recordings that are not what they seem: each is named, with a number, and nothing else is."""
+"""Checks of a modulated measurement: each names its defect with a number, and nothing else."""
 
 from dataclasses import replace
 from functools import partial
@@ -21,8 +21,8 @@ RATE, END = 2000.0, 10.0
 
 
 @pytest.fixture
-def made(truth):
-    """Arrays time, load, force of ten steady seconds."""
+def steady(truth):
+    """Function that makes arrays time, load, force of ten steady seconds."""
 
     def make(seed=0, **changes):
         source = truth.but(**changes)
@@ -73,7 +73,7 @@ def response_changes(time, load, force):
     return time, load, force + 7e-3 * np.sin(2 * np.pi * 0.15 * time) * np.cos(phi - 1.5)
 
 
-def hum_beside_the_line(time, load, force):
+def hum_next_to_the_line(time, load, force):
     return time, load, force + 0.02 * np.cos(2 * np.pi * 60.27 * time)
 
 
@@ -94,8 +94,8 @@ def coarse_load(time, load, force):
     return time, np.round(2 * load) / 2, force
 
 
-#: Defect, the checks that name it, and the verdict of the gravest.
-DOUBTS = {
+#: Defect: the function that plants it, the checks that may name it, and the overall verdict.
+DEFECTS = {
     "columns exchanged": (swapped, {"friction", "load harmonics", "mains"}, "bad"),
     "sign of the force": (flipped, {"friction"}, "suspicious"),
     "units a thousand apart": (in_kilonewton, {"friction"}, "suspicious"),
@@ -109,51 +109,51 @@ DOUBTS = {
         {"steady response", "shifting response"},
         "bad",
     ),
-    "another line beside it": (hum_beside_the_line, {"steady response"}, "bad"),
+    "a line next to the modulation": (hum_next_to_the_line, {"steady response"}, "bad"),
     "dropped bits": (dropped_bits, {"spike"}, "suspicious"),
     "sparks of two samples": (sparks, {"spike"}, "bad"),
     "steps of the load": (coarse_load, {"resolution", "leakage"}, "suspicious"),
 }
 
 
-#: Check and number of what was planted, and how well it is known.
+#: Defect: the check that measures it, the number planted, and the relative tolerance.
 NUMBERS = {
     "sign of the force": ("friction", -0.4, 1e-3),
     "zero of the load": ("contact", 7 * 0.24, 1e-3),
     "drift of the load": ("steady load", 0.03 * END / 7.15, 1e-2),
     "a second modulation": ("other modulation", (0.5 / 1.68) ** 2, 1e-2),
-    # Either sideband of a wandering phase has the amplitude J1 / J0 of the line, of half a radian.
+    # A phase that wanders by half a radian has sidebands of J1(0.5)/J0(0.5) of the line.
     "a phase that wanders": ("other modulation", (j1(0.5) / j0(0.5)) ** 2, 5e-2),
-    # Half of the line's slope is fitted as drift: ten half-turns hold next to none.
+    # The linear drift that is fitted takes next to nothing of five periods.
     "slow wave of the load": ("steady load", 0.3 / 7, 0.05),
     "steps of the load": ("resolution", 0.5 / 1.68, 0.05),
 }
 
 
-@pytest.mark.parametrize("doubt", DOUBTS)
-def test_what_cannot_be_believed_is_named(made, trace, doubt) -> None:
-    plant, names, verdict = DOUBTS[doubt]
-    found = measure(trace(*plant(*made())), window=(0.0, END))
-    named = {c.name for c in found.checks if c.verdict != "ok"}
+@pytest.mark.parametrize("defect", DEFECTS)
+def test_a_defect_is_named_and_nothing_else(steady, trace, defect) -> None:
+    plant, names, verdict = DEFECTS[defect]
+    measurement = measure(trace(*plant(*steady())), window=(0.0, END))
+    named = {c.name for c in measurement.checks if c.verdict != "ok"}
     assert named & names, named
     assert named <= names | {"stick-slip", "signal", "transient"}
-    assert found.verdict == verdict
-    if doubt in NUMBERS:
-        name, number, rel = NUMBERS[doubt]
-        check = next(c for c in found.checks if c.name == name)
-        assert check.number == pytest.approx(number, rel=rel)
+    assert measurement.verdict == verdict
+    if defect in NUMBERS:
+        name, number, rel = NUMBERS[defect]
+        (measured,) = (c.number for c in measurement.checks if c.name == name)
+        assert measured == pytest.approx(number, rel=rel)
 
 
-def test_noise_is_no_sideband_of_few_periods(made, trace) -> None:
-    """Of thirty periods all sidebands are next to the line."""
+def test_noise_over_few_periods_is_not_taken_for_sidebands(steady, trace) -> None:
+    """In the spectrum of thirty periods every sideband is next to the line."""
     for seed in range(8):
-        time, load, force = (a[:1000] for a in made(seed=seed, epsilon=0.02))
+        time, load, force = (a[:1000] for a in steady(seed=seed, epsilon=0.02))
         load += 0.02 * np.random.default_rng(seed).standard_normal(time.size)
         checks = {c.name: c for c in measure(trace(time, load, force)).checks}
         assert checks["leakage"].number > 0.01
         assert checks["leakage"].verdict == "ok"
         assert checks["steady response"].verdict == "ok"
-    time, load, force = (a[:1000] for a in made())
+    time, load, force = (a[:1000] for a in steady())
     swelling = 0.2 * np.sin(2 * np.pi * 8 * time)
     load_swells = load + swelling * (load - load.mean())
     checks = {c.name: c for c in measure(trace(time, load_swells, force)).checks}
@@ -164,43 +164,43 @@ def test_noise_is_no_sideband_of_few_periods(made, trace) -> None:
     assert checks["leakage"].verdict == "ok"
 
 
-def test_spikes_have_no_share_in_the_numbers(made, trace) -> None:
-    """Nor in the search for the modulation, of which they are many times larger."""
-    time, load, force = made(epsilon=0.01)
+def test_spikes_do_not_change_the_numbers(steady, trace) -> None:
+    """Nor do they hide the modulation, though they are many times as large."""
+    time, load, force = steady(epsilon=0.01)
     rng = np.random.default_rng(3)
     for values, size in ((load, 10.0), (force, 1.0)):
         values[rng.choice(time.size, 12, replace=False)] += size * rng.choice([-1, 1], 12)
-    found = measure(trace(time, load, force))
-    first = found.reading.phasor(1)
-    assert found.samples.dropped == 24
-    assert abs(found.reading.epsilon - 0.01) < 4 * found.reading.uncertainty("epsilon") < 1e-4
+    measurement = measure(trace(time, load, force))
+    reading, first = measurement.reading, measurement.reading.phasor(1)
+    assert measurement.samples.dropped == 24
+    assert abs(reading.epsilon - 0.01) < 4 * reading.uncertainty("epsilon") < 1e-4
     assert abs(first.amplitude - 2e-3) < 4 * first.amplitude_uncertainty < 4e-5
-    assert "spike" in {c.name for c in found.checks if c.verdict != "ok"}
+    assert "spike" in {c.name for c in measurement.checks if c.verdict != "ok"}
 
 
 def test_a_pause_with_a_saturated_gauge_is_named(truth, protocol, trace) -> None:
-    """Its level is too low, and with it the change of friction."""
+    """Saturation lowers the level of the pause, and with it the change of friction."""
     time, load, force = protocol(truth, noise=3e-2)
-    found = measure(trace(time, load, np.minimum(force, 7 * 0.4)))
-    assert {c.name: c.verdict for c in found.checks}["saturation"] == "bad"
-    assert found.reading.start > 6
+    measurement = measure(trace(time, load, np.minimum(force, 7 * 0.4)))
+    assert {c.name: c.verdict for c in measurement.checks}["saturation"] == "bad"
+    assert measurement.reading.start > 6
 
 
-def test_a_force_of_zero_has_a_verdict(made, trace) -> None:
-    time, load, force = made()
-    found = measure(trace(time, load, 0 * force))
-    assert found.verdict == "bad"
-    assert found.reading.mean_friction == 0
+def test_a_force_of_zero_is_bad(steady, trace) -> None:
+    time, load, force = steady()
+    measurement = measure(trace(time, load, 0 * force))
+    assert measurement.verdict == "bad"
+    assert measurement.reading.mean_friction == 0
 
 
-def test_recordings_that_stand_still_have_a_verdict(made, trace) -> None:
-    time, load, force = made()
+def test_constant_or_identical_channels_give_finite_numbers(steady, trace) -> None:
+    time, load, force = steady()
     half = time.size // 2
     stuck = force.copy()
     stuck[half:] = stuck[half]
     for values in (stuck, np.full(time.size, 2.8), load, 0.4 * load):
-        found = measure(trace(time, load, values), frequency=60.0, window=(0.0, END))
-        record = modulated_record(found)
+        measurement = measure(trace(time, load, values), frequency=60.0, window=(0.0, END))
+        record = modulated_record(measurement)
         assert np.isfinite([record[name] for name in ("W0", "epsilon", "mu1", "mu2")]).all()
         assert np.isfinite(list(record["intervals_95"].values())).all()
 
@@ -211,7 +211,7 @@ def test_recordings_that_stand_still_have_a_verdict(made, trace) -> None:
 def test_signals_without_spikes_have_none(trace, shape) -> None:
     rng = np.random.default_rng(4)
     n = 200_000
-    made = {
+    values = {
         "white": rng.standard_normal(n),
         "sine": np.cos(0.9 * np.arange(n)),
         "walk": np.cumsum(rng.standard_normal(n)),
@@ -222,53 +222,53 @@ def test_signals_without_spikes_have_none(trace, shape) -> None:
         + (np.arange(n) % 16_000 > 9_000) * np.cos(0.19 * np.arange(n) + 0.3),
         "coarse": np.round(0.15 * rng.standard_normal(n)),
     }[shape]
-    found = trace(np.arange(n) * 1e-4, made, made).findings
-    assert "spike" not in {finding.name for finding in found}
+    findings = trace(np.arange(n) * 1e-4, values, values).findings
+    assert "spike" not in {finding.name for finding in findings}
 
 
-def test_a_jittering_clock_has_no_gaps(made, trace) -> None:
-    time, load, force = made()
+def test_a_jittering_clock_has_no_gaps(steady, trace) -> None:
+    time, load, force = steady()
     for seed in range(10):
-        off = np.random.default_rng(seed).uniform(-0.3, 0.3, time.size) / RATE
-        found = trace(time + off, load, force).findings
-        assert "gap" not in {finding.name for finding in found}
+        jitter = np.random.default_rng(seed).uniform(-0.3, 0.3, time.size) / RATE
+        findings = trace(time + jitter, load, force).findings
+        assert "gap" not in {finding.name for finding in findings}
     keep = (time < 4) | (time > 4.01)
-    found = check(replace(trace((time + off)[keep], load[keep], force[keep]), findings=()))
-    (gap,) = [finding for finding in found if finding.name == "gap"]
+    findings = check(replace(trace((time + jitter)[keep], load[keep], force[keep]), findings=()))
+    (gap,) = [finding for finding in findings if finding.name == "gap"]
     assert gap.number == pytest.approx(0.01, rel=0.1)
 
 
 @pytest.mark.long
-def test_noise_that_grows_towards_zero_is_followed_there(truth) -> None:
+def test_intervals_contain_the_truth_under_1_f_noise(truth) -> None:
     rng = np.random.default_rng(5)
     n = 2000
 
     def flicker():
-        # A piece of 1/f noise that began four windows ago.
+        # A quarter of a longer noise, which has frequencies below the lowest of the window.
         line = np.fft.rfftfreq(4 * n)
         shape = np.concatenate([[0.0], line[1:] ** -0.5])
         return 1e-3 * np.fft.irfft(shape * np.fft.rfft(rng.standard_normal(4 * n)))[:n]
 
     noises = [(flicker(), flicker()) for _ in range(60)]
     shares = covered(truth, noises, RATE, ("mean_friction", "mu1", "phase1"))
-    # Binomial scatter of 60 seeds is 3 %; following a spectrum down is no better than it is steep.
+    # The binomial scatter of 60 seeds is 3 %; a steep spectrum is extrapolated less well.
     assert min(shares.values()) > 0.82, shares
 
 
 @draws(8, 60)
-def test_hum_far_from_the_harmonics_is_in_their_uncertainties(truth, draws) -> None:
+def test_uncertainties_include_hum_far_from_the_harmonics(truth, draws) -> None:
     rng = np.random.default_rng(6)
     time = np.arange(3000) / RATE
     noises = []
     for _ in range(draws):
-        # Whole periods in the window: no line of the window's spectrum sees them but one.
+        # The window holds whole periods of the hum: one line of its spectrum contains it.
         wave = [np.cos(2 * np.pi * 50 * time + rng.uniform(0, 7)) for _ in range(2)]
         noises.append([0.01 * w + 1e-4 * rng.standard_normal(time.size) for w in wave])
     shares = covered(truth, noises, RATE, ("mean_friction", "mu1", "phase1", "mu2"))
     assert min(shares.values()) > (0.9 if draws == 60 else 0.7), shares
 
 
-def test_a_phase_of_nothing_is_unknown(truth) -> None:
+def test_the_phase_of_an_absent_harmonic_is_unknown(truth) -> None:
     quiet = truth.but(harmonics=(2e-3 + 0j, 0j))
     rng = np.random.default_rng(7)
     time = np.arange(3000) / RATE

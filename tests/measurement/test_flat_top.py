@@ -1,4 +1,4 @@
-"""Signals cut off before the recorder's noise are named; smooth ones, be they flat, are not."""
+"""The check "flat top": it names signals cut off before noise was added, and no smooth cycle."""
 
 from dataclasses import replace
 from functools import partial
@@ -16,11 +16,11 @@ measure = partial(asp.measure, modulated=True)
 W0, EPSILON, MU1 = 7.0, 0.24, 2e-3
 
 
-def recorded(rng, cycle, noise, *, frequency=37.013, rate=2000.0, level=None, side=1, cut="force"):
-    """Measurement of a recording whose friction follows `cycle(phase)`, in amplitudes mu1.
+def measured(rng, cycle, noise, *, frequency=37.013, rate=2000.0, level=None, side=1, cut="force"):
+    """Measurement of a friction that follows `cycle(phase)` (in mu1), and its check "flat top".
 
-    What exceeds `level` amplitudes above or below the mean is cut off, of the force or the load;
-    the noise (amplitudes) is added afterwards.
+    The signal `cut` is limited to `level` amplitudes above or below its mean; noise (amplitudes) is
+    added afterwards.
     """
     time = np.arange(24_000) / rate
     phase = 2 * np.pi * frequency * time + rng.uniform(0, 2 * np.pi)
@@ -33,15 +33,15 @@ def recorded(rng, cycle, noise, *, frequency=37.013, rate=2000.0, level=None, si
     load = load + 1e-3 * rng.standard_normal(time.size)
     friction = friction + noise * rng.standard_normal(time.size)
     force = W0 * (0.4 + MU1 * friction + 0.1 * MU1 * (time / time[-1] - 0.5))
-    made = Trace(
+    trace = Trace(
         time,
         {
             "W": Channel(W0 * (1 + EPSILON * load), "force", "N", "W", "N"),
             "F": Channel(force, "force", "N", "F", "N"),
         },
     )
-    found = measure(replace(made, findings=check(made)))
-    return found, next(c for c in found.checks if c.name == "flat top")
+    measurement = measure(replace(trace, findings=check(trace)))
+    return measurement, next(c for c in measurement.checks if c.name == "flat top")
 
 
 def harmonics(rng):
@@ -53,40 +53,39 @@ def harmonics(rng):
 
 @pytest.mark.parametrize("cut", ["force", "load"])
 @pytest.mark.parametrize("seed", population(6))
-def test_a_cut_below_the_noise_is_named(seed, cut) -> None:
+def test_a_signal_cut_off_before_its_noise_is_named(seed, cut) -> None:
     rng = np.random.default_rng([seed, len(cut)])
     level, noise = rng.uniform(0.1, 0.9), 10 ** rng.uniform(-3, -1)
     side = rng.choice([-1, 1])
-    found, answer = recorded(rng, np.cos, noise, level=level, side=side, cut=cut)
-    assert answer.verdict != "ok"
-    assert (
-        f"of the {cut} is cut off flat at its {'top' if side > 0 else 'bottom'} " in answer.sentence
-    )
-    # arccos(level)/pi of the period, with two bins of 128 at its ends.
-    assert answer.number == pytest.approx(np.arccos(level) / np.pi, abs=2.5 / 128)
-    assert found.verdict != "ok"
+    measurement, flat_top = measured(rng, np.cos, noise, level=level, side=side, cut=cut)
+    assert flat_top.verdict != "ok"
+    end = "top" if side > 0 else "bottom"
+    assert f"of the {cut} is cut off flat at its {end} " in flat_top.sentence
+    # The cut lasts arccos(level)/pi of the period; each end is known to a bin of 128.
+    assert flat_top.number == pytest.approx(np.arccos(level) / np.pi, abs=2.5 / 128)
+    assert measurement.verdict != "ok"
 
 
 @pytest.mark.parametrize("seed", population(6, short=2))
-def test_a_cut_is_named_in_a_cycle_with_harmonics_in_strong_noise_and_at_few_phases(seed) -> None:
+def test_a_cut_is_named_among_harmonics_strong_noise_and_few_phases(seed) -> None:
     rng = np.random.default_rng(seed)
-    # At 2 kHz 120 Hz has 50 phases, and 100 Hz has 20.
+    # Sampled at 2 kHz, 120 Hz has 50 different phases and 100 Hz has 20.
     frequency = (37.013, 120.0, 100.0)[seed % 3]
     cycle = harmonics(rng)
     level = 0.5 * np.max(cycle(np.linspace(0, 2 * np.pi, 400)))
-    _, answer = recorded(rng, cycle, 0.3, level=level, frequency=frequency)
-    assert answer.verdict != "ok"
-    clean, answer = recorded(rng, cycle, 0.3, frequency=frequency)
-    assert answer.verdict == "ok"
+    _, flat_top = measured(rng, cycle, 0.3, level=level, frequency=frequency)
+    assert flat_top.verdict != "ok"
+    clean, flat_top = measured(rng, cycle, 0.3, frequency=frequency)
+    assert flat_top.verdict == "ok"
     assert clean.reading.phasor(1).amplitude == pytest.approx(MU1, rel=0.05)
 
 
-def test_both_sides_can_be_cut() -> None:
+def test_cuts_of_both_sides_are_named() -> None:
     rng = np.random.default_rng(0)
-    _, answer = recorded(rng, lambda x: np.clip(np.cos(x), -0.6, 0.7), 0.02)
-    assert "at its top and bottom" in answer.sentence
+    _, flat_top = measured(rng, lambda x: np.clip(np.cos(x), -0.6, 0.7), 0.02)
+    assert "at its top and bottom" in flat_top.sentence
     share = (np.arccos(0.6) + np.arccos(0.7)) / np.pi
-    assert answer.number == pytest.approx(share, abs=4.5 / 128)
+    assert flat_top.number == pytest.approx(share, abs=4.5 / 128)
 
 
 def pulses(width):
@@ -105,10 +104,10 @@ def ramps(width):
 
 
 def slider(pull, per_period, epsilon):
-    """Quasi-static Rice-Ruina slider under a modulated load, by SciPy, over its settled period.
+    """Settled cycle of a quasi-static Rice-Ruina slider under a modulated load, by SciPy.
 
-    Force over load f, phase x, state phi = ln(V Phi/D0), `pull` = V K/(omega W0) and `per_period` =
-    V/(omega D0): slip comes in pulses at the least load.
+    Variables are force over load f, phase x and state phi = ln(V Phi/D0), with `pull` = V K/(omega
+    W0) and `per_period` = V/(omega D0). Slip comes in pulses at the least load.
     """
     a, b, mu, periods, samples = 0.013, 0.026, 0.4, 40, 512
 
@@ -143,14 +142,13 @@ SMOOTH = {
 @pytest.mark.parametrize("noise", population([3e-2, 1e-3, 0.3]))
 @pytest.mark.parametrize("name", SMOOTH)
 def test_a_smooth_cycle_is_not_suspected(name, noise) -> None:
-    _, answer = recorded(np.random.default_rng(0), SMOOTH[name], noise)
-    assert answer.verdict == "ok", answer
+    _, flat_top = measured(np.random.default_rng(0), SMOOTH[name], noise)
+    assert flat_top.verdict == "ok", flat_top
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_coloured_noise_cuts_nothing_off(red_noise, seed) -> None:
+def test_coloured_noise_is_not_taken_for_a_cut(red_noise, seed) -> None:
     rng = np.random.default_rng(seed)
     noise = red_noise(rng, 0.99, 1, 24_000)[0]
-    kept = iter([noise])
-    _, answer = recorded(rng, lambda x: np.cos(x) + next(kept), 0.01)
-    assert answer.verdict == "ok"
+    _, flat_top = measured(rng, lambda x: np.cos(x) + noise, 0.01)
+    assert flat_top.verdict == "ok"

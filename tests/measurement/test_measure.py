@@ -1,4 +1,4 @@
-"""`measure`: the window, F(0) about it, and every planted defect found."""
+"""`measure` with a modulated load: its window, F(0) before and after, and its checks."""
 
 from functools import partial
 
@@ -13,84 +13,85 @@ from asperity.recording import Channel, Trace
 
 measure = partial(asp.measure, modulated=True)
 
-NAMES = {
+CHECKS = {
     *("modulation", "periods", "signal", "leakage", "drift", "transient"),
     *("stick-slip", "load harmonics", "resolution"),
 }
 
 
-def verdicts(found):
-    return {check.name: check.verdict for check in found.checks}
+def verdicts(measurement):
+    return {check.name: check.verdict for check in measurement.checks}
 
 
-def test_a_clean_recording_passes_everything(truth, protocol, trace) -> None:
-    found = measure(trace(*protocol(truth)))
-    assert set(verdicts(found)) >= NAMES
-    assert set(verdicts(found).values()) == {"ok"}
-    assert found.verdict == "ok"
-    reading = found.reading
+def test_a_clean_recording_passes_every_check(truth, protocol, trace) -> None:
+    measurement = measure(trace(*protocol(truth)))
+    assert set(verdicts(measurement)) >= CHECKS
+    assert set(verdicts(measurement).values()) == {"ok"}
+    assert measurement.verdict == "ok"
+    reading = measurement.reading
     # Five standard uncertainties: the seed is fixed.
     for name in ("W0", "epsilon", "frequency"):
         assert abs(getattr(reading, name) - getattr(truth, name)) < 5 * reading.uncertainty(name)
     for n, c in enumerate(truth.harmonics, 1):
         phasor = reading.phasor(n)
         assert abs(phasor.value - c) < 5 * phasor.amplitude_uncertainty
-    assert abs(found.delta_mu + 0.08) < 5 * found.delta_mu_uncertainty
-    assert abs(found.static_friction - 0.4) < 5e-6
-    for level in (found.before, found.after):
+    assert abs(measurement.delta_mu + 0.08) < 5 * measurement.delta_mu_uncertainty
+    assert abs(measurement.static_friction - 0.4) < 5e-6
+    for level in (measurement.before, measurement.after):
         assert abs(level.value - 2.8) < 5 * level.uncertainty
 
 
 def test_the_window_lies_in_the_modulation_after_the_transient(truth, protocol, trace) -> None:
-    found = measure(trace(*protocol(truth)))
-    reading = found.reading
-    # Eight decay times of 0.3 s, and blocks of 0.07 s: 0.08 e^-8 is within the noise of a block.
+    measurement = measure(trace(*protocol(truth)))
+    reading = measurement.reading
+    # After eight decay times of 0.3 s, 0.08 e^-8 is within the noise of a block of 0.07 s.
     assert 6.9 < reading.start < 10.0
     assert 25.7 < reading.end < 26.0
-    assert found.chosen_by == "program"
-    assert [part.modulated for part in found.stretches] == [False, True, False]
-    assert found.stretches[1].amplitude == pytest.approx(truth.epsilon * truth.W0, rel=1e-2)
+    assert measurement.chosen_by == "program"
+    assert [part.modulated for part in measurement.stretches] == [False, True, False]
+    assert measurement.stretches[1].amplitude == pytest.approx(truth.epsilon * truth.W0, rel=1e-2)
 
 
 def test_a_window_of_the_user_is_taken_as_it_is(truth, protocol, trace) -> None:
-    found = measure(trace(*protocol(truth)), window=(12.0, 20.0))
-    assert (found.reading.start, found.reading.end) == pytest.approx((12.0, 20.0), abs=1e-9)
-    assert found.chosen_by == "user"
-    assert found.before is not None
+    measurement = measure(trace(*protocol(truth)), window=(12.0, 20.0))
+    reading = measurement.reading
+    assert (reading.start, reading.end) == pytest.approx((12.0, 20.0), abs=1e-9)
+    assert measurement.chosen_by == "user"
+    assert measurement.before is not None
 
 
-def test_whole_periods(truth, protocol, trace) -> None:
-    found = measure(trace(*protocol(truth)), window=(12.0, 20.0), only_whole_periods=True)
+def test_the_window_is_cut_to_whole_periods_on_request(truth, protocol, trace) -> None:
+    measurement = measure(trace(*protocol(truth)), window=(12.0, 20.0), only_whole_periods=True)
     # The last sample stands for the time up to the next: n samples span n steps.
-    periods = found.reading.samples * 1e-3 * truth.frequency
+    periods = measurement.reading.samples * 1e-3 * truth.frequency
     assert abs(periods - round(periods)) < 1e-3 * truth.frequency
-    assert 20.0 - found.reading.end < 1 / truth.frequency + 1e-3
+    assert 20.0 - measurement.reading.end < 1 / truth.frequency + 1e-3
 
 
-def test_a_modulated_recording_without_pauses(truth, trace) -> None:
+def test_a_recording_without_pauses_is_read_whole(truth, trace) -> None:
     rng = np.random.default_rng(0)
     time = np.arange(8000) * 1e-3
     load = truth.load(time) + 1e-3 * rng.standard_normal(time.size)
     force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
-    found = measure(trace(time, load, force))
-    assert found.window == (0, time.size)
-    assert found.before is None
-    assert found.after is None
-    assert np.isnan(found.delta_mu)
-    assert found.verdict == "ok"
+    measurement = measure(trace(time, load, force))
+    assert measurement.window == (0, time.size)
+    assert measurement.before is None
+    assert measurement.after is None
+    assert np.isnan(measurement.delta_mu)
+    assert measurement.verdict == "ok"
 
 
-def test_a_weak_modulation_is_no_pause(truth, trace) -> None:
+def test_a_weak_modulation_is_not_taken_for_a_pause(truth, trace) -> None:
     rng = np.random.default_rng(0)
     time = np.arange(30_000) * 1e-3
     epsilon = np.select([time < 5, time < 12, time < 17], [0.0, 0.005, 0.0], 0.4)
     load = 7 * (1 + epsilon * np.cos(2 * np.pi * 60 * time))
     load = load + 1e-3 * rng.standard_normal(time.size)
     force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
-    found = measure(trace(time, load, force))
-    amplitudes = [part.amplitude / 7 for part in found.stretches]
+    measurement = measure(trace(time, load, force))
+    amplitudes = [part.amplitude / 7 for part in measurement.stretches]
     assert amplitudes == pytest.approx([0, 0.005, 0, 0.4], abs=2e-4)
-    assert 12 < found.before.start < found.before.end < 17
+    assert 12 < measurement.before.start < measurement.before.end < 17
 
 
 def test_the_longest_of_several_amplitudes_is_read(truth, trace) -> None:
@@ -100,15 +101,15 @@ def test_the_longest_of_several_amplitudes_is_read(truth, trace) -> None:
     load = np.where(time < 8, weak.load(time), truth.load(time))
     load = load + 1e-3 * rng.standard_normal(time.size)
     force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
-    found = measure(trace(time, load, force))
-    assert found.reading.epsilon == pytest.approx(0.24, abs=1e-4)
-    assert found.reading.start > 8.0
-    amplitudes = [part.amplitude / truth.W0 for part in found.stretches]
+    measurement = measure(trace(time, load, force))
+    assert measurement.reading.epsilon == pytest.approx(0.24, abs=1e-4)
+    assert measurement.reading.start > 8.0
+    amplitudes = [part.amplitude / truth.W0 for part in measurement.stretches]
     assert amplitudes == pytest.approx([0.1, 0.24], abs=1e-3)
 
 
-def test_each_amplitude_of_a_protocol_is_held_against_the_rests_beside_it(truth, trace) -> None:
-    # Rests that drift by 2 % in all, so that those beside another amplitude are wrong by as much.
+def test_delta_mu_of_each_amplitude_refers_to_the_pauses_next_to_it(truth, trace) -> None:
+    # Friction drifts by 2 % in all: the pauses next to another amplitude have other levels.
     rng = np.random.default_rng(8)
     time = np.arange(60_000) * 1e-3
     amplitudes, starts = (0.05, 0.1, 0.2), (8.0, 26.0, 44.0)
@@ -123,12 +124,12 @@ def test_each_amplitude_of_a_protocol_is_held_against_the_rests_beside_it(truth,
     force = truth.W0 * friction + 1e-3 * rng.standard_normal(time.size)
     recording = trace(time, load, force)
     for amplitude, start in zip(amplitudes, starts, strict=True):
-        # The last sample of the window is the first of the rest.
-        found = measure(recording, window=(start + 3, start + 8))
-        assert found.reading.epsilon == pytest.approx(amplitude, rel=5e-3)
-        # The mean of the window lies 1.5 s behind the middle of the rests on average.
-        assert found.delta_mu == pytest.approx(-0.2 * amplitude, abs=6e-4)
-        assert verdicts(found)["steady load"] == "ok"
+        # The last sample of the window is the first of the pause.
+        measurement = measure(recording, window=(start + 3, start + 8))
+        assert measurement.reading.epsilon == pytest.approx(amplitude, rel=5e-3)
+        # The middle of the window is 1.5 s later than the mean time of its pauses.
+        assert measurement.delta_mu == pytest.approx(-0.2 * amplitude, abs=6e-4)
+        assert verdicts(measurement)["steady load"] == "ok"
 
 
 def slow(time, load, force):
@@ -187,7 +188,7 @@ def repeated_stamps(time, load, force):
     return time, load, force
 
 
-#: Defect, window, name of the check, and verdicts that name it.
+#: Defect: the function that plants it, the window, the check that names it, and its verdicts.
 PLANTED = {
     "stick-slip": (slow, None, "stick-slip", {"suspicious", "bad"}),
     "stick-slip, faster": (fast, None, "stick-slip", {"bad"}),
@@ -205,11 +206,11 @@ PLANTED = {
 }
 
 
-#: Number of the check, and how well it is known.
+#: Defect: the number of its check, and the relative tolerance.
 NUMBERS = {
-    # A line between two lines of the window is seen up to 15 % too low.
+    # A line between two frequencies of the spectrum is measured up to 15 % too low.
     "stick-slip": (0.02 / (0.32 * 7), 0.15),
-    # F(0) at the middles of what was averaged, 0-6 s and about 29-36 s.
+    # F(0) is averaged over 0-6 s and about 29-36 s; the middles are 29.5 s apart.
     "drift": (2e-3 * 29.5, 0.1),
     "second harmonic of the load": (2e-3 / 0.24 * (0.1 / 7) / 3e-4, 2e-2),
     "transient": (0.08 * np.exp(-1) / 0.32, 0.3),
@@ -217,74 +218,74 @@ NUMBERS = {
 
 
 @pytest.mark.parametrize("defect", PLANTED)
-def test_a_planted_defect_is_found(truth, protocol, trace, defect) -> None:
+def test_a_planted_defect_is_named(truth, protocol, trace, defect) -> None:
     plant, window, name, expected = PLANTED[defect]
-    found = measure(trace(*plant(*protocol(truth))), window=window)
-    (check,) = [check for check in found.checks if check.name == name]
+    measurement = measure(trace(*plant(*protocol(truth))), window=window)
+    (check,) = [check for check in measurement.checks if check.name == name]
     assert check.verdict in expected, check
     assert check.sentence
     if defect in NUMBERS:
         number, rel = NUMBERS[defect]
         assert check.number == pytest.approx(number, rel=rel)
     if plant is second_harmonic:
-        assert abs(found.reading.load_harmonics[1]) == pytest.approx(0.1 / 7, rel=1e-2)
+        assert abs(measurement.reading.load_harmonics[1]) == pytest.approx(0.1 / 7, rel=1e-2)
 
 
-def test_defects_outside_the_window_are_avoided(truth, protocol, trace) -> None:
+def test_the_chosen_window_avoids_defects(truth, protocol, trace) -> None:
     time, load, force = protocol(truth)
     force = force.copy()
     force[10_500:10_600] = np.nan
-    found = measure(trace(time, load, force))
-    assert found.reading.start >= 10.6
-    assert found.verdict == "ok"
-    # They are reported all the same.
-    assert "missing values" in {finding.name for finding in found.samples.findings}
-    assert found.samples.dropped == 100
+    measurement = measure(trace(time, load, force))
+    assert measurement.reading.start >= 10.6
+    assert measurement.verdict == "ok"
+    # The defects are reported all the same.
+    assert "missing values" in {finding.name for finding in measurement.samples.findings}
+    assert measurement.samples.dropped == 100
 
 
-def test_missing_values_are_left_out_and_not_invented(truth, trace) -> None:
+def test_missing_values_are_left_out_and_not_interpolated(truth, trace) -> None:
     time = np.arange(6000) * 1e-3
     load, force = truth.load(time), truth.force(time)
     force[1000:1100] = np.nan
     load[2500:2600] = np.inf
-    found = measure(trace(time, load, force), window=(0, 6))
-    assert abs(found.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
-    assert found.samples.dropped == 200
+    measurement = measure(trace(time, load, force), window=(0, 6))
+    assert abs(measurement.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
+    assert measurement.samples.dropped == 200
 
 
 def test_a_recorded_friction_coefficient_stands_for_the_force(truth, trace) -> None:
     time = np.arange(6000) * 1e-3
     load, force = truth.load(time), truth.force(time)
     friction = Channel(force / load, "dimensionless", "", "mu", "")
-    found = measure(Trace(time, {"W": Channel(load, "force", "N", "W", "N"), "mu": friction}))
-    assert abs(found.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
-    assert found.samples.names == ("W", "mu x load")
+    measurement = measure(Trace(time, {"W": Channel(load, "force", "N", "W", "N"), "mu": friction}))
+    assert abs(measurement.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
+    assert measurement.samples.names == ("W", "mu x load")
 
 
-def test_a_recording_without_modulation_is_told(truth, trace) -> None:
+def test_a_recording_without_modulation_is_refused(truth, trace) -> None:
     rng = np.random.default_rng(0)
     time = np.arange(8000) * 1e-3
     load = 7 + 1e-2 * rng.standard_normal(time.size)
     force = 2.8 + 1e-2 * rng.standard_normal(time.size)
     with pytest.raises(InputError, match=r"must be modulated.*choose modulated=False"):
         measure(trace(time, load, force))
-    # The verdict says so to a user who knows better.
+    # If the user gives a frequency, the verdict says so.
     assert verdicts(measure(trace(time, load, force), frequency=60.0))["modulation"] == "bad"
 
 
-def test_a_long_recording_with_a_short_modulation(truth, protocol, trace) -> None:
-    # The modulation's line would drown in averages over the whole, and misses the middle.
-    made = protocol(truth, rate=2000.0, on=(88.0, 96.0), end=100.0)
-    found = measure(trace(*made))
-    assert found.reading.frequency == pytest.approx(truth.frequency, abs=1e-4)
-    assert 88 < found.reading.start < found.reading.end < 96
+def test_a_short_modulation_of_a_long_recording_is_found(truth, protocol, trace) -> None:
+    # Averages over the whole would hide the line, and the middle has none.
+    signals = protocol(truth, rate=2000.0, on=(88.0, 96.0), end=100.0)
+    measurement = measure(trace(*signals))
+    assert measurement.reading.frequency == pytest.approx(truth.frequency, abs=1e-4)
+    assert 88 < measurement.reading.start < measurement.reading.end < 96
 
 
-def test_the_record_holds_everything(truth, protocol, trace) -> None:
-    found = measure(trace(*protocol(truth)), harmonics=2)
-    record = modulated_record(found)
-    assert record["mu1"] == found.reading.phasor(1).amplitude
-    assert record["uncertainties"]["phase2"] == found.reading.uncertainty("phase2")
+def test_the_record_holds_values_uncertainties_and_their_covariance(truth, protocol, trace) -> None:
+    measurement = measure(trace(*protocol(truth)), harmonics=2)
+    record = modulated_record(measurement)
+    assert record["mu1"] == measurement.reading.phasor(1).amplitude
+    assert record["uncertainties"]["phase2"] == measurement.reading.uncertainty("phase2")
     matrix = np.array(record["covariance"]["matrix"])
     names = record["covariance"]["names"]
     assert matrix.shape == (len(names), len(names))
@@ -296,7 +297,7 @@ def test_the_record_holds_everything(truth, protocol, trace) -> None:
 
 @pytest.mark.parametrize("samples", [3000, 140_000])
 @pytest.mark.parametrize(("which", "refine"), [("load", True), ("force", False)])
-def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) -> None:
+def test_lock_in_refuses_values_that_are_not_finite(truth, samples, which, refine) -> None:
     time = np.arange(samples) * 1e-3
     signals = {"load": truth.load(time), "force": truth.force(time)}
     signals[which][samples // 3] = np.nan
@@ -325,7 +326,7 @@ def test_bad_input_is_one_sentence(truth, protocol, trace, options, message) -> 
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_noise_of_the_load_is_in_the_friction_without_modulation(
+def test_delta_mu_uncertainty_includes_noise_of_the_load_in_the_pauses(
     truth, protocol, trace, shared
 ) -> None:
     variances = []
@@ -333,13 +334,13 @@ def test_noise_of_the_load_is_in_the_friction_without_modulation(
         time, load, force = protocol(truth, noise=1e-3, on=(6.0, 12.0), end=12.0, seed=seed)
         of_load = 0.05 * np.random.default_rng(100 + seed).standard_normal(time.size)
         force = force + truth.mean_friction * of_load if shared else force
-        found = measure(trace(time, load + of_load, force))
-        whole, modulated = found.delta_mu_uncertainty, found.reading.uncertainty("mean_friction")
-        variances.append(max(whole**2 - modulated**2, 0.0))
-    # Of the mean of a ratio F/W by the law of errors, from the 6,000 samples before the modulation.
+        measurement = measure(trace(time, load + of_load, force))
+        modulated = measurement.reading.uncertainty("mean_friction")
+        variances.append(max(measurement.delta_mu_uncertainty**2 - modulated**2, 0.0))
+    # Propagated error of the mean of F/W over the 6,000 samples before the modulation.
     expected = truth.mean_friction * 0.05 / truth.W0 / np.sqrt(6000)
     if shared:
         assert np.median(variances) < (0.05 * expected) ** 2
     else:
-        # Median of chi-squared of eight degrees of freedom; that of eight draws is good to 22 %.
+        # The median of chi-squared of eight degrees of freedom, which eight draws give to 22 %.
         assert np.median(variances) == pytest.approx(7.34 / 8 * expected**2, rel=0.5)

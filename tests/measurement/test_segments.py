@@ -1,4 +1,4 @@
-"""Where recordings are cut: over decades of velocity, changes of sampling rate, short holds."""
+"""Segments of one velocity: their limits over decades of velocity, and short holds."""
 
 from functools import partial
 
@@ -65,21 +65,21 @@ RECORDS = {
 def test_every_change_of_velocity_is_found_and_nothing_else(name) -> None:
     velocities, lengths, rates = RECORDS[name]
     time, slip, _, truth = stepped(velocities, lengths, rates)
-    found = partition(time, slip)
-    # A tenth of a second, where the coarsest samples are a second apart.
-    assert [c.time for c in found.cuts] == pytest.approx(truth.tolist(), abs=0.1)
-    moving = [v for v, hold in zip(found.velocities, found.holds, strict=True) if not hold]
+    cut = partition(time, slip)
+    # To a tenth of a second, although the coarsest samples are a second apart.
+    assert [c.time for c in cut.cuts] == pytest.approx(truth.tolist(), abs=0.1)
+    moving = [v for v, hold in zip(cut.velocities, cut.holds, strict=True) if not hold]
     assert moving == pytest.approx([v for v in velocities if v], rel=0.02)
-    assert found.holds == tuple(v == 0 for v in velocities)
-    assert found.doubts == ()
+    assert cut.holds == tuple(v == 0 for v in velocities)
+    assert cut.doubts == ()
 
 
 def random_motion(rng):
     """Time, displacement, noise, and the velocities, spans and ramps of a random drive.
 
     Changes by 1.6 and more, holds, ramps of up to a tenth of both sides, 10 Hz to 3 kHz, white
-    noise, a coarse recorder, or noise correlated over 2 to 30 samples; every change is twelve
-    standard deviations or more of what its two sides tell.
+    noise, a coarse recorder, or noise correlated over 2 to 30 samples; every change is at least
+    twelve standard deviations of its estimate from both sides.
     """
     while True:
         rate, count = 10 ** rng.uniform(1, 3.5), int(rng.integers(2, 7))
@@ -124,7 +124,7 @@ def random_motion(rng):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_random_motions_are_cut_right_or_said_to_be_doubtful(seed) -> None:
+def test_random_motions_are_cut_right_or_reported_as_doubtful(seed) -> None:
     for k in range(6):
         time, slip, noise, v, spans, ramps = random_motion(np.random.default_rng([seed, k]))
         cut = partition(time, slip)
@@ -138,27 +138,27 @@ def test_random_motions_are_cut_right_or_said_to_be_doubtful(seed) -> None:
         assert np.all(np.abs(cut.velocities - v) < 0.05 * v + 6 * noise / spans)
 
 
-def test_a_motor_that_takes_seconds_makes_no_segment(sliding_trace) -> None:
-    """Five seconds at 319 nm/s between 200 nm/s and 2 um/s once raised A - B by a quarter."""
+def test_seconds_of_acceleration_are_not_taken_for_a_segment(sliding_trace) -> None:
+    """As a segment, 5 s at 319 nm/s between 200 nm/s and 2 um/s would raise A - B by a quarter."""
     time, slip, friction, _ = stepped(
         (0.2 * UM, 0.319 * UM, 2 * UM), (440 * UM, 1.6 * UM, 900 * UM), (7, 7, 7), resolution=2e-7
     )
-    found = measure_sliding(sliding_trace(time, friction, slip))
-    assert [s.velocity for s in found.segments] == pytest.approx([0.2 * UM, 2 * UM], rel=0.01)
-    (step,) = found.steps
+    measurement = measure_sliding(sliding_trace(time, friction, slip))
+    assert [s.velocity for s in measurement.segments] == pytest.approx([0.2 * UM, 2 * UM], rel=0.01)
+    (step,) = measurement.steps
     assert step.velocity_after / step.velocity_before == pytest.approx(10, rel=0.02)
 
 
-def test_a_disturbance_of_the_motor_is_no_step() -> None:
+def test_a_disturbance_of_the_motor_is_not_taken_for_a_step() -> None:
     time, slip, _, (first, *_) = stepped(
         (3 * UM, 10 * UM, 17 * UM, 10 * UM), (200 * UM, 50 * UM, 8 * UM, 200 * UM), (100,) * 4
     )
-    found = partition(time, slip)
-    assert [c.time for c in found.cuts] == pytest.approx([first], abs=0.05)
+    cut = partition(time, slip)
+    assert [c.time for c in cut.cuts] == pytest.approx([first], abs=0.05)
 
 
 @pytest.mark.parametrize("defect", ["spike", "jump"])
-def test_a_spike_or_a_jump_of_the_gauge_is_no_motion(defect) -> None:
+def test_a_spike_or_a_jump_of_the_gauge_is_not_taken_for_motion(defect) -> None:
     time = np.arange(2000) * 0.01
     slip = 3 * UM * time + 1e-8 * np.random.default_rng(0).standard_normal(time.size)
     slip[slice(700, 701 if defect == "spike" else None)] += 1e-3
@@ -167,10 +167,10 @@ def test_a_spike_or_a_jump_of_the_gauge_is_no_motion(defect) -> None:
     assert cut.velocities == pytest.approx([3 * UM], rel=1e-3)
 
 
-def test_a_small_change_can_be_read_in_two_ways(sliding_trace) -> None:
+def test_a_small_change_of_velocity_is_reported_as_doubtful(sliding_trace) -> None:
     time, slip, friction, _ = stepped((3 * UM, 4 * UM), (300 * UM, 300 * UM), (50, 50))
-    found = measure_sliding(sliding_trace(time, friction, slip))
-    check = next(c for c in found.checks if c.name == "segments")
+    measurement = measure_sliding(sliding_trace(time, friction, slip))
+    check = next(c for c in measurement.checks if c.name == "segments")
     assert check.verdict == "suspicious"
     assert "may be no step" in check.sentence
 
@@ -178,22 +178,24 @@ def test_a_small_change_can_be_read_in_two_ways(sliding_trace) -> None:
 def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
     time, slip, friction, (truth,) = stepped((3 * UM, 10 * UM), (200 * UM, 300 * UM), (50, 50))
     trace = sliding_trace(time, friction, slip)
-    found = measure_sliding(trace, steps=[truth - 0.2])
-    assert found.steps[0].time == truth - 0.2
-    assert found.chosen_by == "user"
-    blind = measure_sliding(sliding_trace(time, friction), steps=[truth])
-    assert np.isnan(blind.steps[0].rate_dependence)
-    assert np.isfinite(blind.steps[0].change)
-    # The velocities of the user stand for those of the displacement, and are compared with them.
-    same = {"steps": [truth], "velocities": [3 * UM, 10 * UM]}
-    seen = measure_sliding(trace, steps=[truth]).steps[0]
-    for known in (sliding_trace(time, friction), trace):
-        step = measure_sliding(known, **same).steps[0]
-        assert step.rate_dependence == pytest.approx(seen.rate_dependence, rel=0.02)
-        assert step.slope_after == pytest.approx(seen.slope_after, rel=0.02)
-    other = measure_sliding(trace, steps=[truth], velocities=[3 * UM, 20 * UM])
+    measurement = measure_sliding(trace, steps=[truth - 0.2])
+    assert measurement.steps[0].time == truth - 0.2
+    assert measurement.chosen_by == "user"
+    without_slip = measure_sliding(sliding_trace(time, friction), steps=[truth])
+    assert np.isnan(without_slip.steps[0].rate_dependence)
+    assert np.isfinite(without_slip.steps[0].change)
+    # Velocities of the user replace those of the displacement, and are compared with them.
+    options = {"steps": [truth], "velocities": [3 * UM, 10 * UM]}
+    expected = measure_sliding(trace, steps=[truth]).steps[0]
+    for recording in (sliding_trace(time, friction), trace):
+        step = measure_sliding(recording, **options).steps[0]
+        assert step.rate_dependence == pytest.approx(expected.rate_dependence, rel=0.02)
+        assert step.slope_after == pytest.approx(expected.slope_after, rel=0.02)
+    contradicted = measure_sliding(trace, steps=[truth], velocities=[3 * UM, 20 * UM])
     assert "the recorded displacement has 1" in next(
-        c.sentence for c in other.checks if c.name == "segments" and c.verdict == "suspicious"
+        c.sentence
+        for c in contradicted.checks
+        if c.name == "segments" and c.verdict == "suspicious"
     )
     for steps in ([-5.0], [1e6]):
         with pytest.raises(InputError, match="steps must lie inside the recording"):
@@ -204,7 +206,7 @@ def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
         measure_sliding(trace, holds=[(30.0, 20.0)])
 
 
-def test_the_noise_of_a_displacement_is_found(sliding_trace) -> None:
+def test_the_noise_of_a_displacement_is_estimated() -> None:
     rng = np.random.default_rng(0)
     time = np.concatenate([np.arange(0, 50, 0.1), np.arange(50, 60, 0.01)])
     clean = np.interp(time, [0, 50, 60], [0, 150 * UM, 250 * UM])
@@ -222,8 +224,8 @@ def white(rng, size, rate):
 def gauge(rng, size, rate):
     """Correlated over 5 to 200 ms, as behind a filter."""
     keep = np.exp(-1 / (rate * 10 ** rng.uniform(-2.3, -0.7)))
-    made = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(size + 4000))
-    return made[4000:] + 0.3 * rng.standard_normal(size)
+    filtered = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(size + 4000))
+    return filtered[4000:] + 0.3 * rng.standard_normal(size)
 
 
 def hum(rng, size, rate):
@@ -238,11 +240,11 @@ def wanders(rng, size, rate):
 
 @pytest.mark.parametrize("kind", [white, gauge, hum, wanders])
 @pytest.mark.parametrize("seed", population(8))
-def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kind, seed) -> None:
+def test_each_stop_is_one_hold_in_noise_of_any_kind(sliding_trace, kind, seed) -> None:
     """Random velocities with stops of seconds between; noise of 5 nm to 0.5 um."""
     rng = np.random.default_rng(seed)
     rate, noise = 300.0, 10 ** rng.uniform(-8.3, -6.3)
-    # A stop is seen if it moves by 60 standard deviations less than its surroundings.
+    # A stop is visible if it moves by 60 standard deviations less than its surroundings.
     fast = max(60 * noise / 2, 1e-6) * 10 ** rng.uniform(0, 1.5)
     factor = 10 ** (rng.choice([-1, 1]) * rng.uniform(0.3, 0.9))
     velocities = (fast, 0.0, fast, max(fast * factor, 60 * noise / 5), 0.0, fast)
@@ -250,27 +252,27 @@ def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kin
     lengths = [v * s if v else s for v, s in zip(velocities, spans, strict=True)]
     time, slip, friction, truth = stepped(velocities, lengths, (rate,) * 6, resolution=0, seed=seed)
     slip = slip + noise * kind(rng, time.size, rate)
-    found = measure_sliding(sliding_trace(time, friction, slip))
-    assert [s.hold for s in found.segments] == [v == 0 for v in velocities]
-    assert [s.start for s in found.segments[1:]] == pytest.approx(truth.tolist(), abs=0.5)
-    for segment, velocity, span in zip(found.segments, velocities, spans, strict=True):
+    measurement = measure_sliding(sliding_trace(time, friction, slip))
+    assert [s.hold for s in measurement.segments] == [v == 0 for v in velocities]
+    assert [s.start for s in measurement.segments[1:]] == pytest.approx(truth.tolist(), abs=0.5)
+    for segment, velocity, span in zip(measurement.segments, velocities, spans, strict=True):
         assert segment.velocity == pytest.approx(velocity, abs=6 * noise / span + 0.01 * velocity)
-    (step,) = found.steps
+    (step,) = measurement.steps
     assert step.velocity_before * step.velocity_after > 0
-    assert len(found.holds) == 2
+    assert len(measurement.holds) == 2
 
 
 @pytest.mark.parametrize(
-    ("displacement", "said"),
+    ("displacement", "sentence"),
     [
         (lambda time: 1e-8 * time**2, "changes by 2e+02 % within a segment"),
         (lambda time: 0 * time, "nothing slides"),
         (lambda time: 1e-5 * (time > 10), "nothing slides"),
     ],
 )
-def test_one_segment_that_does_not_slide_evenly_is_doubted(displacement, said):
+def test_a_single_segment_without_even_sliding_is_doubted(displacement, sentence):
     time = np.arange(20_000) / 1000
     cut = partition(time, displacement(time))
     assert cut.cuts == ()
     (doubt,) = cut.doubts
-    assert said in doubt
+    assert sentence in doubt

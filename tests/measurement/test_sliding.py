@@ -16,7 +16,7 @@ STRESS = 20e6
 
 
 def velocity_step(*, seed=0, noise=5e-4, direct=0.01, change=-0.004, decay=1.5):
-    """Friction through a step from 3 to 10 um/s at 60 s; the rate of sampling rises at 50 s."""
+    """Time, slip and friction of a step from 3 to 10 um/s at 60 s; sampling is faster from 50 s."""
     rng = np.random.default_rng(seed)
     time = np.concatenate([np.arange(0, 50, 0.1), np.arange(50, 110, 0.02)])
     after = np.clip(time - 60, 0, None)
@@ -34,50 +34,51 @@ def recorded(time, **channels):
         "normal stress": ("Pa", "pressure"),
         "shear stress": ("Pa", "pressure"),
     }
-    made = {}
+    by_name = {}
     for name, values in channels.items():
         unit, kind = kinds[name.replace("_", " ")]
-        made[name.replace("_", " ")] = Channel(values, kind, unit or "", name, unit or "")
-    return Trace(time, made)
+        by_name[name.replace("_", " ")] = Channel(values, kind, unit or "", name, unit or "")
+    return Trace(time, by_name)
 
 
-def check(found) -> None:
-    assert len(found.segments) == 2
-    before, after = found.segments
+def assert_step_is_read(measurement) -> None:
+    assert len(measurement.segments) == 2
+    before, after = measurement.segments
     assert after.start == pytest.approx(60, abs=0.1)
     assert (before.velocity, after.velocity) == pytest.approx((3e-6, 10e-6), rel=1e-2)
     assert before.steady.value == pytest.approx(0.6, abs=1e-4)
     assert after.steady.value == pytest.approx(0.596, abs=1e-4)
     assert after.steady.start > 63
-    (step,) = found.steps
+    (step,) = measurement.steps
     assert abs(step.change + 0.004) < 5 * step.uncertainty
     assert step.rate_dependence == pytest.approx(-0.004 / np.log(10 / 3), abs=2e-4)
     assert step.peak == pytest.approx(0.01, abs=2e-3)
 
 
 @pytest.mark.parametrize("motion", ["slip", "velocity"])
-def test_a_velocity_step(motion) -> None:
+def test_a_velocity_step_is_read_from_displacement_or_velocity(motion) -> None:
     time, slip, friction = velocity_step()
     velocity = np.where(time < 60, 3e-6, 10e-6)
     values = slip if motion == "slip" else velocity
     noise = 1 + 1e-3 * np.random.default_rng(1).standard_normal(time.size)
-    found = measure_sliding(recorded(time, friction=friction, **{motion: values * noise**0.1}))
-    check(found)
-    assert found.velocity_from == motion
-    assert found.rates[0][0] == pytest.approx(50)
-    assert found.rates[1][0] == pytest.approx(10)
-    assert found.load is None
+    trace = recorded(time, friction=friction, **{motion: values * noise**0.1})
+    measurement = measure_sliding(trace)
+    assert_step_is_read(measurement)
+    assert measurement.velocity_from == motion
+    assert measurement.rates[0][0] == pytest.approx(50)
+    assert measurement.rates[1][0] == pytest.approx(10)
+    assert measurement.load is None
 
 
 def test_friction_is_the_ratio_of_force_and_load() -> None:
     time, slip, friction = velocity_step()
     load = STRESS * (1 + 1e-4 * np.random.default_rng(3).standard_normal(time.size))
-    found = measure_sliding(
+    measurement = measure_sliding(
         recorded(time, slip=slip, normal_stress=load, shear_stress=friction * load)
     )
-    check(found)
-    assert found.load.value == pytest.approx(STRESS, rel=1e-4)
-    assert found.load_unit == "Pa"
+    assert_step_is_read(measurement)
+    assert measurement.load.value == pytest.approx(STRESS, rel=1e-4)
+    assert measurement.load_unit == "Pa"
     exchanged = measure_sliding(
         recorded(time, slip=slip, normal_stress=friction * load, shear_stress=load)
     )
@@ -86,49 +87,49 @@ def test_friction_is_the_ratio_of_force_and_load() -> None:
         recorded(time, slip=slip, normal_stress=1e-3 * load, shear_stress=friction * load)
     )
     assert (small.checks[0].name, small.checks[0].verdict) == ("friction", "bad")
-    assert found.verdict == "ok"
+    assert measurement.verdict == "ok"
 
 
-def test_several_steps_and_back() -> None:
+def test_steps_up_and_down_are_read() -> None:
     rng = np.random.default_rng(0)
     time = np.arange(12_000) * 0.01
     velocity = 1e-6 * np.select([time < 30, time < 55, time < 90], [1.0, 10.0, 3.0], 1.0)
     slip = np.cumsum(velocity) * 0.01
     friction = 0.6 + 0.01 * np.log(velocity / 1e-6) + 1e-4 * rng.standard_normal(time.size)
-    found = measure_sliding(recorded(time, friction=friction, slip=slip))
-    assert [s.start for s in found.segments] == pytest.approx([0, 30, 55, 90], abs=0.1)
-    for step in found.steps:
+    measurement = measure_sliding(recorded(time, friction=friction, slip=slip))
+    assert [s.start for s in measurement.segments] == pytest.approx([0, 30, 55, 90], abs=0.1)
+    for step in measurement.steps:
         assert step.rate_dependence == pytest.approx(0.01, abs=3e-4)
-    # Downward steps have their extreme below.
-    assert found.steps[1].peak < 0
+    # The extreme of a downward step lies below.
+    assert measurement.steps[1].peak < 0
 
 
-def test_no_motion_is_one_segment() -> None:
+def test_a_recording_without_motion_is_one_segment() -> None:
     time, _, friction = velocity_step(direct=0.0, change=0.0)
-    found = measure_sliding(recorded(time, friction=friction))
-    assert len(found.segments) == 1
-    assert np.isnan(found.segments[0].velocity)
-    assert found.steps == ()
-    assert found.friction.value == pytest.approx(0.6, abs=5 * found.friction.uncertainty)
+    measurement = measure_sliding(recorded(time, friction=friction))
+    assert len(measurement.segments) == 1
+    assert np.isnan(measurement.segments[0].velocity)
+    assert measurement.steps == ()
+    assert abs(measurement.friction.value - 0.6) < 5 * measurement.friction.uncertainty
 
 
-def test_planted_defects() -> None:
+def test_an_unsteady_load_and_a_drift_are_bad() -> None:
     time, slip, friction = velocity_step()
     load = STRESS * (1 + 0.05 * np.sin(2 * np.pi * 0.3 * time))
 
     def verdict(name, **channels):
-        found = measure_sliding(recorded(time, slip=slip, **channels))
-        return next(check.verdict for check in found.checks if check.name == name)
+        measurement = measure_sliding(recorded(time, slip=slip, **channels))
+        return next(check.verdict for check in measurement.checks if check.name == name)
 
     assert verdict("load", normal_stress=load, shear_stress=friction * STRESS) == "bad"
     assert verdict("drift", friction=friction + 5e-3 * time) == "bad"
 
 
-def test_a_window() -> None:
+def test_only_the_window_of_the_user_is_read() -> None:
     time, slip, friction = velocity_step()
-    found = measure_sliding(recorded(time, friction=friction, slip=slip), window=(5.0, 55.0))
-    assert len(found.segments) == 1
-    assert found.friction.end == pytest.approx(55, abs=0.03)
+    measurement = measure_sliding(recorded(time, friction=friction, slip=slip), window=(5.0, 55.0))
+    assert len(measurement.segments) == 1
+    assert measurement.friction.end == pytest.approx(55, abs=0.03)
 
 
 @pytest.mark.parametrize(
@@ -142,36 +143,37 @@ def test_a_window() -> None:
         ({"shear_stress": 1, "slip": 1}, {"load": "slip"}, "dimension of the load"),
     ],
 )
-def test_bad_input_is_one_sentence(channels, options, message) -> None:
+def test_bad_input_is_refused(channels, options, message) -> None:
     time, _, friction = velocity_step()
-    made = recorded(time, **dict.fromkeys(channels, friction))
+    trace = recorded(time, **dict.fromkeys(channels, friction))
     with pytest.raises(InputError, match=message):
-        measure_sliding(made, **options)
+        measure_sliding(trace, **options)
 
 
-def test_under_an_infinite_load_there_is_no_friction() -> None:
-    """The quotient would be 0."""
+def test_samples_with_an_infinite_load_are_left_out() -> None:
+    """Samples with an infinite load are left out: their ratio F/W would be 0."""
     draw = np.random.default_rng(0)
     time = np.arange(2000) / 100
     load = np.full(time.size, STRESS)
     shear = 0.6 * load * (1 + 1e-3 * draw.standard_normal(time.size))
     lost = draw.random(time.size) < draw.uniform(0.05, 0.6)
     load[lost] = draw.choice([np.inf, -np.inf, np.nan], lost.sum())
-    found = measure_sliding(recorded(time, normal_stress=load, shear_stress=shear))
-    assert found.time.size == time.size - lost.sum()
-    assert found.friction.value == pytest.approx(0.6, abs=5 * 6e-4 / np.sqrt(found.time.size))
-    assert found.load.value == pytest.approx(STRESS)
-    nowhere = recorded(time, normal_stress=np.full(time.size, np.inf), shear_stress=shear)
+    measurement = measure_sliding(recorded(time, normal_stress=load, shear_stress=shear))
+    assert measurement.time.size == time.size - lost.sum()
+    assert abs(measurement.friction.value - 0.6) < 5 * 6e-4 / np.sqrt(measurement.time.size)
+    assert measurement.load.value == pytest.approx(STRESS)
+    no_load = recorded(time, normal_stress=np.full(time.size, np.inf), shear_stress=shear)
     with pytest.raises(InputError, match="usable samples, got 0"):
-        measure_sliding(nowhere)
+        measure_sliding(no_load)
 
 
-def test_friction_is_measured_where_the_load_is_never_a_number() -> None:
+def test_friction_is_measured_where_every_load_is_missing() -> None:
     time, slip, friction = velocity_step()
     nothing = np.full(time.size, np.nan)
-    found = measure_sliding(recorded(time, friction=friction, slip=slip, normal_stress=nothing))
-    assert found.load is None
-    check(found)
+    trace = recorded(time, friction=friction, slip=slip, normal_stress=nothing)
+    measurement = measure_sliding(trace)
+    assert measurement.load is None
+    assert_step_is_read(measurement)
 
 
 V, HOLDS, STIFFNESS = 10e-6, (3.0, 30.0, 300.0), 4e3
@@ -191,42 +193,42 @@ def held(pulled):
 def true_readings(held):
     """Healing and relaxation of each hold without noise."""
     time, _, clean, _, bounds = held
-    found = []
+    readings = []
     for k in range(len(HOLDS)):
         start, end, stop = bounds[2 * k + 1 : 2 * k + 4]
         level = clean[time < start][-1]
-        found.append(
+        readings.append(
             (clean[(time > end) & (time < stop)].max() - level, level - clean[time < end][-1])
         )
-    return np.array(found)
+    return np.array(readings)
 
 
 def test_holds_are_found_and_read(held, sliding_trace) -> None:
     time, slip, _, friction, _ = held
-    found = measure_sliding(sliding_trace(time, friction, slip))
-    assert [h.hold_time for h in found.holds] == pytest.approx(HOLDS, abs=0.02)
-    assert found.steps == ()
-    for hold, (healing, relaxation) in zip(found.holds, true_readings(held), strict=True):
+    measurement = measure_sliding(sliding_trace(time, friction, slip))
+    assert [h.hold_time for h in measurement.holds] == pytest.approx(HOLDS, abs=0.02)
+    assert measurement.steps == ()
+    for hold, (healing, relaxation) in zip(measurement.holds, true_readings(held), strict=True):
         assert abs(hold.healing - healing) < 4 * hold.healing_uncertainty + 2e-4
         assert abs(hold.relaxation - relaxation) < 4 * hold.relaxation_uncertainty + 2e-4
         assert 0 < hold.healing_uncertainty < 2e-3
-        # The first half of the rise is elastic but for the creep of the contact.
+        # The first half of the rise is elastic, apart from creep of the contact.
         assert hold.reload_slope == pytest.approx(STIFFNESS, rel=0.1)
         assert hold.velocity == pytest.approx(V, rel=1e-2)
     true_slope = np.polyfit(np.log10(HOLDS), true_readings(held)[:, 0], 1)[0]
-    assert found.healing.holds == 3
-    assert abs(found.healing.per_decade - true_slope) < found.healing.interval_95
-    assert found.healing.per_decade == pytest.approx(true_slope, rel=0.1)
-    assert [s.velocity for s in found.segments if s.hold] == [0.0, 0.0, 0.0]
+    assert measurement.healing.holds == 3
+    assert abs(measurement.healing.per_decade - true_slope) < measurement.healing.interval_95
+    assert measurement.healing.per_decade == pytest.approx(true_slope, rel=0.1)
+    assert [s.velocity for s in measurement.segments if s.hold] == [0.0, 0.0, 0.0]
 
 
 def test_holds_of_the_user_need_no_displacement(held, sliding_trace) -> None:
     time, _, _, friction, bounds = held
     listed = [(bounds[k], bounds[k + 1]) for k in (1, 3, 5)]
-    found = measure_sliding(sliding_trace(time, friction), holds=listed)
-    assert [h.hold_time for h in found.holds] == pytest.approx(HOLDS)
-    assert found.chosen_by == "user"
-    for hold, (healing, _) in zip(found.holds, true_readings(held), strict=True):
+    measurement = measure_sliding(sliding_trace(time, friction), holds=listed)
+    assert [h.hold_time for h in measurement.holds] == pytest.approx(HOLDS)
+    assert measurement.chosen_by == "user"
+    for hold, (healing, _) in zip(measurement.holds, true_readings(held), strict=True):
         assert abs(hold.healing - healing) < 4 * hold.healing_uncertainty + 2e-4
         assert np.isnan(hold.reload_slope)
 
@@ -245,25 +247,24 @@ def faulty(friction, fault, seed):
 
 @pytest.mark.parametrize("fault", ["spikes", "coarse", "line"])
 def test_intervals_of_holds_cover_faults_of_the_recorder(pulled, sliding_trace, fault) -> None:
-    off = []
+    scores = []
     for seed in range(3):
-        made = pulled(
+        time, slip, clean, friction, bounds = pulled(
             (V, 0.0, V, 0.0, V), (400e-6, 20.0 + seed, 400e-6, 200.0, 400e-6), (50,) * 5,
             noise=1e-4, seed=seed, resolution=2e-8,
         )  # fmt: skip
-        time, slip, clean, friction, bounds = made
-        found = measure_sliding(sliding_trace(time, faulty(friction, fault, seed), slip))
-        for hold, start, end in zip(found.holds, bounds[1:-1:2], bounds[2::2], strict=True):
+        measurement = measure_sliding(sliding_trace(time, faulty(friction, fault, seed), slip))
+        for hold, start, end in zip(measurement.holds, bounds[1:-1:2], bounds[2::2], strict=True):
             level, rested = clean[time < start][-1], clean[time < end][-1]
             peak = clean[(time > end) & (time < end + 30)].max()
-            off.append((hold.healing - (peak - level)) / hold.interval_95)
-            off.append((hold.relaxation - (level - rested)) / 2 / hold.relaxation_uncertainty)
+            scores.append((hold.healing - (peak - level)) / hold.interval_95)
+            scores.append((hold.relaxation - (level - rested)) / 2 / hold.relaxation_uncertainty)
             assert hold.interval_95 < 0.006
-    assert np.abs(off).max() < 1.5
+    assert np.abs(scores).max() < 1.5
 
 
-def test_the_relaxation_is_that_at_the_end_of_a_hold(pulled, sliding_trace) -> None:
-    """Friction still falls over the samples that are read."""
+def test_the_relaxation_is_read_at_the_end_of_a_hold(pulled, sliding_trace) -> None:
+    """Friction still falls during the samples that are averaged."""
     time, slip, clean, friction, bounds = pulled(
         (V, 0.0, V), (400e-6, 20.0, 400e-6), (200,) * 3, noise=1e-6, resolution=1e-9
     )
@@ -276,22 +277,22 @@ def test_the_relaxation_is_that_at_the_end_of_a_hold(pulled, sliding_trace) -> N
 @pytest.mark.parametrize(
     ("hold", "off", "least", "most"), [(1.0, 0.2, 0.1, 0.5), (3e3, 0.05, 0, 0.1)]
 )
-def test_slip_on_the_rise_is_in_the_uncertainty_of_its_slope(
+def test_the_uncertainty_of_the_reload_slope_includes_slip_on_the_rise(
     pulled, sliding_trace, hold, off, least, most
 ) -> None:
-    """After a short hold the contact slips on all of the rise: the slope is not the stiffness."""
+    """After a short hold the contact slips on the whole rise: its slope is not the stiffness."""
     time, slip, _, friction, _ = pulled(
         (V, 0.0, V), (400e-6, hold, 400e-6), (500, 500 if hold < 10 else 1, 500),
         noise=1e-5, resolution=1e-9, k=STIFFNESS,
     )  # fmt: skip
-    (found,) = measure_sliding(sliding_trace(time, friction, slip)).holds
-    away = found.reload_slope / STIFFNESS - 1
-    assert (away < -off) == (hold < 10)
-    assert abs(away) * STIFFNESS < 2 * found.reload_uncertainty
-    assert least < found.reload_uncertainty / STIFFNESS < most
+    (reading,) = measure_sliding(sliding_trace(time, friction, slip)).holds
+    error = reading.reload_slope / STIFFNESS - 1
+    assert (error < -off) == (hold < 10)
+    assert abs(error) * STIFFNESS < 2 * reading.reload_uncertainty
+    assert least < reading.reload_uncertainty / STIFFNESS < most
 
 
-def test_a_peak_in_the_noise_has_its_uncertainty(pulled, sliding_trace) -> None:
+def test_a_peak_hidden_in_noise_lies_within_its_interval(pulled, sliding_trace) -> None:
     time, slip, clean, friction, bounds = pulled(
         (V, 0.0, V), (8e-3, 3.0, 8e-3), (10,) * 3, noise=8e-3, resolution=2e-8
     )
@@ -306,8 +307,8 @@ def test_a_gap_that_may_hide_the_peak_is_named(pulled, sliding_trace) -> None:
     )
     for first, verdict in ((0.2, "suspicious"), (15.0, "ok")):
         kept = (time < bounds[2] + first) | (time > bounds[2] + first + 3)
-        found = measure_sliding(sliding_trace(time[kept], friction[kept], slip[kept]))
-        check = next(c for c in found.checks if c.name == "segments")
+        measurement = measure_sliding(sliding_trace(time[kept], friction[kept], slip[kept]))
+        check = next(c for c in measurement.checks if c.name == "segments")
         assert check.verdict == verdict
         assert ("may lie in a gap of 3" in check.sentence) == (verdict != "ok")
 
@@ -317,19 +318,19 @@ def test_the_loading_before_the_first_hold_is_left_out(pulled, sliding_trace) ->
         (V, 0.0, V), (400e-6, 20.0, 400e-6), (100,) * 3, noise=1e-4, resolution=2e-8
     )
     loading = np.arange(0, 15, 0.01)
-    made = sliding_trace(
+    trace = sliding_trace(
         np.concatenate([loading, time + 15]),
         np.concatenate([clean[0] * loading / 15, friction]),
         np.concatenate([V * loading, slip + 15 * V]),
     )
-    (hold,) = measure_sliding(made).holds
+    (hold,) = measure_sliding(trace).holds
     healing = clean[time > bounds[2]].max() - clean[time < bounds[1]][-1]
     assert abs(hold.healing - healing) < hold.interval_95 < 2e-3
 
 
 @draws(4, 20)
-def test_noise_makes_no_healing(sliding_trace, draws) -> None:
-    """The largest of many noisy samples is no peak."""
+def test_noise_alone_makes_no_healing(sliding_trace, draws) -> None:
+    """The largest of many noisy samples is not taken for the peak."""
     heals = []
     for seed in range(draws):
         rng = np.random.default_rng(seed)
@@ -338,5 +339,5 @@ def test_noise_makes_no_healing(sliding_trace, draws) -> None:
         friction = 0.6 + 1e-3 * rng.standard_normal(time.size)
         (hold,) = measure_sliding(sliding_trace(time, friction, slip)).holds
         heals.append(hold.healing)
-    # Of 2000 samples the largest stands 3.4 standard deviations out.
+    # The largest of 2000 samples lies 3.4 standard deviations above the mean.
     assert np.mean(heals) < 1e-3

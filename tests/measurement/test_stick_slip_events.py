@@ -1,4 +1,4 @@
-"""Slip events against recordings whose drops, onsets and noise are known."""
+"""Slip events read from recordings with known drops, onsets and noise."""
 
 from pathlib import Path
 
@@ -42,28 +42,28 @@ CASES = {
 def test_every_event_is_read_and_no_other(case, seed) -> None:
     truth = saw(seed, **CASES[case])
     _, events = read(truth.force)
-    true, found = matched(truth, events)
-    # Where the spread makes some smaller than noise shows, few are missed.
+    true, detected = matched(truth, events)
+    # A wide spread makes a few drops smaller than the noise can show.
     assert true.size >= 0.97 * truth.drop.size
-    # Where the gauge rings by 30 % of the drop one in a hundred may be a bump of the ringing.
+    # If the gauge rings by 30 % of the drop, 1 % of the events may be bumps of the ringing.
     false = 0.01 if case == "ringing" else 0.0
-    assert len(events) - found.size <= false * truth.drop.size
-    off = float(np.median(events.drop[found] - truth.drop[true])) / truth.drop.max()
-    assert abs(off) < (0.03 if case == "ringing" else 0.02)
+    assert len(events) - detected.size <= false * truth.drop.size
+    bias = float(np.median(events.drop[detected] - truth.drop[true])) / truth.drop.max()
+    assert abs(bias) < (0.03 if case == "ringing" else 0.02)
 
 
 @pytest.mark.parametrize("case", ["regular", "thirty per cent", "irregular", "inertial"])
-def test_drops_are_as_certain_as_they_say(case) -> None:
+def test_errors_of_drops_agree_with_their_uncertainties(case) -> None:
     truth = saw(11, events=300, **CASES[case])
     _, events = read(truth.force)
-    true, found = matched(truth, events)
-    score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
+    true, detected = matched(truth, events)
+    score = (events.drop[detected] - truth.drop[true]) / events.drop_uncertainty[detected]
     assert abs(np.median(score)) < 0.3
-    # A long slip tells the levels before and after it too, which its uncertainty leaves out, and
-    # whether the drive goes on in it is hard to see.
+    # A long slip also informs on the levels before and after it, which its uncertainty leaves out;
+    # whether the drive goes on during it is hard to see.
     least = 0.05 if case == "inertial" else 0.4
     assert least < np.percentile(np.abs(score), 68) < 1.3
-    late = (events.onset[found] - truth.onset[true]) / events.timing_uncertainty[found]
+    late = (events.onset[detected] - truth.onset[true]) / events.timing_uncertainty[detected]
     assert np.percentile(np.abs(late), 68) < 2.0
 
 
@@ -71,10 +71,10 @@ def test_durations_slopes_and_creep_are_those_planted() -> None:
     truth = saw(3, events=200, noise=0.02, creep=0.1)
     _, events = read(truth.force)
     assert np.median(events.slip_duration) == pytest.approx(20 / 2000, rel=0.05)
-    # Creep of a tenth over a tenth of the stick reaches into its middle half by a share exp(-2.5).
+    # Creep that decays over a tenth of the stick has fallen to exp(-2.5) in its middle half.
     assert np.nanmedian(events.loading_slope) == pytest.approx(truth.loading_slope[0], rel=0.015)
     assert np.nanmedian(events.creep) == pytest.approx(0.1 * 0.1, rel=0.1)
-    # Half a cosine falls pi/2 times as fast as its mean; over a quarter of it 5 % less.
+    # The steepest fall of half a cosine is pi/2 times its mean, and 5 % less over a quarter of it.
     steepest = np.pi / 2 * truth.drop[0] / (20 / 2000)
     assert np.median(events.fall_rate) == pytest.approx(steepest, rel=0.1)
 
@@ -100,7 +100,7 @@ def test_two_events_close_together_are_two() -> None:
 
 
 @pytest.mark.parametrize("seed", population(20))
-def test_noise_has_no_events(seed) -> None:
+def test_noise_makes_no_events(seed) -> None:
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal(50_000)
     impulses = 30 * rng.standard_normal(noise.size) * (rng.random(noise.size) < 0.005)
@@ -111,29 +111,29 @@ def test_noise_of_known_size_is_measured() -> None:
     truth = saw(0, events=300, noise=0.1)
     clean, impulses = without_impulses(truth.force)
     falls = find_falls(clean, estimate(clean))
-    # Of 4 in 1000 those that are larger than five times the noise: 0.4 of a normal distribution.
+    # Of the impulses, 4 in 1000 samples, a share of 0.4 exceeds five times the noise.
     assert 0.001 < impulses.size / clean.size < 0.002
-    # Never less than it is: a threshold would promise too much.
+    # Noise must not be underestimated: the stated threshold would be too low.
     for octave, scatter in enumerate(falls.scatter[:5]):
         assert 0.98 < scatter / (0.1 * 0.1 / 2 ** (octave / 2)) < 1.25
 
 
-def test_a_drop_above_the_stated_threshold_is_seen_and_one_far_below_is_not() -> None:
+def test_drops_above_the_stated_threshold_are_detected_and_those_far_below_are_not() -> None:
     truth = saw(5, events=100, noise=0.05)
     falls, _ = read(truth.force)
     widths = 2.0 ** np.arange(falls.thresholds.size)
     least = (falls.thresholds + widths * truth.loading_slope[0] / 2000).min()
     for size, share in ((1.2 * least, 0.9), (0.2 * least, None)):
-        both = saw(6, events=200, noise=0.05, small=0.5, small_size=size / 0.1)
-        _, events = read(both.force)
-        true, _ = matched(both, events)
-        seen = np.isin(np.flatnonzero(both.drop < 0.099), true).mean()
-        assert seen >= share if share else seen < 0.2
+        mixed = saw(6, events=200, noise=0.05, small=0.5, small_size=size / 0.1)
+        _, events = read(mixed.force)
+        true, _ = matched(mixed, events)
+        detected = np.isin(np.flatnonzero(mixed.drop < 0.099), true).mean()
+        assert detected >= share if share else detected < 0.2
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_slips_that_noise_hides_do_not_take_those_that_are_seen_with_them(seed) -> None:
-    """Drops of the size of the threshold, of which noise lifts one half above it."""
+def test_slips_below_the_threshold_do_not_hide_those_above(seed) -> None:
+    """Drops are as large as the threshold: noise lifts half of them above it."""
     truth = saw(seed, events=100, cycle=120, slip=6, noise=0.28, impulses=0.0)
     falls, events = read(truth.force)
     assert 30 < len(falls) < 70
@@ -167,8 +167,8 @@ def test_a_real_recording_of_paper_on_paper() -> None:
     force = loadmat(file)["Fnorm"].ravel()
     falls, events = read(force)
     assert 230 < len(events) < 260
-    # The slider slips for half a period of sqrt(K/M), and the spring loads as its stiffness says,
-    # to the 11 % by which stiffness or velocity are off.
+    # The slider slips for half a period of the mass on its spring; the loading slope is K V/W0, to
+    # the 11 % by which stiffness or velocity are wrong.
     assert np.median(events.slip_duration) == pytest.approx(np.pi * np.sqrt(0.0307 / 168), rel=0.3)
     slope = 168 * 42e-6 / (0.0307 * 9.81)
     assert np.nanmedian(events.loading_slope) == pytest.approx(slope, rel=0.15)
@@ -176,18 +176,18 @@ def test_a_real_recording_of_paper_on_paper() -> None:
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
-def test_onsets_are_as_certain_as_they_say(correlation) -> None:
-    # Long slips: a bin of the search has twelve samples, the onset is known to less than one. What
-    # is open of the shape is one error for all slips of a recording: several recordings count.
+def test_errors_of_onsets_agree_with_their_uncertainties(correlation) -> None:
+    # In long slips a bin of the search has twelve samples, and onsets are known to less than one.
+    # The error by the shape is common to all slips of a recording: several recordings are needed.
     scores, late = [], []
     for seed in range(5, 11):
         truth = saw(seed, events=40, cycle=1500, slip=150, noise=0.02, correlation=correlation)
         _, events = read(truth.force)
-        true, found = matched(truth, events)
-        late.append(events.onset[found] - truth.onset[true])
-        scores.append(late[-1] / events.timing_uncertainty[found])
+        true, detected = matched(truth, events)
+        late.append(events.onset[detected] - truth.onset[true])
+        scores.append(late[-1] / events.timing_uncertainty[detected])
     assert np.mean(np.abs(np.concatenate(scores)) < 1.96) > 0.9
-    # Fisher's information of onset, end and both lines, in white noise: 0.74 samples.
+    # Fisher information of onset, end and both lines in white noise gives 0.74 samples.
     if not correlation:
         assert np.std(np.concatenate(late)) < 1.3 * 0.74 / 2000
 
@@ -199,7 +199,7 @@ FALLS = {
 
 
 @pytest.mark.parametrize("fall", FALLS)
-def test_slips_of_another_shape_are_as_long_as_they_are(fall) -> None:
+def test_slips_of_other_shapes_have_the_right_duration_and_onset(fall) -> None:
     cycle = np.r_[np.linspace(0, 1, 400, endpoint=False), FALLS[fall](np.arange(60) / 60)]
     force = 0.3 + 0.1 * np.tile(cycle, 60)
     force += 0.003 * np.random.default_rng(0).standard_normal(force.size)
@@ -211,8 +211,8 @@ def test_slips_of_another_shape_are_as_long_as_they_are(fall) -> None:
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_the_noise_of_a_filtered_recorder_has_no_events(seed) -> None:
-    """Its second differences from sample to sample are a seventh of those that are far apart."""
+def test_the_noise_of_a_filtered_recorder_makes_no_events(seed) -> None:
+    """Second differences of adjacent samples are a seventh of those of distant samples."""
     truth = saw(seed, events=40, noise=0.0, impulses=0.0)
     white = np.random.default_rng(seed).standard_normal(truth.force.size)
     smooth = sosfilt(butter(2, 0.1, output="sos"), white)
@@ -228,7 +228,7 @@ def test_random_recordings_are_read_right_or_flagged() -> None:
 
 
 def test_onsets_of_damped_slips_lie_within_their_uncertainty():
-    """A slider damped by 0.3 slips between the shapes of a free one and of an exponential fall."""
+    """A slip with a damping ratio of 0.3 lies between a free slip and an exponential fall."""
     half, damping, loading, slips = 30, 0.3, 1 / 900, 40
     w = np.pi / half
     wd = w * np.sqrt(1 - damping**2)
@@ -247,8 +247,8 @@ def test_onsets_of_damped_slips_lie_within_their_uncertainty():
     falls = find_falls(force, estimate(force))
     events = read_events(np.arange(force.size, dtype=float), force, falls)
     assert len(events) == slips
-    off = np.abs(events.onset - onset)
-    assert np.mean(off < 1.96 * events.timing_uncertainty) > 0.9
+    error = np.abs(events.onset - onset)
+    assert np.mean(error < 1.96 * events.timing_uncertainty) > 0.9
     assert np.median(events.timing_uncertainty) < 0.15 * half
 
 
@@ -260,27 +260,27 @@ def humming(seed, size, period, **options):
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_hum_counts_in_drops_and_makes_no_events(seed) -> None:
+def test_hum_widens_the_uncertainty_of_drops_and_makes_no_events(seed) -> None:
     truth, force = humming(seed, 0.08, 163, cycle=640, slip=15, spread=0.2, noise=0.007)
     _, events = read(force)
-    true, found = matched(truth, events)
+    true, detected = matched(truth, events)
     assert true.size == len(events) >= 0.97 * truth.drop.size
-    score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
+    score = (events.drop[detected] - truth.drop[true]) / events.drop_uncertainty[detected]
     assert np.mean(np.abs(score) < 1.96) > 0.85
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_steps_of_the_recorder_count_in_drops(seed) -> None:
+def test_steps_of_the_recorder_widen_the_uncertainty_of_drops(seed) -> None:
     truth = saw(seed, cycle=2000, noise=0.004, impulses=0.0)
     _, events = read(0.008 * np.rint(truth.force / 0.008))
-    true, found = matched(truth, events)
-    score = (events.drop[found] - truth.drop[true]) / events.drop_uncertainty[found]
+    true, detected = matched(truth, events)
+    score = (events.drop[detected] - truth.drop[true]) / events.drop_uncertainty[detected]
     assert np.mean(np.abs(score) < 1.96) > 0.9
     assert np.median(events.drop_uncertainty) < 0.15 * 0.1
 
 
 def test_onsets_of_shapes_outside_every_mixture_lie_within_their_uncertainty() -> None:
-    """A fall that begins as a parabola and is arrested, which no shape of the search does."""
+    """A fall that begins as a parabola and is then arrested is no mixture of the fitted shapes."""
     u = np.arange(1, 61) / 60
     fall = np.where(u < 0.7, 1 - 0.5 * (u / 0.7) ** 2, 0.5 * np.maximum((1 - u) / 0.3, 0) ** 1.5)
     cycle = np.r_[np.linspace(0, 1, 1500), fall]

@@ -1,4 +1,4 @@
-"""A - B of velocity steps: against an integrated slider in the noise of a rig, and a real file."""
+"""A - B of velocity steps of an integrated slider in the noise of a rig, and of a real file."""
 
 from functools import partial
 from pathlib import Path
@@ -17,8 +17,8 @@ REAL = Path(__file__).resolve().parents[3] / "shared" / "data"
 TRUE = -0.004  # A - B of the slider
 
 
-def only_step(found):
-    (step,) = found.steps
+def only_step(measurement):
+    (step,) = measurement.steps
     return step
 
 
@@ -35,47 +35,47 @@ def test_intervals_cover_in_correlated_noise_with_lines_and_drift(
     pulled, sliding_trace, case, draws
 ) -> None:
     velocities, slips, rate = CASES[case]
-    hits, off, doubts = [], [], []
+    hits, errors, uncertainties = [], [], []
     for seed in range(draws):
         time, slip, _, friction, _ = pulled(velocities, slips, (rate, rate), seed=seed, slope=4.4)
         step = only_step(measure_sliding(sliding_trace(time, friction, slip)))
-        off.append(step.rate_dependence - TRUE)
-        doubts.append(step.rate_uncertainty)
-        hits.append(abs(off[-1]) < step.rate_interval_95)
-    # 27 of 30 is the 5 % quantile of 95 %, 5 of 6 the 3 % one.
+        errors.append(step.rate_dependence - TRUE)
+        uncertainties.append(step.rate_uncertainty)
+        hits.append(abs(errors[-1]) < step.rate_interval_95)
+    # With a coverage of 95 %, 27 of 30 is the quantile of 5 %, and 5 of 6 that of 3 %.
     assert sum(hits) >= {6: 5, 30: 27}[draws]
-    # And they are no wider than they need be, nor is the mean off.
-    assert np.mean(doubts) < 3 * np.std(off)
-    assert abs(np.mean(off)) < np.mean(doubts)
+    # The intervals are not much too wide, and the mean has no bias.
+    assert np.mean(uncertainties) < 3 * np.std(errors)
+    assert abs(np.mean(errors)) < np.mean(uncertainties)
 
 
-def test_longer_and_shorter_slices_agree(pulled, sliding_trace) -> None:
+def test_longer_and_shorter_windows_agree(pulled, sliding_trace) -> None:
     time, slip, _, friction, bounds = pulled(
         (3e-6, 10e-6), (300e-6, 600e-6), (50, 50), seed=3, slope=4.4
     )
-    found = []
+    steps = []
     for before, after in ((1, 1), (0.5, 0.5), (1, 0.4), (0.4, 1)):
         start = bounds[1] - before * (bounds[1] - bounds[0])
         end = bounds[1] + after * (bounds[2] - bounds[1])
         trace = sliding_trace(time, friction, slip)
-        found.append(only_step(measure_sliding(trace, window=(start, end))))
-    whole = found[0]
-    for part in found[1:]:
+        steps.append(only_step(measure_sliding(trace, window=(start, end))))
+    whole, *parts = steps
+    for part in parts:
         apart = abs(part.rate_dependence - whole.rate_dependence)
         assert apart < 2 * np.hypot(part.rate_uncertainty, whole.rate_uncertainty)
 
 
-@pytest.mark.parametrize("turned", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
-def test_signs_of_recording_do_not_matter(pulled, sliding_trace, turned) -> None:
+@pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
+def test_signs_of_friction_and_displacement_do_not_matter(pulled, sliding_trace, signs) -> None:
     time, slip, _, friction, _ = pulled((1e-6, 10e-6), (200e-6, 200e-6), (10, 50))
-    made = sliding_trace(time, turned[0] * friction, turned[1] * slip)
-    step = only_step(measure_sliding(made))
+    trace = sliding_trace(time, signs[0] * friction, signs[1] * slip)
+    step = only_step(measure_sliding(trace))
     reference = only_step(measure_sliding(sliding_trace(time, friction, slip)))
     assert step.rate_dependence == pytest.approx(reference.rate_dependence, rel=1e-9)
     assert step.peak == pytest.approx(reference.peak, rel=1e-9)
 
 
-def test_a_trend_is_taken_out_unless_told_otherwise(pulled, sliding_trace) -> None:
+def test_a_trend_is_removed_unless_detrend_is_none(pulled, sliding_trace) -> None:
     time, slip, _, friction, _ = pulled(
         (3e-6, 10e-6), (300e-6, 300e-6), (50, 50), noise=2e-4, slope=40.0
     )
@@ -86,14 +86,14 @@ def test_a_trend_is_taken_out_unless_told_otherwise(pulled, sliding_trace) -> No
     assert abs(straight.rate_dependence - TRUE) < straight.rate_interval_95
     level = only_step(measure_sliding(trace, detrend="none"))
     assert level.trend == "none"
-    # Levels in the middle of windows 0.3 mm apart: 40 /m raises them by 0.012 and turns the sign.
+    # The middles of the windows are 0.3 mm apart: a slope of 40 /m adds 0.012 and turns the sign.
     assert level.rate_dependence > 0.003
     assert only_step(measure_sliding(trace, detrend="quadratic")).rate_uncertainty > 0
     with pytest.raises(InputError, match="detrend must be none, linear or quadratic"):
         measure_sliding(trace, detrend="cubic")
 
 
-def test_two_slopes_are_told_from_one(pulled, sliding_trace) -> None:
+def test_different_slopes_before_and_after_are_fitted(pulled, sliding_trace) -> None:
     time, slip, _, friction, bounds = pulled(
         (3e-6, 10e-6), (300e-6, 300e-6), (50, 50), noise=2e-4, slope=0.0
     )
@@ -108,14 +108,14 @@ def test_a_step_too_short_to_be_read_is_named(sliding_trace) -> None:
     time = np.arange(2000) * 0.01
     slip = 1e-6 * np.minimum(time, 19.9) + 1e-4 * np.clip(time - 19.9, 0, None)
     friction = 0.6 + 1e-4 * np.random.default_rng(0).standard_normal(time.size)
-    found = measure_sliding(sliding_trace(time, friction, slip), steps=[19.9])
-    assert found.steps == ()
-    check = next(c for c in found.checks if c.name == "segments")
+    measurement = measure_sliding(sliding_trace(time, friction, slip), steps=[19.9])
+    assert measurement.steps == ()
+    check = next(c for c in measurement.checks if c.name == "segments")
     assert check.verdict == "suspicious"
     assert "too few samples" in check.sentence
 
 
-#: What a recorder sees of the load point: the contact's own slip, and a gear with 20 % of ripple.
+#: Recorded displacements: the slip of the contact, and a gear whose velocity ripples by 20 %.
 MOTIONS = {
     "contact": lambda slip, mu: slip - mu / 3e3,
     "gear": lambda slip, mu: slip + 0.2 * 2e-6 * np.sin(slip / 2e-6),
@@ -126,10 +126,10 @@ MOTIONS = {
 def test_unsteady_displacements_make_no_steps(pulled, sliding_trace, motion) -> None:
     velocities = (10e-6, 30e-6, 10e-6, 100e-6, 10e-6)
     time, slip, clean, friction, bounds = pulled(velocities, (200e-6,) * 5, (100,) * 5, noise=3e-4)
-    seen = MOTIONS[motion](slip, clean)
-    found = measure_sliding(sliding_trace(time, friction, seen))
-    assert [s.time for s in found.steps] == pytest.approx(bounds[1:-1].tolist(), abs=0.3)
-    for step in found.steps:
+    displacement = MOTIONS[motion](slip, clean)
+    measurement = measure_sliding(sliding_trace(time, friction, displacement))
+    assert [s.time for s in measurement.steps] == pytest.approx(bounds[1:-1].tolist(), abs=0.3)
+    for step in measurement.steps:
         assert abs(step.rate_dependence - TRUE) < step.rate_interval_95
 
 
@@ -139,27 +139,26 @@ def test_the_loading_before_a_step_is_left_out(pulled, sliding_trace) -> None:
     )
     loading = np.arange(0, 20, 0.01)
     elastic = np.minimum(3e3 * 10e-6 * loading, clean[0])
-    made = sliding_trace(
+    trace = sliding_trace(
         np.concatenate([loading, time + 20]),
         np.concatenate([elastic, friction]),
         np.concatenate([10e-6 * loading, slip + 200e-6]),
     )
-    step = only_step(measure_sliding(made))
+    step = only_step(measure_sliding(trace))
     assert abs(step.rate_dependence - TRUE) < step.rate_interval_95 < 0.001
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real recordings are not here")
-def test_basalt_weakens_with_velocity() -> None:
-    """Means of drifting segments give +0.00039; linear trends give -0.00040 to -0.00053."""
-    found = measure_sliding(read(REAL / "velstep4_BRAVA_expb819_basalt.txt"))
-    step = only_step(found)
+def test_basalt_weakens_with_velocity_as_published() -> None:
+    """Means of the drifting segments give +0.00039, linear trends -0.00040 to -0.00053."""
+    trace = read(REAL / "velstep4_BRAVA_expb819_basalt.txt")
+    step = only_step(measure_sliding(trace))
     assert step.time == pytest.approx(11676.36, abs=0.1)
     assert -0.0008 < step.rate_dependence < -0.0002
     for published in (-0.00040, -0.00053):
         assert abs(step.rate_dependence - published) < step.rate_interval_95
     # White noise of these 5849 samples would give an uncertainty of about 2e-5.
     assert step.rate_uncertainty > 1e-4
-    trace = read(REAL / "velstep4_BRAVA_expb819_basalt.txt")
     for window in ((11640.0, 11726.0), (11607.0, 11700.0), (11640.0, 11700.0)):
         part = only_step(measure_sliding(trace, window=window))
         apart = abs(part.rate_dependence - step.rate_dependence)

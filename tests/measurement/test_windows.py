@@ -1,4 +1,4 @@
-"""Where to read: stretches, what has settled, clean runs, slow modulation; a noisy level."""
+"""Windows: intervals of one amplitude, settled series, runs without defects, and mean levels."""
 
 from functools import partial
 
@@ -15,24 +15,24 @@ from references.populations import population
 measure = partial(asp.measure, modulated=True)
 
 
-def test_stretches_are_cut_where_the_amplitude_changes() -> None:
+def test_intervals_end_where_the_amplitude_changes() -> None:
     time = np.arange(30_000) * 1e-3
     amplitude = np.select([time < 5, time < 15, time < 22], [0.0, 1.0, 2.0], 0.0)
     load = 7 + amplitude * np.cos(2 * np.pi * 40 * time)
-    found = stretches(time, load, 40.0)
-    # A block of four periods and one more on each side belong to no stretch.
-    edges = [(time[p.first], time[p.stop - 1]) for p in found]
+    parts = stretches(time, load, 40.0)
+    # At each change a block of four periods and one on each side belong to no interval.
+    edges = [(time[p.first], time[p.stop - 1]) for p in parts]
     assert np.ravel(edges) == pytest.approx([0, 5, 5, 15, 15, 22, 22, 30], abs=0.25)
-    assert [round(p.amplitude, 6) for p in found] == [0.0, 1.0, 2.0, 0.0]
+    assert [round(p.amplitude, 6) for p in parts] == [0.0, 1.0, 2.0, 0.0]
 
 
 @pytest.mark.parametrize("decay", [3.0, 8.0])
-def test_what_has_not_settled_is_cut(decay) -> None:
+def test_a_transient_is_cut_off(decay) -> None:
     rng = np.random.default_rng(0)
     at = np.arange(200)
     series = np.exp(-at / decay) + 1e-3 * rng.standard_normal(200)
     cut = steady_from(series, 0)
-    # Down to the noise of a point after 6.9 decay times, of a mean over all after 9.
+    # The transient falls to the noise of a point in 6.9 decay times, and of the mean in 9.
     assert 3.5 * decay < cut < 10 * decay
 
 
@@ -47,7 +47,7 @@ def test_a_steady_series_is_kept(degree) -> None:
     assert max(cuts) <= 75
 
 
-def test_a_clean_run_is_taken_if_it_is_long() -> None:
+def test_a_run_without_defects_is_taken_if_it_is_long() -> None:
     assert clean_run(0, 1000, np.array([300])) == (301, 1000)
     assert clean_run(0, 1000, np.array([800])) == (0, 800)
     assert clean_run(0, 1000, np.array([300, 650])) == (0, 1000)
@@ -65,9 +65,9 @@ def test_a_mean_covers_its_truth_in_slow_noise(red_noise) -> None:
     time = np.arange(3000) * 1e-3
     hits = 0
     for series in red_noise(rng, 0.95, 300, time.size):
-        found = mean_level(time, series)
+        level = mean_level(time, series)
         # Student's t of 8 degrees of freedom at 97.5 %.
-        hits += abs(found.value) < 2.306 * found.uncertainty
+        hits += abs(level.value) < 2.306 * level.uncertainty
     assert 0.92 < hits / 300 < 0.98
 
 
@@ -114,14 +114,14 @@ def slow_recording(rng, frequency, periods, pauses, rate):
 @pytest.mark.parametrize("frequency", [0.03, 0.1, 1.0, 30.0])
 @pytest.mark.parametrize("rate", [40, 700])
 def test_twenty_periods_between_pauses_are_measured(trace, frequency, rate, seed) -> None:
-    """Pauses of 1.5 to 20 periods: scales are those of the modulation, and not seconds."""
+    """Pauses of 1.5 to 20 periods: lengths are compared with the period, not with seconds."""
     rng = np.random.default_rng(seed)
     pauses = np.exp(rng.uniform(*np.log([1.5, 20]), 2)) / frequency
-    made = slow_recording(rng, frequency, rng.integers(16, 25), pauses, rate * frequency)
-    found = measure(trace(*made))
-    reading = found.reading
+    signals = slow_recording(rng, frequency, rng.integers(16, 25), pauses, rate * frequency)
+    measurement = measure(trace(*signals))
+    reading = measurement.reading
     assert abs(reading.epsilon - 0.1) < 5 * reading.uncertainty("epsilon")
     assert abs(abs(reading.harmonics[0]) - 0.02) < 5 * reading.uncertainty("mu1")
     assert reading.periods > 11
-    assert abs(found.delta_mu + 5e-3) < 5 * found.delta_mu_uncertainty
-    assert found.verdict == "ok", [str(c) for c in found.checks if c.verdict != "ok"]
+    assert abs(measurement.delta_mu + 5e-3) < 5 * measurement.delta_mu_uncertainty
+    assert measurement.verdict == "ok", [str(c) for c in measurement.checks if c.verdict != "ok"]

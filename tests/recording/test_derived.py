@@ -14,7 +14,7 @@ TIME = np.arange(50) / 10
 
 @pytest.fixture
 def rig():
-    """A triaxial cell with names that have dots and blanks, volts of a gauge and plain numbers."""
+    """A triaxial cell: names with dots and blanks, volts of a gauge and plain numbers."""
     rng = np.random.default_rng(0)
     channels = {
         "Conf.Press.": Channel(4e7 + 1e5 * rng.normal(size=50), "pressure", "Pa", "Conf.Press."),
@@ -25,8 +25,7 @@ def rig():
         "count": Channel(np.ones(50), None, "", "count", ""),
         "slip": Channel(1e-6 * TIME**2, "length", "m"),
     }
-    made = Trace(TIME, channels)
-    return Trace(TIME, channels, check(made))
+    return Trace(TIME, channels, check(Trace(TIME, channels)))
 
 
 def values(trace, name):
@@ -60,65 +59,63 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("text", [t for t, (truth, _) in CASES.items() if truth])
-def test_numbers_and_units(rig, text):
+@pytest.mark.parametrize("text", CASES)
+def test_expressions_give_the_numbers_and_units_of_their_formula(rig, text):
     truth, unit = CASES[text]
-    made = derive(rig, {"made": text})
+    derived = derive(rig, {"new": text})
     expected = truth({name: c.values for name, c in rig.channels.items()})
-    assert np.allclose(values(made, "made"), expected, rtol=1e-13, atol=0)
-    assert made.channels["made"].unit == unit
-    assert made.provenance["derived channels"] == {"made": text}
+    assert np.allclose(values(derived, "new"), expected, rtol=1e-13, atol=0)
+    assert derived.channels["new"].unit == unit
+    assert derived.provenance["derived channels"] == {"new": text}
 
 
-def test_a_long_sum(rig):
-    made = derive(rig, {"made": "+".join(["slip"] * 390)})
-    assert np.allclose(values(made, "made"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)
+def test_an_expression_may_be_a_long_sum(rig):
+    derived = derive(rig, {"new": "+".join(["slip"] * 390)})
+    assert np.allclose(values(derived, "new"), 390 * values(rig, "slip"), rtol=1e-12, atol=0)
 
 
 def test_the_integral_of_a_derivative_is_the_change(rig):
-    made = derive(rig, {"change": "integral(derivative(slip))"})
-    # The trapezoidal rule is exact for the slope of a parabola; its ends are one-sided differences.
-    assert np.allclose(values(made, "change"), values(rig, "slip"), atol=2e-8)
-    assert made.channels["change"].unit == "m"
+    derived = derive(rig, {"change": "integral(derivative(slip))"})
+    # The trapezoidal rule is exact for a linear slope; the end slopes are one-sided differences.
+    assert np.allclose(values(derived, "change"), values(rig, "slip"), atol=2e-8)
+    assert derived.channels["change"].unit == "m"
 
 
-def test_a_channel_called_like_a_role_plays_it(rig):
-    made = derive(rig, {"load": "Conf.Press - Up.Pore.Press", "force": "'Axial force'/(5 cm^2)"})
-    assert made.channel("W") is made.channels["load"]
-    assert made.channel("shear stress") is made.channels["force"]
-    later = derive(made, {"friction": "force / load"})
-    assert np.array_equal(
-        later.channel("mu").values, values(later, "force") / values(later, "load")
-    )
+def test_a_derived_channel_named_as_a_role_takes_the_role(rig):
+    derived = derive(rig, {"load": "Conf.Press - Up.Pore.Press", "force": "'Axial force'/(5 cm^2)"})
+    assert derived.channel("W") is derived.channels["load"]
+    assert derived.channel("shear stress") is derived.channels["force"]
+    with_friction = derive(derived, {"friction": "force / load"})
+    ratio = values(derived, "force") / values(derived, "load")
+    assert np.array_equal(with_friction.channel("mu").values, ratio)
 
 
 def test_a_recorded_channel_of_the_same_name_is_kept(rig):
-    made = derive(rig, {"Axial force": "2 * 'Axial force'"})
-    assert np.array_equal(values(made, "Axial force"), 2 * values(rig, "Axial force"))
-    assert np.array_equal(values(made, "Axial force (recorded)"), values(rig, "Axial force"))
+    derived = derive(rig, {"Axial force": "2 * 'Axial force'"})
+    assert np.array_equal(values(derived, "Axial force"), 2 * values(rig, "Axial force"))
+    assert np.array_equal(values(derived, "Axial force (recorded)"), values(rig, "Axial force"))
 
 
-def test_time_from_a_column_of_intervals():
+def test_time_is_derived_from_a_column_of_intervals():
     steps = np.full(20, 0.25)
     trace = Trace(
         np.arange(20.0), {"dt": Channel(steps, "time", "s"), "F": Channel(steps, "force")}
     )
-    made = derive(trace, {"time": "cumulative(dt) - 0.25 s"})
-    assert np.allclose(made.time, 0.25 * np.arange(20))
-    assert made.sample_rate == pytest.approx(4.0)
+    derived = derive(trace, {"time": "cumulative(dt) - 0.25 s"})
+    assert np.allclose(derived.time, 0.25 * np.arange(20))
+    assert derived.sample_rate == pytest.approx(4.0)
 
 
-def test_what_was_found_in_a_channel_is_found_in_what_is_made_of_it(rig):
+def test_a_derived_channel_inherits_the_findings_of_its_sources(rig):
     flat = np.clip(np.cumsum(np.random.default_rng(1).normal(size=50)), -1.5, 1.5)
     channels = {**rig.channels, "Gauge": Channel(flat, None, "", "Gauge", "V")}
-    trace = Trace(TIME, channels)
-    trace = Trace(TIME, channels, check(trace))
+    trace = Trace(TIME, channels, check(Trace(TIME, channels)))
     assert "saturation" in {f.name for f in trace.findings}
-    # Noise of another channel hides the flat top.
-    made = derive(trace, {"force": "1 N/V * Gauge + 'Axial force' / 1000"})
-    (found,) = {f.name for f in made.findings if f.where.startswith("force")}
-    assert found == "source saturation"
-    assert "source saturation" in {f.name for f in made.slice("1 s", "4 s").findings}
+    # The noise of the other channel hides the flat top.
+    derived = derive(trace, {"force": "1 N/V * Gauge + 'Axial force' / 1000"})
+    names = {f.name for f in derived.findings if f.where.startswith("force")}
+    assert names == {"source saturation"}
+    assert "source saturation" in {f.name for f in derived.slice("1 s", "4 s").findings}
 
 
 @pytest.mark.parametrize(
@@ -146,14 +143,14 @@ def test_what_was_found_in_a_channel_is_found_in_what_is_made_of_it(rig):
         ("", "must be an expression"),
     ],
 )
-def test_what_is_no_expression_is_one_sentence(rig, text, rule):
+def test_a_wrong_expression_is_refused_in_one_line(rig, text, rule):
     with pytest.raises(InputError, match=rule) as refused:
-        derive(rig, {"made": text})
+        derive(rig, {"new": text})
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("role", ["load", "force", "velocity", "friction", "time"])
-def test_a_role_takes_what_it_measures(rig, role):
+def test_a_derived_channel_named_as_a_role_must_have_its_dimension(rig, role):
     with pytest.raises(InputError, match=rf"channels\['{role}'\] must be a .*, got one in"):
         derive(rig, {role: "slip * slip"})
 
@@ -165,7 +162,7 @@ def recording(tmp_path):
     return path
 
 
-def test_a_recipe_names_everything_once(tmp_path):
+def test_a_recipe_gives_layout_units_channels_and_columns(tmp_path):
     recipe = tmp_path / "lab.toml"
     recipe.write_text(
         'title = "rig 3"\ndelimiter = ";"\ndecimal = ","\n[units]\n"Kanal 3" = "2 kN"\n'
@@ -175,34 +172,29 @@ def test_a_recipe_names_everything_once(tmp_path):
     assert np.allclose(trace.channel("F").values, np.round(0.1 * TIME, 4) * 2000 / 20e-4)
     assert trace.channel("W").unit == "Pa"
     assert trace.provenance["recipe"]["channels"] == {"force": "'Kanal 3' / (20 cm^2)"}
-    # What is given besides goes before it.
-    other = read(recording(tmp_path), recipe=recipe, channels={"force": "'Kanal 3' / (1 m^2)"})
-    assert np.allclose(other.channel("F").values * 500, trace.channel("F").values)
-    assert (
-        read(recording(tmp_path), recipe=ReadingRecipe.from_file(recipe)).provenance
-        == trace.provenance
-    )
+    # Arguments take precedence over the recipe.
+    overridden = read(recording(tmp_path), recipe=recipe, channels={"force": "'Kanal 3' / (1 m^2)"})
+    assert np.allclose(overridden.channel("F").values * 500, trace.channel("F").values)
+    from_object = read(recording(tmp_path), recipe=ReadingRecipe.from_file(recipe))
+    assert from_object.provenance == trace.provenance
 
 
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
         ("[chanels]\nx = '1'", "recipe.chanels must be a known field.*did you mean 'channels'"),
-        (
-            "[channels]\nx = 3",
-            "recipe.channels.x must be a text, got 3; .* .in '.*lab.toml'.",
-        ),
+        ("[channels]\nx = 3", "recipe.channels.x must be a text, got 3; .* .in '.*lab.toml'."),
         ("x = [", "recipe must be valid TOML"),
     ],
 )
-def test_a_recipe_with_a_mistake_is_one_sentence(tmp_path, text, rule):
+def test_a_recipe_with_a_mistake_is_refused(tmp_path, text, rule):
     recipe = tmp_path / "lab.toml"
     recipe.write_text(text)
     with pytest.raises(InputError, match=rule):
         read(recording(tmp_path), recipe=recipe)
 
 
-def test_a_recipe_that_is_not_there(tmp_path):
+def test_a_missing_recipe_is_refused(tmp_path):
     with pytest.raises(InputError, match="recipe must be a file"):
         read(recording(tmp_path), recipe=tmp_path / "none.toml")
 

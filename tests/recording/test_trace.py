@@ -1,4 +1,4 @@
-"""Traces and their checks: every planted defect is named with its size, and nothing else is."""
+"""Traces: their checks name every planted defect with its size, and nothing else."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def clean(rng):
     return time, load
 
 
-def found(trace):
+def findings_of(trace):
     return {f.name: f for f in check(trace)}
 
 
@@ -48,29 +48,29 @@ def test_nothing_is_found_in_a_clean_recording(rng):
 
 
 @pytest.mark.parametrize("decimals", [3, 4, 5, 6])
-def test_stamps_with_few_digits_are_even(rng, decimals):
-    """At 3 kHz no step is a whole number of any digit, and of three digits three stamps are one."""
+def test_time_stamps_with_few_decimals_are_even(decimals):
+    """1/3 ms has infinitely many decimals; rounded to three, three stamps are equal."""
     time = np.round(np.arange(N) / 3000, decimals)
-    assert list(found(trace_of(time))) == (["rounded time"] if decimals == 3 else [])
+    assert list(findings_of(trace_of(time))) == (["rounded time"] if decimals == 3 else [])
     assert trace_of(time).sample_rate == pytest.approx(3000, rel=1e-3)
 
 
-def test_jitter_is_uneven_and_no_gap(rng):
+def test_jitter_is_uneven_sampling_and_no_gap(rng):
     time, load = clean(rng)
     jitter = time + 1e-4 * rng.uniform(-1, 1, size=N)
-    result = found(trace_of(jitter, W=load))
-    assert list(result) == ["uneven sampling"]
+    findings = findings_of(trace_of(jitter, W=load))
+    assert list(findings) == ["uneven sampling"]
     steps = np.diff(jitter)
     median = np.median(steps)
-    assert result["uneven sampling"].number == pytest.approx(np.abs(steps / median - 1).max())
+    assert findings["uneven sampling"].number == pytest.approx(np.abs(steps / median - 1).max())
     assert trace_of(jitter).sample_rate is None
 
 
-def test_a_change_of_the_rate_is_uneven_and_no_gap():
+def test_a_change_of_the_rate_is_uneven_sampling_and_no_gap():
     time = np.concatenate([np.arange(300) * 0.1, 30 + np.arange(900) * 0.01])
-    result = found(trace_of(time))
-    assert list(result) == ["uneven sampling"]
-    assert result["uneven sampling"].number == pytest.approx(9, rel=1e-6)
+    findings = findings_of(trace_of(time))
+    assert list(findings) == ["uneven sampling"]
+    assert findings["uneven sampling"].number == pytest.approx(9, rel=1e-6)
 
 
 @pytest.mark.parametrize(("at", "missing"), [([1, 1998], 40), ([700, 703, 1500], 1)])
@@ -79,75 +79,75 @@ def test_gaps_are_counted_and_measured(rng, at, missing):
     shift = np.zeros(N)
     for row in at:
         shift[row:] += missing / 1000
-    gap = found(trace_of(time + shift, W=load))
-    assert list(gap) == ["gap"]
-    assert gap["gap"].number == pytest.approx(len(at) * missing / 1000, rel=1e-6)
-    assert gap["gap"].sentence.startswith(f"{len(at)} gap")
+    findings = findings_of(trace_of(time + shift, W=load))
+    assert list(findings) == ["gap"]
+    assert findings["gap"].number == pytest.approx(len(at) * missing / 1000, rel=1e-6)
+    assert findings["gap"].sentence.startswith(f"{len(at)} gap")
 
 
 def test_a_gap_at_a_change_of_the_rate_is_found():
     time = np.concatenate([np.arange(300) * 0.1, 31 + np.arange(900) * 0.01])
-    result = found(trace_of(time))
-    assert list(result) == ["gap", "uneven sampling"]
-    assert "row 299" in result["gap"].where
+    findings = findings_of(trace_of(time))
+    assert list(findings) == ["gap", "uneven sampling"]
+    assert "row 299" in findings["gap"].where
 
 
-def test_time_that_stands_still_or_runs_backward(rng):
+def test_repeated_and_backward_times_are_found(rng):
     time, load = clean(rng)
     time[500] = time[499]
     time[900:] -= 0.25
-    result = found(trace_of(time, W=load))
-    assert (result["repeated time"].number, result["backward time"].number) == (1, 1)
-    assert "row 500" in result["repeated time"].where
-    assert "row 900" in result["backward time"].where
-    assert result["backward time"].severity == "error"
-    assert "0.249" in result["backward time"].sentence
-    # Still there, and in the same order.
+    findings = findings_of(trace_of(time, W=load))
+    assert (findings["repeated time"].number, findings["backward time"].number) == (1, 1)
+    assert "row 500" in findings["repeated time"].where
+    assert "row 900" in findings["backward time"].where
+    assert findings["backward time"].severity == "error"
+    assert "0.249" in findings["backward time"].sentence
+    # The trace keeps the rows in their order.
     assert trace_of(time, W=load).time[900] < trace_of(time, W=load).time[899]
 
 
-def test_missing_and_infinite_values(rng):
+def test_missing_and_infinite_values_are_counted(rng):
     time, load = clean(rng)
     load[[3, 77, 1999]] = np.nan
     load[50] = np.inf
-    result = found(trace_of(time, W=load))
-    assert set(result) == {"missing values", "infinite"}
-    assert result["missing values"].number == 3
-    assert result["missing values"].where == "W, row 3, t = 5.003 s"
-    assert result["infinite"].number == 1
+    findings = findings_of(trace_of(time, W=load))
+    assert set(findings) == {"missing values", "infinite"}
+    assert findings["missing values"].number == 3
+    assert findings["missing values"].where == "W, row 3, t = 5.003 s"
+    assert findings["infinite"].number == 1
 
 
 def test_a_time_that_is_missing_is_an_error(rng):
     time, load = clean(rng)
     time[10] = np.nan
-    result = found(trace_of(time, W=load))
-    assert result["missing values"].severity == "error"
+    findings = findings_of(trace_of(time, W=load))
+    assert findings["missing values"].severity == "error"
     assert trace_of(time).sample_rate is None
 
 
 def test_a_channel_without_any_value_is_an_error(rng):
     time, _ = clean(rng)
-    result = found(trace_of(time, W=np.full(N, np.nan)))
-    assert list(result) == ["missing values"]
-    assert result["missing values"].severity == "error"
+    findings = findings_of(trace_of(time, W=np.full(N, np.nan)))
+    assert list(findings) == ["missing values"]
+    assert findings["missing values"].severity == "error"
 
 
 @pytest.mark.parametrize(("side", "rate"), [(1, 1.0), (-1, 12.3), (1, 120.0)])
 def test_saturation_is_found_at_any_frequency(rng, side, rate):
     time = np.arange(N) / 1000
     force = side * np.minimum(np.sin(2 * np.pi * rate * time) + 0.01 * rng.normal(size=N), 0.8)
-    result = found(trace_of(time, F=force))
-    assert list(result) == ["saturation"]
-    share = np.mean(np.abs(force) == np.abs(force[force * side == 0.8 * 1.0][0]))
-    assert result["saturation"].number == pytest.approx(share)
-    assert ("largest" if side > 0 else "smallest") in result["saturation"].sentence
+    findings = findings_of(trace_of(time, F=force))
+    assert list(findings) == ["saturation"]
+    share = np.mean(force == side * 0.8)
+    assert findings["saturation"].number == pytest.approx(share)
+    assert ("largest" if side > 0 else "smallest") in findings["saturation"].sentence
 
 
 @pytest.mark.parametrize(("step", "rate"), [(1e-4, 0.5), (1e-2, 3.0), (0.1, 50.0), (1e-3, 120.0)])
 def test_quantisation_is_no_saturation(step, rate):
     time = np.arange(20_000) / 1000
     force = np.round(np.sin(2 * np.pi * rate * time) / step) * step
-    assert "saturation" not in found(trace_of(time, F=force))
+    assert "saturation" not in findings_of(trace_of(time, F=force))
 
 
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 1e-2])
@@ -155,23 +155,23 @@ def test_a_top_as_flat_as_a_fourth_power_is_no_saturation(step):
     """cos x - cos(2x)/4 has neither slope nor curvature at its top."""
     phase = np.linspace(-3, 3, 20_000)
     force = np.round((np.cos(phase) - np.cos(2 * phase) / 4) / step) * step
-    assert "saturation" not in found(trace_of(np.arange(phase.size) / 1000, F=force))
+    assert "saturation" not in findings_of(trace_of(np.arange(phase.size) / 1000, F=force))
 
 
 def test_noise_on_a_coarse_converter_is_no_saturation(rng):
     time = np.arange(20_000) / 1000
     force = np.round(rng.normal(size=time.size) * 5)
-    assert found(trace_of(time, F=force)) == {}
+    assert findings_of(trace_of(time, F=force)) == {}
 
 
 def test_a_dead_channel_is_constant(rng):
     time, _ = clean(rng)
-    result = found(trace_of(time, W=np.full(N, 3.5)))
-    assert list(result) == ["constant"]
-    assert result["constant"].number == 3.5
+    findings = findings_of(trace_of(time, W=np.full(N, 3.5)))
+    assert list(findings) == ["constant"]
+    assert findings["constant"].number == 3.5
 
 
-def test_channels_go_by_name_by_heading_and_by_role(rng):
+def test_a_channel_is_found_by_name_by_heading_and_by_role(rng):
     time, load = clean(rng)
     channels = {
         "Normal load": Channel(load, "force", "N", "Normal load [kN]", "kN"),
@@ -217,7 +217,7 @@ def test_channels_go_by_name_by_heading_and_by_role(rng):
         ("displacement", "Slip velocity", None, False),
     ],
 )
-def test_names_that_laboratories_give(role, name, kind, fits):
+def test_roles_are_recognised_from_names_of_laboratories(role, name, kind, fits):
     trace = Trace(np.arange(3.0), {name: Channel(np.arange(3.0), kind)})
     if fits:
         assert trace.channel(role) is trace.channels[name]
@@ -230,8 +230,8 @@ def test_a_slice_is_half_open_and_checked_anew(rng):
     time, load = clean(rng)
     load[1500] = np.nan
     whole = trace_of(time, W=load)
-    kept = Finding("truncated", "error", 1.0, "row 2000", "cut")
-    whole = Trace(time, whole.channels, (kept, *check(whole)))
+    truncated = Finding("truncated", "error", 1.0, "row 2000", "cut")
+    whole = Trace(time, whole.channels, (truncated, *check(whole)))
     first = whole.slice(end="6 s")
     assert first.time[-1] == time[999]
     assert len(first) == 1000
@@ -303,18 +303,18 @@ def test_stresses_become_forces_only_with_an_area(rock):
 
 
 def test_friction_times_load_is_a_force(rock):
-    made = derive(rock, {"force": "friction * load"})
-    assert np.allclose(made.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
-    assert made.provenance["derived channels"] == {"force": "friction * load"}
+    derived = derive(rock, {"force": "friction * load"})
+    assert np.allclose(derived.channel("F").to("MPa"), [12, 12.2, 12.4, 12], rtol=1e-15)
+    assert derived.provenance["derived channels"] == {"force": "friction * load"}
 
 
 @pytest.mark.parametrize("text", ["1e-3 /um", "1e-3 1/um", "1e-3 friction/um", "1 /mm", 1000.0])
-def test_stiffness_in_friction_per_length(text):
+def test_a_stiffness_in_friction_per_length_is_converted(text):
     assert stiffness_from_friction(text, "7 N") == pytest.approx(7000, rel=1e-15)
     assert stiffness_from_friction(text, "20 MPa") == pytest.approx(20e9, rel=1e-15)
 
 
 @pytest.mark.parametrize(("k", "load"), [("1 N/um", "7 N"), ("1e-3 um", 7.0), ("-1 /um", 7.0)])
-def test_what_is_no_friction_per_length_is_refused(k, load):
+def test_a_stiffness_of_another_dimension_or_sign_is_refused(k, load):
     with pytest.raises(InputError, match="stiffness_from_friction"):
         stiffness_from_friction(k, load)

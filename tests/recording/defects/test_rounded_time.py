@@ -1,4 +1,4 @@
-"""Stamps that were rounded are a grid plus rounding; an irregular clock stays as it is."""
+"""Rounded time stamps are replaced by their even grid; those of an irregular clock are kept."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,17 +18,17 @@ SEEDS = range(6)
 
 
 def single(rng, time, step):
-    """Single precision, at a time at which it shows."""
+    """Stamps in single precision, so late that the rounding matters."""
     quantum = step * rng.uniform(0.05, 6)
     late = time + np.exp2(np.floor(np.log2(quantum)) + 23) * rng.uniform(1, 1.9)
     return late, late.astype(np.float32).astype(float), 2 * quantum
 
 
 def decimals(rng, time, step):
-    """Few digits, rounded or cut."""
+    """Stamps of few decimals, rounded or cut off."""
     quantum = 10.0 ** np.round(np.log10(step) + rng.uniform(-1.2, 1.2))
-    made = np.round(time / quantum) if rng.random() < 0.5 else np.floor(time / quantum)
-    return time, made * quantum, quantum
+    multiples = np.round(time / quantum) if rng.random() < 0.5 else np.floor(time / quantum)
+    return time, multiples * quantum, quantum
 
 
 def grid(rng, gaps):
@@ -43,7 +43,7 @@ def grid(rng, gaps):
 @pytest.mark.parametrize("gaps", [0, 2])
 @pytest.mark.parametrize("rounded", [single, decimals])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_grid_of_rounded_stamps_is_read(seed, rounded, gaps) -> None:
+def test_the_even_grid_of_rounded_stamps_is_recovered(seed, rounded, gaps) -> None:
     rng = np.random.default_rng([seed, gaps])
     changed = 0
     while changed < 30:
@@ -52,15 +52,15 @@ def test_the_grid_of_rounded_stamps_is_read(seed, rounded, gaps) -> None:
         time, stamps, quantum = rounded(rng, exact, step)
         steps = np.diff(stamps)
         changed = np.count_nonzero(np.abs(steps - np.median(steps)) > 1e-6 * step)
-    made = even_times(stamps)
-    steps = np.diff(made)
+    even = even_times(stamps)
+    steps = np.diff(even)
     usual = steps < 2 * step
     assert np.ptp(steps[usual]) < 1e-5 * step
     assert np.median(steps) == pytest.approx(step, rel=2 * quantum / step / time.size + 1e-9)
-    # Of a stamp that is cut, the mean rounding error is half a quantum.
-    assert np.abs(made - time).max() < quantum
+    # Stamps that are cut off have a mean error of half a quantum.
+    assert np.abs(even - time).max() < quantum
     if not gaps:
-        assert np.ptp(made - time) < 0.3 * quantum
+        assert np.ptp(even - time) < 0.3 * quantum
     names = {f.name for f in check(Trace(stamps, {}))}
     assert "uneven sampling" not in names
     assert "repeated time" not in names
@@ -85,7 +85,7 @@ def events(rng, step, size):
 @pytest.mark.parametrize("digits", [None, 0.01, 0.1])
 @pytest.mark.parametrize("clock", [jitter, walk, two_rates, events])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_an_irregular_clock_stays_as_it_is(seed, clock, digits) -> None:
+def test_stamps_of_an_irregular_clock_are_kept(seed, clock, digits) -> None:
     rng = np.random.default_rng(seed)
     step = 10 ** rng.uniform(-4, 0)
     time = np.sort(clock(rng, step, int(rng.uniform(500, 5000))))
@@ -96,8 +96,8 @@ def test_an_irregular_clock_stays_as_it_is(seed, clock, digits) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_no_stamp_of_an_exact_clock_is_moved(seed) -> None:
-    """Neither what a decimal cannot hold in binary, nor a gap, is rounding."""
+def test_stamps_of_an_exact_clock_are_kept(seed) -> None:
+    """Neither the binary error of a decimal nor a gap is taken for rounding."""
     rng = np.random.default_rng(seed)
     time = 3600 + np.arange(5000) / 1000
     assert even_times(time) is time
@@ -108,7 +108,7 @@ def test_no_stamp_of_an_exact_clock_is_moved(seed) -> None:
 
 @pytest.mark.parametrize("lost", [1, 5, 30, 100])
 @pytest.mark.parametrize("seed", range(3))
-def test_samples_that_are_lost_at_random_are_gaps(seed, lost) -> None:
+def test_samples_lost_at_random_are_gaps(seed, lost) -> None:
     rng = np.random.default_rng(seed)
     time = np.delete(np.arange(9000) / 1000, rng.choice(np.arange(1, 8999), lost, replace=False))
     assert even_times(time) is time
@@ -125,43 +125,44 @@ CLOCKS = {
 
 
 @pytest.mark.parametrize("name", CLOCKS)
-def test_amplitudes_are_those_of_the_samples_and_not_of_their_stamps(truth, trace, name) -> None:
+def test_amplitudes_are_right_in_spite_of_rounded_stamps(truth, trace, name) -> None:
     rate, stamped = CLOCKS[name]
     rng = np.random.default_rng(len(name))
     time = np.arange(20_000) / rate
-    made = truth.but(frequency=120.0)
-    load, force = (f(time) + 2e-3 * rng.standard_normal(time.size) for f in (made.load, made.force))
-    found = measure(trace(stamped(time).astype(float), load, force))
-    reading = found.reading
+    source = truth.but(frequency=120.0)
+    load = source.load(time) + 2e-3 * rng.standard_normal(time.size)
+    force = source.force(time) + 2e-3 * rng.standard_normal(time.size)
+    measurement = measure(trace(stamped(time).astype(float), load, force))
+    reading = measurement.reading
     assert abs(reading.epsilon - 0.24) < 4 * reading.uncertainty("epsilon")
     assert reading.uncertainty("epsilon") < 1e-5
     assert reading.phasor(1).amplitude == pytest.approx(2e-3, abs=5e-5)
-    assert found.verdict == "ok"
-    assert "rounded time" in {f.name for f in found.samples.findings} or rate == 3000
+    assert measurement.verdict == "ok"
+    assert "rounded time" in {f.name for f in measurement.samples.findings} or rate == 3000
 
 
-def test_everyone_who_reads_a_recording_reads_the_grid(tmp_path) -> None:
+def test_measurement_and_inference_both_use_the_even_grid(tmp_path) -> None:
     time = np.arange(4000) / 400
     table = np.stack([np.round(time, 2), 1e6 * 1e-5 * time, 0.6 + 1e-3 * time], axis=1)
     path = tmp_path / "rounded.csv"
     head = "time (s),displacement (um),mu"
     np.savetxt(path, table, "%.4f", delimiter=",", header=head, comments="")
-    recorded = read(path)
-    assert recorded.sample_rate == pytest.approx(400, rel=1e-5)
-    assert [f.name for f in recorded.findings if "time" in f.name] == ["rounded time"]
+    trace = read(path)
+    assert trace.sample_rate == pytest.approx(400, rel=1e-5)
+    assert [f.name for f in trace.findings if "time" in f.name] == ["rounded time"]
     for read_times in (
-        sliding_signals(recorded, "W", "F", None).time,
-        recorded_run(recorded, steps=[5.0]).time,
+        sliding_signals(trace, "W", "F", None).time,
+        recorded_run(trace, steps=[5.0]).time,
     ):
         assert np.ptp(np.diff(read_times)) < 1e-9
         assert read_times.size == time.size
 
 
-def test_a_recording_of_stamps_is_sliced_and_checked_as_it_is() -> None:
+def test_a_trace_keeps_its_rounded_stamps_and_a_slice_reports_them() -> None:
     time = (3600 + np.arange(5000) / 1000).astype(np.float32).astype(float)
-    made = Trace(time, {"W": Channel(np.ones(time.size), "force", "N", "W", "N")})
-    made = replace(made, findings=check(made))
-    assert np.array_equal(made.time, time)
-    names = [f.name for f in made.slice(3601, 3603).findings]
+    trace = Trace(time, {"W": Channel(np.ones(time.size), "force", "N", "W", "N")})
+    trace = replace(trace, findings=check(trace))
+    assert np.array_equal(trace.time, time)
+    names = [f.name for f in trace.slice(3601, 3603).findings]
     assert names == ["rounded time", "constant"]
-    assert rounded_grid(made.time[::7]).step == pytest.approx(7e-3, rel=1e-5)
+    assert rounded_grid(trace.time[::7]).step == pytest.approx(7e-3, rel=1e-5)

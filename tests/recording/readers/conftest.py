@@ -1,4 +1,4 @@
-"""A recording whose every number is known, to be written in each format and read again."""
+"""A recording of known numbers that tests write in each format, and functions that write files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROWS = 400
 
 
 class Planted(NamedTuple):
-    """Truth in SI."""
+    """Time, load and force in SI units."""
 
     time: np.ndarray
     W: np.ndarray
@@ -22,10 +22,7 @@ class Planted(NamedTuple):
 
 @pytest.fixture(scope="session")
 def planted() -> Planted:
-    """0.4 s at 1 kHz of a load with a strong and a force with a weak modulation, in steps of 1e-6.
-
-    Rounded, so that a text of six decimals holds it exactly.
-    """
+    """0.4 s at 1 kHz of a modulated load and force, which a text of six decimals holds exactly."""
     time = np.arange(ROWS) / 1000
     load = 7 + 1.7 * np.cos(2 * np.pi * 37 * time)
     force = 2.8 + 0.02 * np.cos(2 * np.pi * 37 * time + 1) + 0.1 * time
@@ -34,7 +31,7 @@ def planted() -> Planted:
 
 @pytest.fixture
 def cut(tmp_path: Path) -> Callable[[Path, float], Path]:
-    """A file of which only a part is left."""
+    """Function that copies the first part of a file."""
 
     def cut_file(path: Path, part: float) -> Path:
         whole = path.read_bytes()
@@ -43,3 +40,15 @@ def cut(tmp_path: Path) -> Callable[[Path, float], Path]:
         return target
 
     return cut_file
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[..., Path]:
+    """Function that writes a file of text or bytes."""
+
+    def write(content: str | bytes, name: str = "recording.txt", encoding: str = "utf-8") -> Path:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode(encoding))
+        return path
+
+    return write

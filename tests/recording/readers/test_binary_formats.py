@@ -1,4 +1,4 @@
-"""HDF5, MATLAB and TDMS: the planted recording comes back from each way to write it."""
+"""HDF5, MATLAB and TDMS: the planted recording is read back, however it was written."""
 
 from __future__ import annotations
 
@@ -79,15 +79,15 @@ def h5_group(file, planted):
     "write",
     [h5_datasets, h5_columns_of_one, h5_table, h5_matrix, h5_wide_matrix, h5_rate, h5_group],
 )
-def test_hdf5(tmp_path, planted, write):
-    # The extension says nothing.
+def test_hdf5_is_read(tmp_path, planted, write):
+    # The extension is not used.
     path = tmp_path / "recording.dat"
     with h5py.File(path, "w") as file:
         write(file, planted)
     assert_planted(read(path), planted)
 
 
-def test_text_beside_the_numbers_of_hdf5_does_not_matter(tmp_path, planted):
+def test_text_next_to_the_numbers_of_hdf5_does_not_matter(tmp_path, planted):
     path = tmp_path / "recording.h5"
     with h5py.File(path, "w") as file:
         h5_datasets(file, planted)
@@ -97,8 +97,8 @@ def test_text_beside_the_numbers_of_hdf5_does_not_matter(tmp_path, planted):
     assert np.allclose(trace.channel("W").values, planted.W, rtol=1e-15)
 
 
-def test_netcdf(tmp_path, planted):
-    """What a trace itself is written to comes back as it was."""
+def test_netcdf_is_read(tmp_path, planted):
+    """A trace that was written as NetCDF is read back."""
     source = tmp_path / "a.h5"
     with h5py.File(source, "w") as file:
         h5_datasets(file, planted)
@@ -171,13 +171,13 @@ def mat_rate(planted):
 
 @pytest.mark.parametrize("write", [mat_vectors, mat_struct, mat_matrix, mat_rate])
 @pytest.mark.parametrize("compressed", [False, True])
-def test_matlab_5(tmp_path, planted, write, compressed):
+def test_matlab_5_is_read(tmp_path, planted, write, compressed):
     path = tmp_path / "recording.mat"
     scipy.io.savemat(path, write(planted), do_compression=compressed)
     assert_planted(read(path), planted)
 
 
-def test_matlab_4(tmp_path, planted):
+def test_matlab_4_is_read(tmp_path, planted):
     path = tmp_path / "recording.mat"
     contents = {"t": planted.time, "W": planted.W, "F": planted.F}
     scipy.io.savemat(path, contents, format="4")
@@ -187,7 +187,7 @@ def test_matlab_4(tmp_path, planted):
 @pytest.mark.parametrize("version", ["4", "5"])
 @pytest.mark.parametrize("compressed", [False, True])
 def test_a_matlab_file_that_is_cut_is_refused(tmp_path, planted, cut, version, compressed):
-    """Anywhere but between two variables, where a cut leaves no trace in the file."""
+    """A cut anywhere but between two variables, where nothing in the file shows it."""
     path = tmp_path / "a.mat"
     contents = {"time_s": planted.time, "W_N": planted.W, "F_N": planted.F}
     scipy.io.savemat(path, contents, format=version, do_compression=compressed and version == "5")
@@ -214,7 +214,7 @@ def matlab_73(path, planted):
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
 
 
-def test_matlab_73(tmp_path, planted, cut):
+def test_matlab_73_is_read(tmp_path, planted, cut):
     path = tmp_path / "a.mat"
     matlab_73(path, planted)
     trace = read(path)
@@ -249,7 +249,7 @@ def write_tdms(path, planted, segments=4, time=False, group="run"):
 
 
 @pytest.mark.parametrize("time", [False, True])
-def test_tdms(tmp_path, planted, time):
+def test_tdms_is_read(tmp_path, planted, time):
     assert_planted(read(write_tdms(tmp_path / "a.tdms", planted, time=time)), planted)
 
 
@@ -268,14 +268,14 @@ def test_tdms_cut_before_any_value_is_refused(tmp_path, planted, cut):
         read(cut(write_tdms(tmp_path / "a.tdms", planted), 0.02))
 
 
-def test_tdms_without_its_library_is_one_sentence(tmp_path, planted, monkeypatch):
+def test_tdms_without_its_library_is_refused(tmp_path, planted, monkeypatch):
     path = write_tdms(tmp_path / "a.tdms", planted)
     monkeypatch.setitem(sys.modules, "nptdms", None)
     with pytest.raises(InputError, match=r"install npTDMS, as 'pip install asperity\[lab\]' does"):
         read(path)
 
 
-def test_what_is_no_recording_is_refused(tmp_path):
+def test_other_files_and_formats_are_refused(tmp_path):
     path = tmp_path / "picture.png"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 20)
     with pytest.raises(InputError, match="looks like none of them"):
@@ -288,7 +288,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
 
 @pytest.mark.parametrize("way", ["link", "storage", "virtual"])
 def test_hdf5_reads_no_other_file(tmp_path, way):
-    """Who sends a recording to a server must not read the server's files by it."""
+    """A recording sent to a server must not give access to the files of the server."""
     with h5py.File(tmp_path / "secret.h5", "w") as secret:
         secret["F"] = np.arange(50.0)
     np.arange(50.0).tofile(tmp_path / "secret.bin")
@@ -308,8 +308,8 @@ def test_hdf5_reads_no_other_file(tmp_path, way):
         read(path)
 
 
-def links_without_end(file, planted, seed):
-    """The planted recording in one of many groups, each of which has links to many others."""
+def linked_groups(file, planted, seed):
+    """The planted recording in one of many groups that have links to each other."""
     draw = np.random.default_rng(seed)
     groups = [file]
     for k in range(40):
@@ -317,8 +317,8 @@ def links_without_end(file, planted, seed):
         groups.append(inside.create_group(f"group {k}"))
     h5_datasets(groups[draw.integers(1, len(groups))], planted)
     for k in range(200):
-        group, other = (groups[i] for i in draw.integers(len(groups), size=2))
-        group[f"link {k}"] = other if draw.random() < 0.5 else h5py.SoftLink(other.name)
+        group, target = (groups[i] for i in draw.integers(len(groups), size=2))
+        group[f"link {k}"] = target if draw.random() < 0.5 else h5py.SoftLink(target.name)
     file["nowhere"] = h5py.SoftLink("/not there")
 
 
@@ -326,11 +326,11 @@ def links_without_end(file, planted, seed):
 def test_groups_with_links_to_one_another_are_read_once(tmp_path, planted, seed):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
-        links_without_end(file, planted, seed)
+        linked_groups(file, planted, seed)
     assert_planted(read(path), planted)
 
 
-def test_a_group_goes_by_each_of_its_names(tmp_path, planted):
+def test_a_group_can_be_chosen_by_each_of_its_names(tmp_path, planted):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
         h5_datasets(file.create_group("runs/fast"), planted)
@@ -343,7 +343,7 @@ def test_a_group_goes_by_each_of_its_names(tmp_path, planted):
     assert len(read(path, group="best")) == 200
 
 
-def test_groups_of_any_depth(tmp_path, planted):
+def test_groups_of_any_depth_are_read(tmp_path, planted):
     path, depth = tmp_path / "a.h5", 1200
     with h5py.File(path, "w") as file:
         group = file
@@ -354,7 +354,7 @@ def test_groups_of_any_depth(tmp_path, planted):
     assert_planted(read(path, group="/".join("g" * depth)), planted)
 
 
-def test_cells_of_matlab_that_hold_themselves(tmp_path, planted):
+def test_matlab_cells_that_contain_themselves_are_skipped(tmp_path, planted):
     path = tmp_path / "a.mat"
     with h5py.File(path, "w") as file:
         h5_datasets(file, planted)

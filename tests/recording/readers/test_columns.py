@@ -1,4 +1,4 @@
-"""Columns, units and roles, whatever the format: what the user says, and what is refused."""
+"""Columns, units and roles: how they are recognised, and what the user may choose."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ def names(trace):
         ("x_1", "x_1", ""),
     ],
 )
-def test_headings_are_taken_apart_where_they_hold_a_unit(label, name, unit):
+def test_headings_are_split_into_name_and_unit(label, name, unit):
     assert split_labels([label]) == [(name, unit)]
 
 
-def test_an_index_n_is_no_newton_beside_another_index():
+def test_an_index_n_next_to_another_index_is_no_newton():
     assert split_labels(["t_s", "F_N", "F_T"]) == [("t", "s"), ("F_N", ""), ("F_T", "")]
     assert split_labels(["t_s", "F_N", "W_N"]) == [("t", "s"), ("F", "N"), ("W", "N")]
 
@@ -83,7 +83,7 @@ def test_an_index_n_is_no_newton_beside_another_index():
         ("d", "time", 86400.0),
     ],
 )
-def test_units_as_laboratories_write_them(recording, unit, kind, si):
+def test_units_are_read_as_laboratories_write_them(recording, unit, kind, si):
     trace = read(recording(f"time_s,a ({unit}),b (s),c (-)", *ROWS))
     channel = trace.channels["a"]
     assert channel.kind == kind
@@ -92,7 +92,7 @@ def test_units_as_laboratories_write_them(recording, unit, kind, si):
 
 
 @pytest.mark.parametrize("unit", ["V", "counts", "deg", "°C", "MPa/s", "t"])
-def test_what_is_no_unit_here_leaves_the_values_and_is_named(recording, unit):
+def test_an_unknown_unit_leaves_the_values_and_is_named(recording, unit):
     trace = read(recording(f"time_s,a ({unit}),b (s),c (-)", *ROWS))
     assert names(trace) == ["unknown unit"]
     assert trace.channels["a"].kind is None
@@ -103,7 +103,7 @@ def test_what_is_no_unit_here_leaves_the_values_and_is_named(recording, unit):
     assert np.array_equal(known.channels["a"].values, [-2500, -5000, -10000, -7500])
 
 
-def test_units_go_by_name_by_heading_and_by_role(recording):
+def test_units_are_given_by_name_by_heading_and_by_role(recording):
     path = recording("t,Load,Shear (V),Displ", *ROWS)
     trace = read(
         path,
@@ -117,13 +117,13 @@ def test_units_go_by_name_by_heading_and_by_role(recording):
     assert np.allclose(trace.channel("slip").values, [3e-6, 5e-6, 4e-6, 1e-6], rtol=1e-15)
 
 
-def test_a_unit_against_the_file_is_taken_and_named(recording):
+def test_a_unit_of_the_user_overrides_that_of_the_file_and_is_named(recording):
     trace = read(recording("time_s,W_N,F_N,x_um", *ROWS), units={"W": "kN"})
     assert names(trace) == ["unit overridden"]
     assert trace.channel("W").values[0] == 1000
 
 
-def test_ambiguous_columns_are_named_and_chosen(recording):
+def test_ambiguous_columns_are_refused_until_the_user_chooses(recording):
     path = recording("time_s,Shear left (N),Shear right (N),W_N", *ROWS)
     with pytest.raises(InputError, match=r"'Shear left' or 'Shear right'; choose when reading"):
         read(path).channel("F")
@@ -136,7 +136,7 @@ def test_ambiguous_columns_are_named_and_chosen(recording):
     assert np.array_equal(read(two, columns={"time": "time 2"}).time, [1, 2, 4, 3])
 
 
-def test_a_rate_goes_before_the_times_of_the_file(recording):
+def test_a_rate_of_the_user_overrides_the_times_of_the_file(recording):
     trace = read(recording("time_s,W_N,F_N,x_um", *ROWS), rate="4 Hz")
     assert np.array_equal(trace.time, [0, 0.25, 0.5, 0.75])
     assert "time" in trace.channels
@@ -157,7 +157,7 @@ def test_a_rate_goes_before_the_times_of_the_file(recording):
         ({"rate": "10 rpm"}, r"read\.rate must be"),
     ],
 )
-def test_what_the_user_says_wrongly_is_one_sentence(recording, options, message):
+def test_a_wrong_option_is_refused_in_one_sentence(recording, options, message):
     path = recording("time_s,W_N,F_N,x_um", *ROWS)
     with pytest.raises(InputError, match=message) as refused:
         read(path, **options)
@@ -172,7 +172,7 @@ def test_two_columns_of_one_name_stay_apart(recording):
 
 
 def test_conversion_is_rounded_once(recording):
-    """3 um is the double nearest to 3e-6, which three times the double nearest to 1e-6 is not."""
+    """3 um is the double nearest to 3e-6; 3 times the double nearest to 1e-6 is another one."""
     rows = [f"{i},{i},{i},{i}" for i in range(1, 60)]
     trace = read(recording("time_s,x_um,delay_ms,p_MPa", *rows))
     for name, power in (("x", -6), ("delay", -3), ("p", 6)):
@@ -181,7 +181,7 @@ def test_conversion_is_rounded_once(recording):
 
 
 @pytest.mark.parametrize("code", ["-9999", "-999.25", "9999.99", "99999"])
-def test_a_code_for_a_missing_value_is_no_reading(recording, code):
+def test_codes_for_missing_values_become_missing(recording, code):
     rows = [f"{0.1 * k:.1f},{4 + 0.01 * (k % 3)},{7 + 0.02 * (k % 2)}" for k in range(40)]
     whole = read(recording("time (s),Ft (N),Fn (N)", *rows))
     for k in (10, 11, 12, 30):
@@ -189,9 +189,9 @@ def test_a_code_for_a_missing_value_is_no_reading(recording, code):
     trace = read(recording("time (s),Ft (N),Fn (N)", *rows))
     assert names(trace) == ["missing code", "missing values"]
     assert trace.findings[0].number == 4
-    load, kept = trace.channels["Fn"].values, np.isfinite(trace.channels["Fn"].values)
-    np.testing.assert_array_equal(np.flatnonzero(~kept), [10, 11, 12, 30])
-    np.testing.assert_array_equal(load[kept], whole.channels["Fn"].values[kept])
+    expected = whole.channels["Fn"].values.copy()
+    expected[[10, 11, 12, 30]] = np.nan
+    np.testing.assert_array_equal(trace.channels["Fn"].values, expected)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_code_for_a_missing_value_is_no_reading(recording, code):
         [0.6, 0.61, -5000, 0.6, 0.61],  # far off, but no nines
     ],
 )
-def test_nines_among_readings_are_readings(recording, values):
+def test_nines_among_values_of_their_size_are_kept(recording, values):
     rows = [f"{0.1 * k:.1f},{v}" for k, v in enumerate(8 * values)]
     trace = read(recording("time (s),Fn (N)", *rows))
     assert "missing code" not in names(trace)

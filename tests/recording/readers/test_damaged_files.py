@@ -1,4 +1,4 @@
-"""Mutated files of every format: a recording or one sentence, and no warning of any library.
+"""Damaged files of every format give a recording or one sentence, and no warning of a library.
 
 The suite turns warnings into errors, so that a library's warning fails these tests.
 """
@@ -51,9 +51,10 @@ def matlab(version: str, compressed: bool = False) -> bytes:
 
 def hdf5() -> bytes:
     file = io.BytesIO()
-    with h5py.File(file, "w") as made:
+    with h5py.File(file, "w") as output:
         for name, values in (("time", TIME), ("W", LOAD), ("F", SHEAR)):
-            made.create_dataset(name, data=values).attrs["units"] = "s" if name == "time" else "N"
+            dataset = output.create_dataset(name, data=values)
+            dataset.attrs["units"] = "s" if name == "time" else "N"
     return file.getvalue()
 
 
@@ -98,7 +99,7 @@ FILES = {
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Some bytes changed, a piece left out or doubled, the end cut."""
+    """The content with some bytes changed, a piece left out or doubled, or the end cut off."""
     broken = bytearray(content)
     for at in rng.integers(0, len(broken), rng.integers(1, 6)):
         # Half of the damage is in the beginning, where headers are.
@@ -121,16 +122,16 @@ def test_a_damaged_file_is_a_recording_or_one_sentence(tmp_path, name):
         try:
             trace = read(path)
         except InputError as error:
-            said = [str(error)]
+            texts = [str(error)]
         else:
-            said = [str(finding) for finding in trace.findings] + list(trace.channels)
-        for text in said:
+            texts = [str(finding) for finding in trace.findings] + list(trace.channels)
+        for text in texts:
             assert text.isprintable(), text
             assert len(text) < 1400
 
 
 @pytest.mark.parametrize("name", [n for n in FILES if n != "durations.csv"])
-def test_the_whole_files_are_recordings(tmp_path, name):
+def test_the_undamaged_files_are_read(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name])
     trace = read(path)
@@ -140,7 +141,7 @@ def test_the_whole_files_are_recordings(tmp_path, name):
     assert np.allclose(trace.channel("W").values, LOAD, rtol=1e-6)
 
 
-def test_json_and_documents_are_refused_at_once(tmp_path):
+def test_json_and_html_are_refused_by_name(tmp_path):
     for name, text in (
         ("a.json", '[{"t": 1, "F": 2.5}]'),
         ("b.json", '{"time": [' + "1.0, " * 60_000 + "2.0]}"),
@@ -153,14 +154,14 @@ def test_json_and_documents_are_refused_at_once(tmp_path):
             read(path)
 
 
-def test_headings_in_brackets_are_no_json(tmp_path):
+def test_headings_in_brackets_are_not_taken_for_json(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(table("[s], [N], [kN]\n", "{t:.3f},{w:.4f},{f:.4f}\n"))
     assert len(read(path, columns={"time": 0})) == ROWS
 
 
-def test_a_heading_of_another_width_is_named_where_no_column_is_the_wanted_one(tmp_path):
-    """The names may have moved, which is why the load is not where it is looked for."""
+def test_a_mismatched_heading_is_named_where_a_column_is_not_found(tmp_path):
+    """The mismatch of names and columns may be why the load is not found."""
     rows = "\n".join(f"{k / 100},{k % 7},{k % 5},1" for k in range(ROWS))
     path = tmp_path / "rig.csv"
     path.write_text(f"time (s),slip (um),F (N)\n{rows}\n")

@@ -1,4 +1,4 @@
-"""Texts as recorders of other laboratories write them, whole, packed, cut and damaged."""
+"""Unusual texts of recorders, packed texts, and damaged packed and MATLAB files."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ LVM = (
     "X_Value\tNormal Force\tShear Force\tComment\n"
 )
 
-#: Contents of a file, and the findings that it must make besides none.
+#: Content of a file, and the names of its findings; None where the times are tested separately.
 TEXTS = {
     "thousands in quotes": (
         NAMES
@@ -108,51 +108,45 @@ TEXTS = {
 }
 
 
-def written(tmp_path, content, name="recording.txt"):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
-
-
 @pytest.mark.parametrize("text", TEXTS)
-def test_other_recorders(tmp_path, text):
+def test_texts_of_other_recorders_are_read(written, text):
     content, expected = TEXTS[text]
-    trace = read(written(tmp_path, content))
+    trace = read(written(content))
     assert len(trace) == ROWS
-    # Twelve digits of a stamp of the day are left.
     if expected is not None:
+        # Times of day are read to a nanosecond.
         assert trace.time == pytest.approx(TIME, abs=2e-9)
         assert {f.name for f in trace.findings} == expected
     assert np.array_equal(trace.channel("W").values, LOAD)
     assert np.array_equal(trace.channel("F").values, SHEAR)
 
 
-def test_of_two_orders_of_day_and_month_the_shorter_recording_is_meant(tmp_path):
-    # The first and the second of February, or the second of January and that of February.
-    trace = read(written(tmp_path, TEXTS["days that can be months"][0]))
+def test_the_order_of_day_and_month_with_the_shorter_recording_is_taken(written):
+    # 01.02. and 02.02. are two days of February, or 2 January and 2 February.
+    trace = read(written(TEXTS["days that can be months"][0]))
     assert trace.time[-1] == pytest.approx(86400 + TIME[-1], abs=1e-6)
     american = TEXTS["days that can be months"][0].replace(".02.2019", "/2/2019")
     american = american.replace("\n01/2", "\n1/30").replace("\n02/2/2019", "\n1/31/2019")
-    trace = read(written(tmp_path, american))
+    trace = read(written(american))
     assert trace.time[-1] == pytest.approx(86400 + TIME[-1], abs=1e-6)
 
 
 @pytest.mark.parametrize("part", [0.01, 0.6])
-def test_gzip_that_is_cut_is_refused(tmp_path, part):
+def test_gzip_that_is_cut_is_refused(written, part):
     packed = gzip.compress(PLAIN.encode())
     with pytest.raises(InputError, match=r"must be a whole file of format 'text'.*may be cut"):
-        read(written(tmp_path, packed[: max(3, int(part * len(packed)))]))
+        read(written(packed[: max(3, int(part * len(packed)))]))
 
 
 @pytest.mark.parametrize("at", [-6, -2, 40])
-def test_gzip_that_is_damaged_is_refused(tmp_path, at):
+def test_gzip_that_is_damaged_is_refused(written, at):
     packed = bytearray(gzip.compress(PLAIN.encode()))
     packed[at] ^= 1
     with pytest.raises(InputError, match=r"must be a whole file of format 'text'.*or damaged"):
-        read(written(tmp_path, bytes(packed)))
+        read(written(bytes(packed)))
 
 
-def test_gzip_that_unpacks_without_end_is_refused_while_it_is_unpacked(tmp_path, monkeypatch):
+def test_gzip_that_unpacks_to_too_much_is_refused_early(tmp_path, monkeypatch):
     limit = 2**22
     monkeypatch.setattr(text_reader, "LARGEST", limit)
     row = b"1.5,2.5,3.5\n"
@@ -167,42 +161,42 @@ def test_gzip_that_unpacks_without_end_is_refused_while_it_is_unpacked(tmp_path,
                 continue
             with pytest.raises(InputError, match=r"must unpack to at most 4 MB.*'a.csv.gz'"):
                 read(path, rate="1 kHz")
-            # A piece of a thousandth of what comes out of it is unpacked at once.
+            # A piece unpacks to up to a thousand times its size.
             assert tracemalloc.get_traced_memory()[1] < 16 * limit
         finally:
             tracemalloc.stop()
 
 
-def test_a_binary_format_that_is_packed_is_refused_with_what_to_do(tmp_path):
+def test_a_packed_binary_format_is_refused_with_a_remedy(written):
     with pytest.raises(InputError, match=r"must hold a text if it is packed.*; unpack it"):
-        read(written(tmp_path, gzip.compress(matlab()), "run.mat.gz"))
+        read(written(gzip.compress(matlab()), "run.mat.gz"))
 
 
 @pytest.mark.parametrize("head", [b"PK\x03\x04", b"BZh91AY", b"\xfd7zXZ\0", b"7z\xbc\xaf\x27\x1c"])
-def test_archives_are_refused_with_what_to_do(tmp_path, head):
+def test_archives_are_refused_with_a_remedy(written, head):
     with pytest.raises(InputError, match="unpack it, or save the sheet as CSV"):
-        read(written(tmp_path, head + bytes(range(256))))
+        read(written(head + bytes(range(256))))
 
 
-def test_a_cut_in_a_quoted_number_leaves_its_row_out(tmp_path):
+def test_a_cut_in_a_quoted_number_leaves_its_row_out(written):
     quoted = NAMES + "".join(
         f'"{t:.4f}","{w:.3f}","{f:.3f}"\n' for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
     )
     length = len('"0.0590","1234.567","1234.567"\n')
     for lost in range(1, length):
-        trace = read(written(tmp_path, quoted[:-lost]))
+        trace = read(written(quoted[:-lost]))
         kept = len(trace)
         assert np.array_equal(trace.channel("F").values, SHEAR[:kept])
-        # A row that lacks nothing but its line end is whole.
+        # A row without its line end only is whole.
         assert kept == ROWS - 1 + (lost == 1)
         assert ("truncated" in {f.name for f in trace.findings}) == (lost > 1)
 
 
-def test_a_quote_without_end_is_one_sentence(tmp_path):
+def test_a_quote_without_end_is_refused(written):
     lines = PLAIN.splitlines(True)
     lines[7] = '"' + lines[7]
     with pytest.raises(InputError, match="EOF inside string starting at row"):
-        read(written(tmp_path, "".join(lines)))
+        read(written("".join(lines)))
 
 
 def matlab():
@@ -214,16 +208,16 @@ def matlab():
     return file.getvalue()
 
 
-def test_the_elements_of_a_matlab_file_are_checked_before_the_library_trusts_them(tmp_path):
+def test_damaged_elements_of_a_matlab_file_are_refused(written):
     raw = matlab()
-    trace = read(written(tmp_path, raw, "whole.mat"))
+    trace = read(written(raw, "whole.mat"))
     assert np.array_equal(trace.channel("W").values, LOAD)
-    # The type of the first variable's numbers, and their count: 128 of the file, 8 of the variable,
-    # 16 of flags, 16 of dimensions, 8 of a short name.
+    # Type and size of the first variable's numbers follow 128 bytes of the header of the file, 8 of
+    # that of the variable, 16 of flags, 16 of dimensions and 8 of a short name.
     place = 128 + 8 + 16 + 16 + 8
     assert struct.unpack_from("<II", raw, place) == (9, 8 * ROWS)
     for kind, size in ((99, 8 * ROWS), (9, 8 * ROWS - 8), (7, 8 * ROWS), (9, 1 << 31)):
         broken = bytearray(raw)
         struct.pack_into("<II", broken, place, kind, size)
         with pytest.raises(InputError, match="cut or damaged"):
-            read(written(tmp_path, bytes(broken), "broken.mat"))
+            read(written(bytes(broken), "broken.mat"))

@@ -1,4 +1,4 @@
-"""Readers of other packages, found by their entry points."""
+"""Readers of other packages, registered by entry points."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXAMPLE = ROOT / "examples" / "lab_reader.py"
 
 
 def installed(folder: Path, points: str) -> None:
-    """What an installer leaves of a package with entry points."""
+    """Write the metadata that an installer writes for a package with entry points."""
     about = folder / "lab_reader-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-reader\nVersion: 1.0\n")
@@ -31,7 +31,7 @@ def installed(folder: Path, points: str) -> None:
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """Install a module of some text under an entry point, for one test."""
+    """Function that installs modules of given text with entry points, for one test."""
 
     def make(points: str, **modules: str) -> None:
         folder = tmp_path / "installed"
@@ -55,7 +55,7 @@ def recording(tmp_path):
     return path
 
 
-def test_a_file_is_recognised_and_read(package, recording):
+def test_a_file_of_another_package_is_recognised_and_read(package, recording):
     package("gaugebox = lab_reader", lab_reader=EXAMPLE.read_text())
     for trace in (read(recording), read(recording, format="gaugebox")):
         assert trace.sample_rate == pytest.approx(1000)
@@ -78,12 +78,12 @@ def test_the_command_line_takes_the_format(tmp_path, recording):
         env=os.environ | {"PYTHONPATH": path},
     )
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert found["mu1"] == pytest.approx(0.05 / 7, rel=1e-2)
-    assert found["provenance"]["format"] == "gaugebox"
+    record = json.loads(done.stdout)
+    assert record["mu1"] == pytest.approx(0.05 / 7, rel=1e-2)
+    assert record["provenance"]["format"] == "gaugebox"
 
 
-def test_other_files_are_read_as_before(package, tmp_path):
+def test_files_of_known_formats_are_read_next_to_a_plugin(package, tmp_path):
     package("gaugebox = lab_reader", lab_reader=EXAMPLE.read_text())
     path = tmp_path / "a.csv"
     path.write_text("time (s),F (N)\n" + "".join(f"{i / 10},{i}.5\n" for i in range(20)))
@@ -100,9 +100,9 @@ UNEQUAL = (
 )
 LISTS = UNEQUAL.replace("np.arange(4.0)", "[0, 1, 2]")
 NUMBER_UNIT = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0), 3)]")
-BARE = UNEQUAL.replace("RawColumn('F', np.arange(4.0))", "np.arange(3.0)")
-START = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], start='now'")
-FINDING = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], findings=['odd']")
+NO_COLUMN = UNEQUAL.replace("RawColumn('F', np.arange(4.0))", "np.arange(3.0)")
+TEXT_START = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], start='now'")
+TEXT_FINDING = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], findings=['odd']")
 TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
 
 
@@ -115,31 +115,31 @@ TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
         (LISTS, "values must be a ndarray, got a list"),
         (TEXT_STEP, "step must be a number or None, got '1 ms'"),
         (NUMBER_UNIT, "unit must be a text or None, got 3"),
-        (BARE, r"columns\[1\] must be a RawColumn, got an array"),
-        (START, "start must be a number, got 'now'"),
-        (FINDING, r"findings\[0\] must be a Finding, got 'odd'"),
+        (NO_COLUMN, r"columns\[1\] must be a RawColumn, got an array"),
+        (TEXT_START, "start must be a number, got 'now'"),
+        (TEXT_FINDING, r"findings\[0\] must be a Finding, got 'odd'"),
         ("def read(path): ...\n", "must be a reader with is_format"),
         ("import nothing_of_this_name\n", "must be a reader that can be loaded"),
     ],
 )
-def test_a_reader_with_a_mistake_is_one_sentence(package, recording, module, rule):
+def test_a_reader_with_a_mistake_is_refused(package, recording, module, rule):
     package("broken = broken_reader", broken_reader=module)
     with pytest.raises(InputError, match=rule):
         read(recording, format="broken")
 
 
-LAYOUT = START.replace("def read(path)", "def read(path, *, delimiter=None)").replace(
+LAYOUT = TEXT_START.replace("def read(path)", "def read(path, *, delimiter=None)").replace(
     "start='now'", "provenance={'delimiter': delimiter}"
 )
 
 
-def test_a_reader_takes_the_layout_that_it_names(package, recording, tmp_path):
+def test_a_reader_gets_the_layout_options_that_it_names(package, recording, tmp_path):
     package("broken = broken_reader", broken_reader=LAYOUT)
     options = {"columns": {"time": "t"}, "format": "broken"}
     assert read(recording, **options, delimiter="|").provenance["delimiter"] == "|"
     with pytest.raises(InputError, match=r"read\.group must be left out for format 'broken'"):
         read(recording, **options, group="run 1")
-    # A reduction file is for recordings of any format: of its layout a reader takes what it can.
+    # Of the layout in a recipe, which is for any format, a reader takes the options that it names.
     recipe = tmp_path / "lab.toml"
     recipe.write_text('group = "run 1"\ndelimiter = ";"\n')
     assert read(recording, **options, recipe=recipe).provenance["delimiter"] == ";"
@@ -151,6 +151,6 @@ def test_a_reader_with_the_name_of_a_format_is_refused(package, recording):
         read(recording)
 
 
-def test_a_format_that_nobody_reads_is_answered_with_those_that_are_known(recording):
+def test_an_unknown_format_is_refused(recording):
     with pytest.raises(InputError, match=r"read.format must be a format, got 'gaugebox'"):
         read(recording, format="gaugebox")
