@@ -26,6 +26,19 @@ def test_intervals_end_where_the_amplitude_changes() -> None:
     assert [round(p.amplitude, 6) for p in parts] == [0.0, 1.0, 2.0, 0.0]
 
 
+def test_small_steps_of_the_amplitude_end_an_interval_and_slow_changes_do_not() -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(32_000) * 1e-3
+    phase, noise = 2 * np.pi * 23.7 * time, 1e-3 * rng.standard_normal(time.size)
+    levels = np.array([0.5, 0.525, 0.55, 0.58])
+    steps = levels[(time // 8).astype(int)]
+    parts = stretches(time, 7 + steps * np.cos(phase) + noise, 23.7)
+    assert [p.amplitude for p in parts] == pytest.approx(levels, rel=1e-3)
+    for slow in (0.1 * time / 32, 0.1 * np.sin(2 * np.pi * time / 16)):
+        (part,) = stretches(time, 7 + 0.5 * (1 + slow) * np.cos(phase) + noise, 23.7)
+        assert part.stop - part.first == time.size
+
+
 @pytest.mark.parametrize("decay", [3.0, 8.0])
 def test_a_transient_is_cut_off(decay) -> None:
     rng = np.random.default_rng(0)

@@ -22,7 +22,7 @@ _SAMPLES = 8
 #: A part is modulated if its amplitude exceeds this share of the largest amplitude.
 _ON = 0.005
 #: A stretch ends where the amplitude changes by more than this share.
-_SAME = 0.1
+_SAME = 0.02
 #: An amplitude and a change of it count above this multiple of the envelope's scatter.
 _SCATTERS = 6.0
 #: Blocks are made longer until the scatter is below this share of the largest amplitude, as long as
