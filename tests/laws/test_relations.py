@@ -183,8 +183,8 @@ class TestMemoryOfTheLoad:
             expected = -(abs(v) + self.V_star) / self.L * (0.8 - 1.3)
             np.testing.assert_allclose(0.8 * rate, expected, rtol=1e-12)
 
-    def test_small_modulations_reach_the_contacts_through_a_low_pass(self):
-        """To first order W_e = W/(1 + i omega L/(V + V_star)), and F is what it was in W."""
+    def test_the_effective_load_is_a_low_pass_of_small_modulations(self):
+        """To first order W_e = W/(1 + i omega L/(V + V_star)), and F depends on W_e as on W."""
         through = 1 / (1 + 2j * np.pi * FREQUENCIES * self.L / (V + self.V_star))
         expected = linear(RiceRuina(**BASE)).transfer * through
         np.testing.assert_allclose(linear(self.law()).transfer, expected, rtol=1e-10, atol=1e-16)

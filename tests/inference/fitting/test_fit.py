@@ -394,8 +394,8 @@ def test_a_window_of_a_table_is_refused(tmp_path) -> None:
         answer_fit(question)
 
 
-def test_the_rate_dependence_with_a_fixed_B(readings, pmma):
-    """A - B is as uncertain as A, and another minimum may change its sign."""
+def test_with_a_fixed_B_the_rate_dependence_is_as_uncertain_as_A(readings, pmma):
+    """Another minimum may change the sign of A - B."""
     result = fit(readings(3), "elasto-plastic", ("A", "eps_ratio"), material=pmma, starts=1)
     difference, A = result.rate_dependence, result.parameters["A"]
     assert difference.value == pytest.approx(A.value - pmma.B)

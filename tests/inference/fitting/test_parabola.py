@@ -123,7 +123,7 @@ PUBLISHED = {
 
 
 @pytest.mark.parametrize("estimate", PUBLISHED)
-def test_published_intervals(estimate):
+def test_bounded_intervals_are_the_published_ones(estimate):
     intervals = [bounded_interval(estimate, 1.0, c, 0.0, math.inf) for c in (0.6827, 0.9, 0.95)]
     np.testing.assert_allclose(intervals, PUBLISHED[estimate], atol=0.0051)
 

@@ -226,14 +226,6 @@ def test_a_load_that_is_not_positive_is_refused():
         recorded_run(trace_of(time, 0.6 + 0 * time, 1e-6 * time, load), steps=[30.0])
 
 
-def test_too_short_a_recording_is_refused(steps_fit):
-    (term,) = steps_fit.objective.terms
-    run = term.run
-    short = replace(run, time=run.time[:40], friction=run.friction[:40], slip=run.slip[:40])
-    with pytest.raises(InputError, match="must have at least"):
-        fit(short, "rice-ruina", FREE)
-
-
 def test_samples_that_two_recordings_share_are_refused():
     first, second = runs_of(CASE, 2)
     later = replace(

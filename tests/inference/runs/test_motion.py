@@ -141,7 +141,7 @@ def test_the_coefficients_are_of_order_5_and_damp_stiff_modes():
     assert abs(linear[0][0]) < 1e-6
 
 
-def test_a_load_of_hundreds_of_lines_has_room():
+def test_a_load_of_hundreds_of_straight_lines_is_integrated():
     """Some 8 steps follow the evolution of friction after each change of the load."""
     pieces = 300
     edges = np.linspace(0.0, 300.0, pieces + 1)
@@ -158,7 +158,7 @@ def test_a_load_of_hundreds_of_lines_has_room():
     np.testing.assert_allclose(friction, expected, atol=2e-6)
 
 
-def test_a_motion_that_runs_away_is_refused():
+def test_a_motion_that_runs_away_has_no_result():
     drive = Drive(EDGES, PULL, np.ones(4), np.zeros(4))
     # A twentieth of the critical stiffness (B - A)/D0.
     assert recorded_friction(MOTION, {**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None

@@ -77,7 +77,7 @@ def test_the_added_covariance_is_that_of_estimated_coefficients():
     np.testing.assert_allclose(added, expected[:2, :2], rtol=0.03, atol=0.01 * expected[0, 0])
 
 
-def test_degrees_of_freedom_of_a_mean_in_closed_form():
+def test_degrees_of_freedom_of_a_mean_agree_with_their_closed_form():
     # s^2/(n (1 - a)^2), with the variances (1 - a^2)/n of a and 2/n of ln s^2.
     a, n = 0.9, 200_000
     model = Autoregression(np.array([a]), 1 / (1 - a * a))
