@@ -25,8 +25,8 @@ _ONE_MODULE = "--xla_cpu_parallel_codegen_split_count=1"
 if _ONE_MODULE not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_ONE_MODULE}".strip()
 
-# The threads of a BLAS wait for each other actively, on the core of the other process. NumPy reads
-# this variable when it is imported.
+# The threads of a BLAS wait for each other in loops, which takes processor time from the other
+# process. NumPy reads this variable when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Rooms that take longest from an empty compilation cache; they run first.
@@ -38,10 +38,10 @@ LONGEST = (
 #: Rooms that are distributed file by file: the longest, and those that compile nothing.
 BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 
-#: Beginnings of the names of files whose programs, those of processes that they start included, are
-#: compiled with few optimisations, as these take longer than the programs run. Other files run the
-#: optimised programs of users. JAX keeps compiled programs in memory however they were compiled, so
-#: that these files run last: programs of theirs would cost the others several times as long.
+#: Files, by the beginnings of their names, whose programs are compiled with few optimisations, as
+#: optimising them takes longer than running them; processes that they start do the same. The other
+#: files run optimised programs, as users do, and run first: JAX keeps programs in memory, and those
+#: with few optimisations would take them several times as long.
 BRIEF = (
     *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "study/"),
     "papers/bureau2000/",

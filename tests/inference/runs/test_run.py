@@ -74,7 +74,7 @@ def test_corners_of_the_load_are_placed_between_samples(noise):
     ],
 )
 def test_noise_of_a_load_cell_makes_no_corners(corners, levels, noise):
-    """Of 6,000 samples some are 4 standard deviations off, and more from a chord through them."""
+    """The largest of 6,000 samples are 4 standard deviations off, on both sides of the load."""
     drive = run_under(np.array(corners), np.array(levels), noise=noise, rate=20.0, end=300.0).drive
     assert drive.edges.size == len(corners)
 
