@@ -3,9 +3,9 @@
 In a page,
 
 - a ``python`` block runs, in the namespace of the page;
-- a ``text`` block directly after a ``python`` block is what that block prints;
-- a ``console`` block holds commands after ``$ ``, each with its exit code as ``# exit 2`` where
-  that is not 0, and followed by what it prints;
+- a ``text`` block directly after a ``python`` block is the output of that block;
+- a ``console`` block has commands after ``$ ``, each followed by its output; an exit code other than
+  0 is written as ``# exit 2``;
 - a ``code-block`` with a file's name as caption is that file;
 - ``...`` matches anything: as a line any number of lines, at the end of a line the rest of it.
 """
@@ -44,7 +44,7 @@ class Snippet:
 
 @dataclass(frozen=True)
 class Command:
-    """A line of a console block, with what it prints and its exit code."""
+    """A line of a console block, with its output and its exit code."""
 
     arguments: list[str]
     prints: str

@@ -22,7 +22,7 @@ LAW = get_law("rice-ruina")
 
 
 class Formula(LockInTerm):
-    """Residuals that are a function of ln D0, as if of orbits.
+    """Residuals that are a function of ln D0, in place of those of orbits.
 
     `values` gives residuals and their derivatives; above `edge` only the robust method has orbits.
     """

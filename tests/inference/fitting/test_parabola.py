@@ -146,7 +146,7 @@ def test_between_narrow_bounds_the_interval_is_the_whole_range(estimate):
 
 @pytest.mark.parametrize("truth", population([0.3, 0.0, 1.5]))
 def test_bounded_intervals_contain_the_truth_as_often_as_stated(truth):
-    # Estimates at the middles of equal probabilities: the share is exact to two of them.
+    # Estimates at the midpoints of equal probabilities: the share is exact to two estimates.
     count = 200
     estimates = truth + norm.ppf((np.arange(count) + 0.5) / count)
     inside = [

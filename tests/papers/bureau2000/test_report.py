@@ -54,7 +54,7 @@ def claim(key, verdict, **fields):
 VARIED = Sensitivity(
     "A", ("A = 0.008", "A = 0.018"), {"value": (0.1, 0.3)}, ("differs", "reproduced")
 )
-#: Figure of the three laws, which the head of the page shows above the answer.
+#: Figure of the three laws, above the answer on the page.
 LAWS = ("figure-16",)
 WORDS = (
     SummaryWords(
