@@ -4,8 +4,8 @@ In a page,
 
 - a ``python`` block runs, in the namespace of the page;
 - a ``text`` block directly after a ``python`` block is the output of that block;
-- a ``console`` block has commands after ``$ ``, each followed by its output; an exit code other than
-  0 is written as ``# exit 2``;
+- a ``console`` block has commands after ``$ ``, each followed by its output; an exit code that
+  is not 0 is written as ``# exit 2``;
 - a ``code-block`` with a file's name as caption is that file;
 - ``...`` matches anything: as a line any number of lines, at the end of a line the rest of it.
 """
