@@ -1,1 +1,1 @@
-"""Speed and accuracy of the periodic response, against other ways to compute it: `make bench`."""
+"""Speed and accuracy compared with other programs (`make bench`); populations of recordings."""

@@ -1,4 +1,4 @@
-"""Run the benchmark and print its table."""
+"""Speed and accuracy of the periodic response, compared with other integrators: `make bench`."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ LAWS = ("rice-ruina", "elasto-plastic")
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--points", type=int, default=100_000, help="points of the batch")
-    parser.add_argument("--repeats", type=int, default=5, help="the median of so many is shown")
+    parser.add_argument(
+        "--repeats", type=int, default=5, help="repetitions, of which the median is shown"
+    )
     parser.add_argument(
         "--million", type=int, default=1_000_000, help="points of the largest call; 0 for none"
     )
     parser.add_argument("--out", type=Path, help="also write the rows to this JSON file")
-    parser.add_argument("--law", choices=LAWS, help="this one only")
+    parser.add_argument("--law", choices=LAWS, help="only this law")
     return parser.parse_args()
 
 
 def _rows(
     laws: tuple[str, ...], points: int, repeats: int, million: int, cores: set[int]
 ) -> Iterator:
-    # Only now: libraries count the cores when they are imported.
+    # Imported here, as libraries count the cores at import: the process is on one core by now.
     from benchmarks import ours, peers, processes, transient
 
     def at_most(most: int) -> int:
@@ -54,7 +56,7 @@ def _rows(
 
 
 def _ratios(rows: list) -> str:
-    """Per core, the comparisons that the table is made for."""
+    """Ratios of times on one core."""
     time = {row.what: row.microseconds for row in rows}
     lines = []
     for law in LAWS:
@@ -79,7 +81,7 @@ def main() -> None:
     laws = (arguments.law,) if arguments.law else LAWS
     for row in _rows(laws, arguments.points, arguments.repeats, arguments.million, cores):
         if row is None:
-            print("A peer is not installed and left out.", file=sys.stderr)
+            print("A peer is left out, as it is not installed.", file=sys.stderr)
             continue
         print(row.markdown(), file=sys.stderr)
         rows.append(row)

@@ -1,10 +1,10 @@
-"""What each stage of the search is worth: random points solved once more without it.
+"""Ablation of the stages of the search: random points are solved again without each stage.
 
     python -m benchmarks.ablation --law rice-ruina --points 10000 --seed 11
 
-The points are those of `benchmarks.whole_range`. They are solved once with all stages; then, for
-each stage, the points that it gave the outcome of are solved without it. What the stages that are
-left make of them is counted, with the processor time that both took.
+The points are those of `benchmarks.whole_range`. They are solved once with all stages. Then, for
+each stage, the points whose outcome comes from this stage are solved without it. The table counts
+the points that are lost, and has the processor time with and without the stage.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from benchmarks.residual import LAWS, draw, problem_of
 
 #: Points solved at a time.
 _SLICE = 2000
-#: Outcomes that say why the branch from steady sliding has no orbit.
+#: Outcomes that are reasons why the branch from steady sliding has no orbit.
 _ANSWERS = (Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE)
 
 
 class Stage(NamedTuple):
-    """A stage of the search, the points that it may matter to, and the search without it."""
+    """A stage of the search, the points that it concerns, and the search without it."""
 
     name: str
     concerned: Callable[[Solution], np.ndarray]
@@ -112,13 +112,13 @@ def solve(
     return jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts), seconds
 
 
-def _row(stage: Stage, problem: Problem, whole: Solution, most: int) -> str:
+def _row(stage: Stage, problem: Problem, whole: Solution, at_most: int) -> str:
     rows = np.flatnonzero(stage.concerned(whole))
     total = len(rows)
-    rows = np.sort(np.random.default_rng(0).permutation(rows)[:most])
+    rows = np.sort(np.random.default_rng(0).permutation(rows)[:at_most])
     if not len(rows):
         return f"| {stage.name} | 0 | | | | | |"
-    # Both times with the programs compiled.
+    # The first call compiles, so that both times are without compilation.
     with _changed(stage.constant):
         solve(problem, rows, stage.methods)
         without, seconds_without = solve(problem, rows, stage.methods)

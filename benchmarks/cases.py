@@ -1,4 +1,4 @@
-"""The operating points that everybody solves, and the numbers their equations need."""
+"""Operating points that all programs solve, and the parameters of their equations."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Batch:
         return Batch(self.law, self.velocity[rows], self.epsilon[rows])
 
     def slider(self) -> asp.Slider:
-        """The slider as asperity takes it."""
+        """The slider for asperity."""
         paper = asp.materials.load("bureau2000")
         return asp.Slider(paper.law(self.law), spring=paper.K, load=paper.W0, mass=paper.M)
 
     def numbers(self) -> dict[str, np.ndarray]:
-        """Dimensionless numbers of the equations in `benchmarks.equations`, each (points,)."""
+        """Dimensionless parameters of the equations in `benchmarks.equations`, each (points,)."""
         slider = self.slider()
         return dimensionless(slider.law, slider.K / slider.W0, self.velocity, self.epsilon)
 
@@ -49,7 +49,7 @@ class Batch:
 def dimensionless(
     law: asp.laws.Law, stiffness: float, velocity: np.ndarray, epsilon: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Numbers of the equations in `benchmarks.equations` for points (n,) and K/W0 (1/m)."""
+    """Parameters of the equations in `benchmarks.equations` for points (n,) and K/W0 (1/m)."""
     omega = 2 * np.pi * FREQUENCY
     numbers = {
         "mu": law.mu0 - (law.B - law.A) * np.log(velocity / law.V0),
@@ -70,7 +70,7 @@ def batch(law: str, points: int) -> Batch:
 
 
 def stable_batch(law: str, points: int) -> Batch:
-    """The corner of the batch that marching in time can reach.
+    """Points of the batch that marching in time can solve.
 
     With the paper's parameters steady sliding is unstable; modulation stabilises it above
     epsilon = 0.15, and a transient dies out over D0/V.

@@ -1,4 +1,4 @@
-"""Measuring times on a machine that others may be using."""
+"""Measuring times on a machine that may be busy with other work."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def pin_to_one_core() -> bool:
-    """Keep this process on one core, where the system can; before any library starts threads."""
+    """Keep this process on one core if the system can; call it before a library starts threads."""
     if not hasattr(os, "sched_setaffinity"):
         return False
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
@@ -18,10 +18,10 @@ def pin_to_one_core() -> bool:
 
 
 def timed(run: Callable[[], Any], repeats: int, warm_up: bool = True) -> tuple[float, Any]:
-    """Median processor time of `run` and its last result, for what runs on one core.
+    """Median processor time of `run`, which uses one core, and its last result.
 
-    On an idle machine that is the wall time; on a busy one the wall time tells of the others.
-    A first call that compiles and fills caches does not count, if `warm_up`.
+    On an idle machine this is the wall time; on a busy one it excludes the time of other processes.
+    With `warm_up` a first call that compiles and fills caches does not count.
     """
     if warm_up:
         run()

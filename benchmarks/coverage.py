@@ -1,13 +1,13 @@
-"""Coverage of intervals from recordings: how many of them hold the truth.
+"""Coverage of intervals of fits to recordings: the share that contains the true value.
 
 ``python -m benchmarks.coverage [--sets 200] [--case steps|holds|loads] [--residual FILE]``
 
-Recordings are computed by SciPy (LSODA, relative tolerance 1e-11) from the printed equations, and
-get noise as real recordings have it: white, correlated over half a second and over eight, and a
-line. Each is fitted twice: by `asperity.inference.fit`, and by the same fit under white noise of
-the residual's size, which is what least squares and its covariance amount to. The share of 68 and
-95 % intervals that hold the truth is printed for both. With ``--residual`` the noise is that of a
-real recording, velstep1_TR2_exp013_sepiolite.txt.
+Recordings are computed by SciPy (LSODA, relative tolerance 1e-11) from the printed equations, with
+noise like that of real recordings: white, correlated over half a second and over eight, and a line.
+Each is fitted by `asperity.inference.fit` twice, the second time with white noise of the size of
+the residuals, as by least squares with its covariance. The share of 68 and 95 % intervals that
+contain the truth is printed for both. With ``--residual`` the noise is that of a real recording,
+velstep1_TR2_exp013_sepiolite.txt.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from asperity.recording import Channel, Trace
 TRUTH = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "alpha": 0.2}
 #: Stiffness over the load (1/m), and the load (Pa).
 STIFFNESS, LOAD = 4e3, 2e7
-#: Of the residual of a fit to 3 to 10 um/s on basalt (10 and 100 samples a second): an AR(1) and
-#: an AR(3), and what is slower.
+#: Standard deviation of the noise, that of the residual of a fit to 3 to 10 um/s on basalt (10 and
+#: 100 samples a second).
 NOISE = 8e-4
 #: Standard deviation of a load that changes, over the load.
 LOAD_NOISE = 2e-4
-#: Of the recording whose residual is resampled (s).
+#: Window (s) of the recording whose residual is resampled.
 WINDOW = (10000, 10800)
 
 
@@ -52,12 +52,12 @@ class Case:
 
     @property
     def law(self) -> str:
-        """Of the fit: with alpha where the load changes."""
+        """Law of the fit, with alpha if the load changes."""
         return "linker-dieterich" if len(self.loads) > 1 else "rice-ruina"
 
     @property
     def true(self) -> dict[str, float]:
-        """Parameters that are counted, K among them."""
+        """True values of the parameters whose intervals are counted."""
         names = ("A", "B", "D0", *(("alpha",) if len(self.loads) > 1 else ()))
         return {**{n: TRUTH[n] for n in names}, "K": STIFFNESS * LOAD}
 
@@ -107,7 +107,7 @@ def integrated(
     tolerance: float = 1e-11,
     start: tuple[float, float] = (0.0, 0.0),
 ) -> np.ndarray:
-    """F/W of the ageing law at times, from steady sliding and `start` off it, by SciPy.
+    """F/W of the ageing law at times by SciPy; the motion starts in steady sliding plus `start`.
 
     The numbers are mu0, A, B, D0, V0, alpha and k = K/W0. The velocity of the drive is constant
     between the edges (s), and W/W0 is `load` of the time.
@@ -149,13 +149,13 @@ def trace_of(
 
 
 def wander(white: np.ndarray, start: float, steps: float) -> np.ndarray:
-    """Noise of unit variance with a correlation of so many steps, from white noise."""
+    """Noise of unit variance with a correlation over `steps` samples, from white noise."""
     a = np.exp(-1 / steps)
     return np.asarray(lfilter([1.0], [1.0, -a], white * np.sqrt(1 - a * a), zi=[a * start])[0])
 
 
 def coloured(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
-    """Noise with the correlation of real gauges: white, correlated over 1 s and 10 s, a line."""
+    """Noise like that of real gauges: white, correlated over 0.5 s and 8 s, and a line."""
     white = random.normal(size=n)
     t = np.arange(n) / rate
     line = np.sqrt(2) * np.cos(2 * np.pi * (1.37 * t + random.random()))
@@ -167,21 +167,21 @@ def coloured(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
 
 
 def resampled(path: Path) -> Callable[[np.random.Generator, int, float], np.ndarray]:
-    """Noise with the spectrum of what a fit leaves of a real recording, sample for sample.
+    """Noise with the spectrum of the residual of a fit to a real recording, at its sampling rate.
 
-    The phases of the whole residual are drawn anew, and a stretch of it is taken; it has the size
-    of the other noise.
+    The phases of the whole residual are random, and a part of the noise is taken, scaled to the
+    standard deviation `NOISE`.
     """
     run = recorded_run(path, window=WINDOW)
-    found = fit(run, "rice-ruina", ["A", "B", "D0"], starts=16)
-    left = run.friction - found.objective.terms[0].fitted_friction(found.values)
-    size = np.abs(np.fft.rfft(left - left.mean()))
+    result = fit(run, "rice-ruina", ["A", "B", "D0"], starts=16)
+    residual = run.friction - result.objective.terms[0].fitted_friction(result.values)
+    amplitudes = np.abs(np.fft.rfft(residual - residual.mean()))
 
     def noise(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
-        phases = np.exp(2j * np.pi * random.random(size.size))
-        whole = np.fft.irfft(size * phases, left.size)
-        first = random.integers(0, left.size - n + 1)
-        return NOISE * whole[first : first + n] / left.std()
+        phases = np.exp(2j * np.pi * random.random(amplitudes.size))
+        whole = np.fft.irfft(amplitudes * phases, residual.size)
+        first = random.integers(0, residual.size - n + 1)
+        return NOISE * whole[first : first + n] / residual.std()
 
     return noise
 
@@ -192,14 +192,14 @@ def runs_of(
     seed: int = 0,
     noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
 ) -> Iterator[RecordedRun]:
-    """Recordings of one truth with different noise."""
+    """Recordings of one motion with different noise."""
     time = np.arange(int(case.end * case.rate)) / case.rate
     clean = friction(case, time)
-    path = case.slip(time)
+    slip = case.slip(time)
     for k in range(sets):
         random = np.random.default_rng([seed, k])
         noisy = clean + (noise or coloured)(random, time.size, case.rate)
-        displacement = path + 2e-8 * random.normal(size=time.size)
+        displacement = slip + 2e-8 * random.normal(size=time.size)
         load = LOAD * case.load(time)
         if len(case.loads) > 1:
             load += LOAD_NOISE * LOAD * random.normal(size=time.size)
@@ -212,15 +212,15 @@ TRUE = CASES["steps"].true
 def covered(
     runs: Iterable[RecordedRun], case: Case, options: RunOptions | None = None, starts: int = 4
 ) -> dict[str, Any]:
-    """Shares of intervals that hold the truth, by parameter, with means of their widths."""
+    """Shares of intervals that contain the truth, and means of their widths, by parameter."""
     true = case.true
     inside = {n: np.zeros(2) for n in true}
     widths: dict[str, list[float]] = {n: [] for n in true}
-    off: dict[str, list[float]] = {n: [] for n in true}
+    errors: dict[str, list[float]] = {n: [] for n in true}
     failed, noise_rejected, done = 0, 0, 0
     begun = clock.perf_counter()
     for run in runs:
-        found = fit(
+        result = fit(
             run,
             case.law,
             [n for n in true if n != "K"],
@@ -228,19 +228,19 @@ def covered(
             runs=options,
             starts=starts,
         )
-        if not found.converged:
+        if not result.converged:
             failed += 1
             continue
         done += 1
-        noise_rejected += any("noise" in w for w in found.warnings)
+        noise_rejected += any("noise" in w for w in result.warnings)
         for n, truth in true.items():
-            p = found.parameters[n]
+            p = result.parameters[n]
             inside[n] += [
                 p.interval_68[0] <= truth <= p.interval_68[1],
                 p.interval_95[0] <= truth <= p.interval_95[1],
             ]
             widths[n].append(p.se / truth)
-            off[n].append(p.value / truth - 1)
+            errors[n].append(p.value / truth - 1)
     return {
         "sets": done,
         "failed": failed,
@@ -251,8 +251,8 @@ def covered(
                 "cover_68": inside[n][0] / max(done, 1),
                 "cover_95": inside[n][1] / max(done, 1),
                 "mean_se": float(np.mean(widths[n])),
-                "scatter": float(np.std(off[n])),
-                "bias": float(np.mean(off[n])),
+                "scatter": float(np.std(errors[n])),
+                "bias": float(np.mean(errors[n])),
             }
             for n in true
         },

@@ -1,12 +1,12 @@
-"""Derivatives of every law with and without damping and inertia, held against differences.
+"""Derivatives of every law with and without damping and inertia, compared with differences.
 
     python -m benchmarks.derivatives --method fast
     python -m benchmarks.derivatives --method robust --law rice-ruina --law elasto-plastic
 
-Of each law and equation of motion four points, all parameters: mean, two harmonics, and with the
-robust method the multipliers. "fast" solves within the compiled program; "robust" asks for
-multipliers, which with inertia or damping the search alone gives, and without them for slow
-modulation. Differences are Richardson's extrapolation of central ones over 0.2 % and 0.1 %.
+Each law and equation of motion is differentiated at four points by all parameters: mean, two
+harmonics, and with the robust method the multipliers. "fast" solves within the compiled program.
+"robust" uses the search: for multipliers with inertia or damping, and under slow modulation without
+them. Differences are Richardson's extrapolation of central ones over 0.2 % and 0.1 %.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ def columns(values: ResponseValues) -> np.ndarray:
 
 
 def worst_difference(model: ResponseFunction, parameters: dict[str, Any]) -> tuple[int, float]:
-    """Points that converged, and the largest error of a derivative by a logarithm.
+    """Number of converged points, and the largest error of a derivative by a logarithm.
 
-    Relative to the largest of all parameters' derivatives of the same output at the same point.
+    Errors are relative to the largest derivative of the same output at the same point.
     """
     values, jacobian = model.value_and_jacobian(parameters)
     names = [n for n in model.parameters if n not in model.equations.optional]
@@ -82,9 +82,9 @@ def main() -> None:
             model = asp.response_function(
                 law, multipliers=not fast, search=not fast, **MOTIONS[motion]
             )
-            own = {name: LAW[name] for name in law_parameters(get_law(law))}
+            numbers = {name: LAW[name] for name in law_parameters(get_law(law))}
             frequency = FREQUENCY[arguments.method] if motion == "quasi-static" else 120.0
-            parameters = own | MACHINE | DRIVE | {"frequency": frequency}
+            parameters = numbers | MACHINE | DRIVE | {"frequency": frequency}
             given = {n: v for n, v in parameters.items() if n in model.parameters}
             converged, error = worst_difference(model, given)
             seconds = time.process_time() - begun

@@ -1,6 +1,6 @@
 """Peer: marching in time with diffrax's Tsit5 in log variables, all points at once.
 
-From the averaged limit, for the reason given in `scipy_marching`.
+Marching starts from the averaged limit, for the reason given in `scipy_marching`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Marching:
         self.period = jax.jit(jax.vmap(_period))
 
     def solve(self, batch: Batch, most_periods: int = _MOST_PERIODS) -> Answer:
-        """March until the last point repeats itself, or for so many periods."""
+        """March until all points are periodic, or for `most_periods`."""
         numbers = {k: np.array(v) for k, v in batch.numbers().items()}
         z0, chi = averaged_limit(numbers)
         state = np.stack([np.zeros_like(chi), chi], axis=-1)
@@ -57,7 +57,7 @@ def _period(state, numbers: dict, z0):
         2 * np.pi,
         None,
         state,
-        # Dense output is of lower order than the steps: stop at the samples instead.
+        # Steps end at the samples, as dense output has a lower order than the steps.
         saveat=diffrax.SaveAt(ts=theta),
         stepsize_controller=diffrax.ClipStepSizeController(
             diffrax.PIDController(rtol=1e-10, atol=1e-12), step_ts=theta[1:-1]

@@ -1,13 +1,13 @@
-"""Fits to recordings with defects: how many answers are right, flagged, or wrong without a word.
+"""Fits to recordings with defects: how many answers are right, flagged, or wrong without a warning.
 
     python -m benchmarks.dirty_recordings [--sets 50] [--kind spikes] [--out rows.jsonl]
     python -m benchmarks.dirty_recordings --kind jump --without jumps
 
 The recordings are those of `benchmarks.coverage` with one kind of defect each, of a size drawn over
-a decade or more. An answer is wrong where a parameter is more than four standard errors off the
-truth, and flagged where the fit warns of anything, or refuses. ``--without`` leaves out one step of
-the cleaning, ``--rate`` samples faster: recordings of more than 20,000 samples are averaged, and
-lines are removed from those alone.
+a decade or more. An answer is wrong if a parameter is more than four standard errors from the
+truth, and flagged if the fit has a warning. ``--without`` leaves out one step of the cleaning.
+``--rate`` samples faster: recordings of more than 20,000 samples are averaged, and lines are
+subtracted only from these.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from benchmarks.coverage import (
 )
 
 Float = np.ndarray
-#: Standard errors off the truth from which on an answer is wrong.
+#: An answer is wrong if it is more than this many standard errors from the truth.
 WRONG = 4.0
 
 
@@ -85,7 +85,7 @@ def line(random: np.random.Generator, case: Case, time: Float, x: Float) -> Floa
 
 
 def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
-    """Friction at the end of its range, above or below, for 5 to 50 % of its height."""
+    """Friction clipped at one end of its range, by 5 to 50 % of the range."""
     low, high = x.min(), x.max()
     share = random.uniform(0.05, 0.5) * (high - low)
     return (
@@ -94,11 +94,11 @@ def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> F
 
 
 def slow(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
-    """Noise of half its size besides, with a correlation of 10 to 300 samples."""
+    """More noise, of half the size, correlated over 10 to 300 samples."""
     steps = np.exp(random.uniform(np.log(10), np.log(300)))
-    # It has forgotten its start after 2,000 samples.
-    begun = wander(random.normal(size=x.size + 2000), 0.0, steps)
-    return np.asarray(x + 0.5 * NOISE * begun[2000:])
+    # The noise does not depend on its start after 2,000 samples.
+    noise = wander(random.normal(size=x.size + 2000), 0.0, steps)
+    return np.asarray(x + 0.5 * NOISE * noise[2000:])
 
 
 def heavy(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
@@ -107,7 +107,7 @@ def heavy(random: np.random.Generator, case: Case, time: Float, x: Float) -> Flo
 
 
 def burst(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
-    """Noise three to ten times as large in 2 to 10 % of the recording."""
+    """Three to ten times the noise in 2 to 10 % of the recording."""
     n = int(random.uniform(0.02, 0.1) * x.size)
     at = random.integers(0, x.size - n)
     x[at : at + n] += random.uniform(3, 10) * NOISE * random.normal(size=n)
@@ -115,7 +115,7 @@ def burst(random: np.random.Generator, case: Case, time: Float, x: Float) -> Flo
 
 
 def missing(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
-    """Up to five stretches of 1 to 30 samples that are no numbers."""
+    """Up to five stretches of 1 to 30 samples without a number."""
     for _ in range(random.integers(1, 6)):
         at = random.integers(20, x.size - 50)
         x[at : at + random.integers(1, 31)] = np.nan
@@ -158,7 +158,7 @@ def dirty_trace(kind: str, case: Case, exact: Float, seed: int) -> Trace:
 
 
 def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[str, Any]:
-    """What a fit to one recording says."""
+    """Result of a fit to one recording."""
     row: dict[str, Any] = {"kind": kind, "case": name, "seed": seed}
     true = case.true
     begun = clock.process_time()
@@ -172,12 +172,12 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
     if not result.converged:
         return {**row, "refused": "not converged"}
     parameters = {n: result.parameters[n] for n in true}
-    away = {}
+    distances = {}
     for n, p in parameters.items():
         low, high = p.interval_95
         side = (high - p.value if true[n] > p.value else p.value - low) / 1.96
-        away[n] = float((p.value - true[n]) / max(side, 1e-300))
-    row["away"] = away
+        distances[n] = float((p.value - true[n]) / max(side, 1e-300))
+    row["distances"] = distances
     row["covered"] = {
         n: bool(p.interval_95[0] <= true[n] <= p.interval_95[1]) for n, p in parameters.items()
     }
@@ -187,7 +187,7 @@ def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[st
     return row
 
 
-#: Steps of the cleaning that ``--without`` leaves out: where each is called, and what replaces it.
+#: Steps of the cleaning that ``--without`` leaves out: module, function, and its replacement.
 STEPS: dict[str, tuple[Any, str, Any]] = {
     "spikes": (cleaning, "spikes", lambda values: np.empty(0, np.intp)),
     "jumps": (cleaning, "find_jumps", lambda values, stretches: []),
@@ -201,7 +201,7 @@ def line_of(kind: str, rows: list[dict[str, Any]]) -> str:
     refused = sum("refused" in r for r in rows)
     done = [r for r in rows if "refused" not in r]
     flagged = [bool(r["warnings"]) for r in done]
-    wrong = [max(map(abs, r["away"].values())) > WRONG for r in done]
+    wrong = [max(map(abs, r["distances"].values())) > WRONG for r in done]
     silent = sum(w and not f for w, f in zip(wrong, flagged, strict=True))
     ok = [r for r, f in zip(done, flagged, strict=True) if not f]
 
@@ -228,10 +228,10 @@ def main() -> None:
     names = chosen.case or list(CASES)
     cases = {name: replace(CASES[name], rate=chosen.rate) for name in names}
     if chosen.without:
-        room, function, nothing = STEPS[chosen.without]
-        setattr(room, function, nothing)
+        module, function, replacement = STEPS[chosen.without]
+        setattr(module, function, replacement)
     exact = {n: friction(c, np.arange(int(c.end * c.rate)) / c.rate) for n, c in cases.items()}
-    columns = ("kind", "recordings", "refused", "flagged", "wrong", "wrong, no word")
+    columns = ("kind", "recordings", "refused", "flagged", "wrong", "wrong, no warning")
     columns += ("95 %", "of those ok", "SE, %")
     print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     for kind in chosen.kind or list(KINDS):

@@ -2,9 +2,9 @@
 
     python -m benchmarks.emcee_coverage [--sets 100] [--steps 300]
 
-This is what published programs sample: the density of asperity with white noise of the residual's
-size, by 32 walkers about its mode. Shares of central intervals of 68 and 95 % that hold the truth
-are printed for velocity steps, which `python -m benchmarks.coverage` fits too.
+Published programs sample this posterior: that of asperity with white noise of the size of the
+residuals, here by 32 walkers that start at its mode. The shares of central 68 and 95 % intervals
+that contain the truth are printed for velocity steps, which `benchmarks.coverage` fits too.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ def main() -> None:
     program = jax.jit(lambda density, z, data: density(z, data), static_argnums=0)
     for k, run in enumerate(runs_of(CASES["steps"], chosen.sets)):
         options = RunOptions(order=0)
-        found = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=4, runs=options)
-        whitened = Whitened.of(found)
+        result = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=4, runs=options)
+        whitened = Whitened.of(result)
         density, data = whitened.compiled()
         random = np.random.default_rng(k)
         sampler = emcee.EnsembleSampler(
             WALKERS,
-            len(found.values),
+            len(result.values),
             lambda z, density=density, data=data: float(
                 np.nan_to_num(program(density, z, data), nan=-np.inf)
             ),
         )
         # The whitened posterior has unit variance about its mode.
-        sampler.run_mcmc(random.normal(size=(WALKERS, len(found.values))), chosen.steps)
+        sampler.run_mcmc(random.normal(size=(WALKERS, len(result.values))), chosen.steps)
         u = whitened.u_of(sampler.get_chain(discard=chosen.steps // 3, flat=True))
-        for i, unknown in enumerate(found.objective.unknowns):
+        for i, unknown in enumerate(result.objective.unknowns):
             if unknown.name in TRUE:
                 low, high, lowest, highest = np.quantile(unknown.to_value(u[:, i]), ENDS)
                 truth = TRUE[unknown.name]

@@ -1,4 +1,4 @@
-"""The published equations, written for the peers and sharing nothing with the package.
+"""The published equations for the other programs, independent of the package.
 
 Rice-Ruina friction with elastic asperities, Eqs. (1), (2) and (26)-(29) of Bureau et al. (2000), in
 theta = omega t, with w = 1 + eps cos(theta). The spring and the asperities together are
@@ -20,12 +20,12 @@ import numpy as np
 
 
 class Answer(NamedTuple):
-    """What is compared; points along the last axis, NaN where a method does not yield it."""
+    """Numbers that are compared; points along the last axis, NaN if a method does not give them."""
 
     mean: np.ndarray
     mu1: np.ndarray
     mu2: np.ndarray
-    multipliers: np.ndarray  # (2, points), by falling modulus
+    multipliers: np.ndarray  # (2, points), by decreasing modulus
 
 
 def force(numbers: dict, z: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def averaged_limit(numbers: dict, nodes: int = 24, steps: int = 6) -> tuple[np.n
 
 
 def multipliers_of(monodromy: np.ndarray) -> np.ndarray:
-    """Eigenvalues of (points, 2, 2), shape (2, points), by falling modulus."""
+    """Eigenvalues of (points, 2, 2), shape (2, points), by decreasing modulus."""
     values = np.linalg.eigvals(monodromy).astype(complex)
     order = np.argsort(-np.abs(values), axis=1, kind="stable")
     return np.take_along_axis(values, order, 1).T

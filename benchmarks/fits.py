@@ -1,19 +1,19 @@
-"""Fits and posteriors of one lock-in table, beside what is at hand elsewhere.
+"""Fits and posteriors of one lock-in table, compared with other programs.
 
     python -m benchmarks.fits [--rows 60] [--draws 1000] [--without-scipy]
 
 A table of mean, mu1 and mu2 by the elasto-plastic law with the parameters of Bureau et al. (2000),
 computed by SciPy's integration of the published equations, with 1 % noise; free are A, B, D0,
-lambda and eps_ratio, with a prior of D0. Rows of the answer:
+lambda and eps_ratio, with a prior of D0. Besides asperity, the rows are:
 
-- SciPy's `least_squares` with differences over that integration, from 10 % off the truth, which
-  asperity is not told;
-- emcee and numpyro with the response of asperity, as their own models would take hours; they are
-  left out where they are not installed.
+- SciPy's `least_squares` with differences over that integration, started 10 % from the truth;
+  asperity has no start;
+- emcee and numpyro with the response of asperity, as with SciPy's integration they would take
+  hours; they are left out if they are not installed.
 
 "Off" is the largest distance from the parameters of asperity's fit, or from the means of its
-posterior, in standard errors. The effective draws are the smallest of bulk and tail. Times are
-those of a clock on the wall, to be taken on an idle machine; samplers compile within theirs.
+posterior, in standard errors. The effective draws are the smaller number of bulk and tail. Times
+are wall times, to be measured on an idle machine; those of samplers include compilation.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LAW = "elasto-plastic"
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 6.2e-7, "eps_ratio": 0.5}
 FIXED = {"mu0": 0.5, "V0": 1e-6, "K": 2e5, "W0": 7.0}
 NOISE = 0.01
-#: Far above D0 the likelihood is flat, where samplers that know no bounds get lost.
+#: Far above D0 the likelihood is flat, so that samplers without bounds need a prior.
 PRIOR = {"D0": Prior(mean=4e-7, sd=2e-7, source="benchmark")}
 COLUMNS = ("mean_friction", "mu1", "mu2")
 
@@ -77,12 +77,12 @@ def scipy_fit(inputs: dict, readings: np.ndarray, errors: np.ndarray) -> dict[st
         return np.concatenate([((integrated(inputs, free) - readings) / errors).ravel(), gaps])
 
     start = np.log(list(TRUTH.values())) + 0.1
-    found = least_squares(residuals, start, diff_step=1e-5, method="lm")
-    return dict(zip(TRUTH, np.exp(found.x), strict=True))
+    minimum = least_squares(residuals, start, diff_step=1e-5, method="lm")
+    return dict(zip(TRUTH, np.exp(minimum.x), strict=True))
 
 
 def log_density(inputs: dict, readings: np.ndarray, errors: np.ndarray) -> Callable[[Any], Any]:
-    """Of the posterior by the logarithms of the parameters, with asperity's response."""
+    """Log density of the posterior in the logarithms of parameters, with asperity's response."""
     response = asp.response_function(LAW, search=False)
 
     def density(u: Any) -> Any:
@@ -99,19 +99,19 @@ def log_density(inputs: dict, readings: np.ndarray, errors: np.ndarray) -> Calla
         )
         total = -0.5 * (gap**2).sum((0, -1))
         for name, prior in PRIOR.items():
-            # Flat in the logarithm, but for parameters with a prior, which is one of the parameter.
+            # Flat in the logarithm, except for parameters with a prior, which is normal in them.
             total += jnp.log(free[name]) - 0.5 * ((free[name] - prior.mean) / prior.sd) ** 2
         return jnp.where(jnp.isfinite(total), total, -jnp.inf)
 
     return density
 
 
-def emcee_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
-    """Draws of 32 walkers about the fit, half as many again before them; (walkers, draws, n)."""
+def emcee_draws(density: Callable, result: Fit, draws: int) -> np.ndarray:
+    """Draws of 32 walkers around the fit, after half as many to warm up; (walkers, draws, n)."""
     emcee = importlib.import_module("emcee")
     rng = np.random.default_rng(1)
-    centre = np.log([found.parameters[name].value for name in TRUTH])
-    spread = [found.parameters[name].se / found.parameters[name].value for name in TRUTH]
+    centre = np.log([result.parameters[name].value for name in TRUTH])
+    spread = [result.parameters[name].se / result.parameters[name].value for name in TRUTH]
     start = centre + 0.5 * np.array(spread) * rng.normal(size=(32, len(TRUTH)))
     compiled = jax.jit(density)
     sampler = emcee.EnsembleSampler(
@@ -121,10 +121,10 @@ def emcee_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
     return np.exp(np.moveaxis(sampler.get_chain(discard=draws // 2), 0, 1))
 
 
-def numpyro_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
-    """Draws of four chains from the fit, half as many again before them; (4, draws, n)."""
+def numpyro_draws(density: Callable, result: Fit, draws: int) -> np.ndarray:
+    """Draws of four chains from the fit, after half as many to warm up; (4, draws, n)."""
     infer = importlib.import_module("numpyro.infer")
-    centre = np.log([found.parameters[name].value for name in TRUTH])
+    centre = np.log([result.parameters[name].value for name in TRUTH])
     sampler = infer.NUTS(potential_fn=lambda u: -density(u), dense_mass=True)
     chains = infer.MCMC(
         sampler,
@@ -138,14 +138,14 @@ def numpyro_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
     return np.exp(np.asarray(chains.get_samples(group_by_chain=True)))
 
 
-def asperity_draws(found: Fit, names: Iterable[str], draws: int, **options: Any) -> np.ndarray:
+def asperity_draws(result: Fit, names: Iterable[str], draws: int, **options: Any) -> np.ndarray:
     """Draws of four chains by asperity; (4, draws, n)."""
-    posterior = sample_posterior(found, chains=4, draws=draws, **options)
+    posterior = sample_posterior(result, chains=4, draws=draws, **options)
     return np.stack([posterior.draws[name] for name in names], axis=-1)
 
 
 def effective(draws: np.ndarray) -> float:
-    """Smallest effective sample size of bulk and tail, of (chains, draws, n)."""
+    """Smallest effective sample size of bulk and tail over parameters; draws (chains, draws, n)."""
     ess = importlib.import_module("arviz_stats.base").array_stats.ess
     methods = {"bulk": {}, "tail": {"prob": (0.05, 0.95)}}
     return float(
@@ -158,19 +158,19 @@ def effective(draws: np.ndarray) -> float:
 
 
 def timed(run: Callable[[], Any]) -> tuple[float, Any]:
-    """Time and result; chains of asperity run in a process of their own."""
+    """Wall time and result: chains of asperity run in other processes."""
     began = time.perf_counter()
     result = run()
     return time.perf_counter() - began, result
 
 
-def off(values: dict[str, float], found: Fit) -> float:
+def off(values: dict[str, float], result: Fit) -> float:
     """Largest distance from the fit in standard errors."""
-    return max(abs(values[n] - p.value) / p.se for n, p in found.parameters.items() if n in values)
+    return max(abs(values[n] - p.value) / p.se for n, p in result.parameters.items() if n in values)
 
 
 def print_samplers(
-    samplers: dict[str, Callable[[], np.ndarray]], found: Fit, names: Iterable[str]
+    samplers: dict[str, Callable[[], np.ndarray]], result: Fit, names: Iterable[str]
 ) -> None:
     """Print a row of the table for each sampler, whose draws have the shape (chains, draws, n)."""
     reference = None
@@ -183,7 +183,7 @@ def print_samplers(
         means = draws.mean((0, 1))
         reference = means if reference is None else reference
         gap = max(
-            abs(m - r) / found.parameters[n].se
+            abs(m - r) / result.parameters[n].se
             for n, m, r in zip(names, means, reference, strict=True)
         )
         count = effective(draws)
@@ -212,19 +212,19 @@ def main() -> None:
         return fit(table, LAW, list(TRUTH), fixed=FIXED, prior=PRIOR)
 
     first, _ = timed(fitted)
-    seconds, found = timed(fitted)
+    seconds, result = timed(fitted)
     print(f"| asperity fit (the first {first:.1f} s) | {seconds:.2f} | 0 | | |", flush=True)
     if not chosen.without_scipy:
         seconds, values = timed(lambda: scipy_fit(*data))
         name = "SciPy least_squares, differences"
-        print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
+        print(f"| {name} | {seconds:.0f} | {off(values, result):.0e} | | |", flush=True)
     density = log_density(*data)
     samplers: dict[str, Callable[[], np.ndarray]] = {
-        "asperity posterior": lambda: asperity_draws(found, TRUTH, chosen.draws, jobs=1),
-        "numpyro, same density": lambda: numpyro_draws(density, found, chosen.draws),
-        "emcee, same density": lambda: emcee_draws(density, found, chosen.draws),
+        "asperity posterior": lambda: asperity_draws(result, TRUTH, chosen.draws, jobs=1),
+        "numpyro, same density": lambda: numpyro_draws(density, result, chosen.draws),
+        "emcee, same density": lambda: emcee_draws(density, result, chosen.draws),
     }
-    print_samplers(samplers, found, TRUTH)
+    print_samplers(samplers, result, TRUTH)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Peer: heyoka, Taylor integration in SIMD batches with variational equations, and shooting.
+"""Peer: shooting with heyoka, Taylor integration in SIMD batches with variational equations.
 
-As fast as we could make it: the equations in a form with few products (see `equations`), compiled
-once, compact mode off, one point a SIMD lane, points of like epsilon in a batch, a first Newton
-step at a loose tolerance, harmonics from the dense output of the last period.
+Everything known to us that makes heyoka fast is used: equations with few products (see
+`equations`), one compilation, no compact mode, one point in a SIMD lane, points of similar epsilon
+in a batch, a first Newton step at a loose tolerance, and harmonics from the dense output of the
+last period.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ TOLERANCE = 1e-10
 _LOOSE = 1e-6
 _SAMPLES = 32
 _NUMBERS = ("mu", "A", "B", "kappa", "ratio", "ageing", "epsilon")
-#: Two vectors at a time hide the latency of the arithmetic.
+#: Vectors integrated together, which hides the latency of the arithmetic.
 _VECTORS = 2
 
 
@@ -42,7 +43,7 @@ def _integrator(tolerance: float, lanes: int):
 
 
 class Shooting:
-    """Compiled integrators, to be used on any number of points."""
+    """Compiled integrators for any number of points."""
 
     def __init__(self) -> None:
         import heyoka as hy
@@ -54,7 +55,7 @@ class Shooting:
         self.grid = np.repeat(theta[:, None], self.lanes, axis=1)
 
     def solve(self, batch: Batch) -> Answer:
-        """Solve all points; the last vector is filled up with copies."""
+        """Solve all points; copies of points fill up the last vector."""
         order = np.argsort(batch.epsilon)
         filled = np.resize(order, -(-len(batch) // self.lanes) * self.lanes)
         numbers = {k: v[filled] for k, v in batch.numbers().items()}
@@ -68,9 +69,9 @@ class Shooting:
         last = np.concatenate([run[-1, 2:] for run in runs], axis=1)
         w = 1 + numbers["epsilon"] * np.cos(self.grid[:-1, :1])
         rest = force_rest(numbers, z0, y, w)
-        found = read(z0 / (1 + numbers["ratio"]), rest, last.T.reshape(-1, 2, 2))
+        answer = read(z0 / (1 + numbers["ratio"]), rest, last.T.reshape(-1, 2, 2))
         back = np.argsort(order)
-        return Answer(*(a[..., : len(batch)][..., back] for a in found))
+        return Answer(*(a[..., : len(batch)][..., back] for a in answer))
 
     def _shoot(self, values: np.ndarray, chi: np.ndarray) -> np.ndarray:
         start = np.array([np.zeros_like(chi), chi])
@@ -81,7 +82,7 @@ class Shooting:
             self._set(self.fine, values, start)
             path = self.fine.propagate_grid(self.grid)[-1]
             step = _newton(start, path[-1])
-            # Relative to the mean force, and of the exponent of the slip rate.
+            # Changes of the force over W0, and of the exponent of the slip rate.
             if np.abs(values[3] * step[0]).max() < 1e-11 and np.abs(step[1]).max() < 1e-8:
                 break
             start = start + step

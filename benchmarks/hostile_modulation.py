@@ -1,11 +1,11 @@
-"""Recordings of a modulated load with faults of laboratories: answers that are wrong and ok.
+"""Recordings of a modulated load with the faults of laboratories: wrong numbers with verdict ok.
 
     python -m benchmarks.hostile_modulation [--recordings 500] [--seed 0]
 
 A recording has 25 to 1,500 periods of 0.5 to 200 Hz, 12 to 200 samples a period, an amplitude of 1
 to 60 % of the load, noise in both channels, drawn over decades, and up to three of the faults of
-`FAULTS`. What is read is compared with what was planted, in standard uncertainties; harmonics that
-drift are compared with their mean over the window. A clean recording has no fault.
+`FAULTS`. Measured numbers are compared with the planted ones, in standard uncertainties; harmonics
+that drift are compared with their mean over the window. A clean recording has no fault.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from asperity.errors import InputError
 from asperity.recording import Channel, Trace
 
 Float = np.ndarray
-#: Standard uncertainties from which on a number is wrong. Student's t exceeds them once in 1,400
-#: numbers with 12 degrees of freedom, as of a mean, and once in 17,000 with 40, as of a harmonic.
+#: A number is wrong if it is more than this many standard uncertainties off. Student's t exceeds
+#: this once in 1,400 numbers with 12 degrees of freedom (a mean), in 17,000 with 40 (a harmonic).
 WRONG = 4.5
 W0 = 7.0
 MOST_SAMPLES = 200_000
@@ -35,10 +35,11 @@ def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
 
 @dataclass
 class Recording:
-    """Numbers that are planted, and what is added to them.
+    """Planted numbers, and the signals that are added to the load and the force.
 
     Times are from the beginning of the modulation; `share` is the time over its length. Load and
-    force are over W0.
+    force are over W0. The modulation is multiplied by `swell` and its phase shifted by `turn`; the
+    response of friction is also multiplied by `change`. `without` names numbers not to compare.
     """
 
     random: np.random.Generator
@@ -92,7 +93,7 @@ class Recording:
         return log_uniform(self.random, low, high) * self.random.normal(size=self.time.size)
 
     def some(self, least: float, most: float) -> slice:
-        """A stretch of the recording of this share."""
+        """A random part of the recording of a share between two bounds."""
         first = int(self.random.uniform(0.1, 0.8) * self.time.size)
         return slice(first, first + 3 + int(self.random.uniform(least, most) * self.time.size))
 
@@ -105,11 +106,11 @@ class Recording:
         phi = 2 * np.pi * self.frequency * self.time + r.uniform(0, 6.28) + self.turn
         wave = np.cos(phi) + r.uniform(0, 2e-3) * np.cos(2 * phi + r.uniform(0, 6.28))
         self.load += 1 + self.epsilon * self.swell * wave
-        own = mu1 * np.exp(1j * phi) + mu2 * np.exp(2j * phi)
+        response = mu1 * np.exp(1j * phi) + mu2 * np.exp(2j * phi)
         since = np.clip(np.stack([self.time, self.time - self.length]), 0, None) / self.decay
         settled = np.where(u <= 1, -np.expm1(-since[0]), np.exp(-since[1]))
         level = self.mean - self.drop * np.where(u < 0, 0.0, settled)
-        self.force += level + self.swell * self.change * own.real
+        self.force += level + self.swell * self.change * response.real
         self.load += self.noise[0] * r.normal(size=u.size)
         self.force += self.noise[1] * r.normal(size=u.size)
         for name in RECORDERS:
@@ -120,7 +121,7 @@ class Recording:
         return self.time[kept] - start, W0 * self.load[kept], W0 * self.force[kept]
 
     def planted(self, start: float, end: float) -> dict[str, complex]:
-        """What a window of times from the beginning of the recording should read."""
+        """Numbers that a measurement of a window (s from the first sample) should give."""
         inside = (self.time - self.time[0] >= start) & (self.time - self.time[0] <= end)
         swell = self.swell[inside].mean()
         response = (self.swell * self.change)[inside].mean()
@@ -261,7 +262,7 @@ def _missing(x: Recording) -> None:
     x.force[x.some(0.001, 0.1)] = np.nan
 
 
-#: Faults of the motion, and of what records it, in the order in which they act.
+#: Faults of the motion and of the recorder, in the order in which they act.
 MOTIONS: dict[str, Callable[[Recording], None]] = {
     "mains": _mains,
     "drift": _drift,
@@ -315,37 +316,37 @@ def drawn(seed: int) -> Recording:
 
 
 def judged(seed: int) -> dict:
-    """Verdict of a recording, and errors of what was read in standard uncertainties."""
+    """Verdict of a recording, and errors of measured numbers in standard uncertainties."""
     recording = drawn(seed)
-    row = {"seed": seed, "faults": recording.faults, "verdict": "refused", "off": {}}
+    row = {"seed": seed, "faults": recording.faults, "verdict": "refused", "errors": {}}
     time, load, force = recording.arrays()
     channels = {"W": Channel(load, "force", "N", "W"), "F": Channel(force, "force", "N", "F")}
     try:
-        found = asp.measure(Trace(time, channels), modulated=True)
+        measurement = asp.measure(Trace(time, channels), modulated=True)
     except InputError:
         return row
-    reading = found.reading
-    off = {}
+    reading = measurement.reading
+    errors = {}
     for name, value in recording.planted(reading.start, reading.end).items():
         if name in ("mu1", "mu2"):
             phasor = reading.phasor(int(name[2]))
-            off[name] = (phasor.amplitude - abs(value)) / phasor.amplitude_uncertainty
+            errors[name] = (phasor.amplitude - abs(value)) / phasor.amplitude_uncertainty
             # The phase of a small amplitude has no normal error.
             if phasor.amplitude > 6 * phasor.amplitude_uncertainty:
-                turned = np.angle(phasor.value / value)
-                off[f"phase{name[2]}"] = turned / phasor.phase_uncertainty
+                difference = np.angle(phasor.value / value)
+                errors[f"phase{name[2]}"] = difference / phasor.phase_uncertainty
         elif name == "delta_mu":
-            off[name] = (found.delta_mu - value) / found.delta_mu_uncertainty
+            errors[name] = (measurement.delta_mu - value) / measurement.delta_mu_uncertainty
         else:
-            read = reading.observables()[name]
-            off[name] = (read - value) / reading.uncertainty(name)
-    named = [check.name for check in found.checks if check.verdict != "ok"]
-    finite = {name: round(float(z), 1) for name, z in off.items() if np.isfinite(z)}
-    return row | {"verdict": found.verdict, "named": named, "off": finite}
+            measured = reading.observables()[name]
+            errors[name] = (measured - value) / reading.uncertainty(name)
+    named = [check.name for check in measurement.checks if check.verdict != "ok"]
+    finite = {name: round(float(z), 1) for name, z in errors.items() if np.isfinite(z)}
+    return row | {"verdict": measurement.verdict, "named": named, "errors": finite}
 
 
 def main() -> None:
-    """Print how many recordings are wrong without a word, and which."""
+    """Print the number of recordings of each verdict, and those that are wrong and ok."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--recordings", type=int, default=500)
     parser.add_argument("--seed", type=int, default=0, help="of the first recording")
@@ -356,7 +357,7 @@ def main() -> None:
     }
     print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     for row in rows:
-        wrong = {name: z for name, z in row["off"].items() if abs(z) > WRONG}
+        wrong = {name: z for name, z in row["errors"].items() if abs(z) > WRONG}
         if row["verdict"] == "ok" and wrong:
             print(
                 f"wrong and ok: seed {row['seed']}, {', '.join(row['faults']) or 'clean'}: {wrong}"
@@ -366,8 +367,8 @@ def main() -> None:
             print(
                 f"clean and {row['verdict']}: seed {row['seed']}: {', '.join(row.get('named', []))}"
             )
-    told = np.abs([z for row in rows if row["verdict"] == "ok" for z in row["off"].values()])
-    print(f"{np.mean(told > 2):.1%} of {told.size} numbers that are ok are off by more than 2")
+    errors = np.abs([z for row in rows if row["verdict"] == "ok" for z in row["errors"].values()])
+    print(f"{np.mean(errors > 2):.1%} of {errors.size} numbers that are ok are off by more than 2")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Recordings of velocity steps and holds with faults of laboratories: answers wrong and ok.
+"""Recordings of velocity steps and holds with faults of laboratories: wrong numbers that are ok.
 
     python -m benchmarks.hostile_sliding [--recordings 300] [--seed 0]
 
 A slider with the ageing law is pulled at two to five velocities of 0.1 to 100 um/s, with holds of 2
 to 200 s, on a spring 1.5 to 30 times as stiff as stable sliding needs, and sampled 1,500 to 60,000
-times with noise of 3e-5 to 1e-3 and up to three of the faults of `FAULTS`. What `asperity.measure`
-reads of each step and hold is compared with the motion without noise, in 95 % intervals.
+times with noise of 3e-5 to 1e-3 and up to three of the faults of `FAULTS`. The numbers of each step
+and hold from `asperity.measure` are compared with the motion without noise, in 95 % intervals.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FAULTS = (
     "trend", "random walk", "lines", "coarse friction", "coarse displacement", "spikes", "gear",
     "contact displacement", "loading first", "jitter", "gap", "short", "load wanders",
 )  # fmt: skip
-#: Half widths of 95 % intervals from which on a number is wrong.
+#: A number is wrong if it is more than this many half widths of its 95 % interval off.
 WRONG = 2.0
 
 
@@ -52,7 +52,7 @@ def motion(random, faults):
 
 
 def recording(seed):
-    """Faults, what was planted, and the recording."""
+    """Faults, planted numbers, and the recording."""
     r = np.random.default_rng(seed)
     faults = {str(name) for name in r.choice(FAULTS, r.integers(0, 4), replace=False)}
     numbers, velocities, bounds = motion(r, faults)
@@ -88,14 +88,14 @@ def recording(seed):
         size = np.exp(r.uniform(np.log(3e-3), np.log(0.3), at.size))
         friction[at] += r.choice([-1, 1], at.size) * size
     if "loading first" in faults:
-        lasts = 0.6 / (k * velocities[0])
-        before = np.linspace(0, lasts, min(max(int(lasts * rate), 10), 30_000), endpoint=False)
-        loading = clean[0] * before / lasts
+        lead = 0.6 / (k * velocities[0])
+        before = np.linspace(0, lead, min(max(int(lead * rate), 10), 30_000), endpoint=False)
+        loading = clean[0] * before / lead
         friction = np.concatenate([loading + noise * r.normal(size=before.size), friction])
-        x = np.concatenate([velocities[0] * (before - lasts), x])
-        time, clean = np.concatenate([before, time + lasts]), np.concatenate([loading, clean])
-        bounds = bounds + lasts
-    seen = time + 0.1 / rate * r.normal(size=time.size) * ("jitter" in faults)
+        x = np.concatenate([velocities[0] * (before - lead), x])
+        time, clean = np.concatenate([before, time + lead]), np.concatenate([loading, clean])
+        bounds = bounds + lead
+    recorded_time = time + 0.1 / rate * r.normal(size=time.size) * ("jitter" in faults)
     kept = np.ones(time.size, bool)
     if "gap" in faults:
         first = int(r.uniform(0.1, 0.8) * time.size)
@@ -108,34 +108,34 @@ def recording(seed):
     else:
         channels["friction"] = Channel(friction[kept], "dimensionless", "", "friction", "")
     planted = numbers["A"] - numbers["B"], velocities, bounds, time, clean
-    return faults, planted, Trace(seen[kept], channels)
+    return faults, planted, Trace(recorded_time[kept], channels)
 
 
 def judged(seed):
     """Verdict, and errors of A - B and of healing in half widths of their 95 % intervals."""
     faults, (change, velocities, bounds, time, clean), trace = recording(seed)
-    found = asp.measure(trace, modulated=False)
-    row = {"seed": seed, "faults": sorted(faults), "verdict": found.verdict, "off": []}
-    for step in found.steps:
+    measurement = asp.measure(trace, modulated=False)
+    row = {"seed": seed, "faults": sorted(faults), "verdict": measurement.verdict, "errors": []}
+    for step in measurement.steps:
         at = int(np.argmin(np.abs(bounds[1:-1] - step.time)))
         slower, faster = sorted(velocities[at : at + 2])
         if slower and faster and slower / 1.2 < step.velocity_before < 1.2 * faster:
-            off = (step.rate_dependence - change) / step.rate_interval_95
-            row["off"].append(("A - B", float(off)))
-    # A trend or a random walk is friction that changes by itself.
-    for hold in found.holds if not faults & {"trend", "random walk"} else ():
+            error = (step.rate_dependence - change) / step.rate_interval_95
+            row["errors"].append(("A - B", float(error)))
+    # With a trend or a random walk the planted healing is not that of the recording.
+    for hold in measurement.holds if not faults & {"trend", "random walk"} else ():
         at = int(np.argmin(np.abs(bounds[:-1] - hold.start)))
         if velocities[at] or not 0.8 < hold.hold_time / (bounds[at + 1] - bounds[at]) < 1.2:
             continue
         after = (time >= bounds[at + 1]) & (time <= bounds[at + 2])
         level = float(clean[time <= bounds[at]][-1])
-        off = (hold.healing - (clean[after].max() - level)) / hold.interval_95
-        row["off"].append(("healing", float(off)))
+        error = (hold.healing - (clean[after].max() - level)) / hold.interval_95
+        row["errors"].append(("healing", float(error)))
     return row
 
 
 def main():
-    """Print how often intervals hold the truth where all is ok, and what is wrong."""
+    """Print how often intervals contain the truth with verdict ok, and the wrong numbers."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--recordings", type=int, default=300)
     parser.add_argument("--seed", type=int, default=0, help="of the first recording")
@@ -144,10 +144,10 @@ def main():
     good = [row for row in rows if row["verdict"] == "ok"]
     print(f"{len(good)} of {len(rows)} are ok")
     for name in ("A - B", "healing"):
-        off = np.abs([z for row in good for which, z in row["off"] if which == name])
-        print(f"{name}: {np.mean(off < 1):.1%} of {off.size} within the 95 % interval")
+        errors = np.abs([z for row in good for which, z in row["errors"] if which == name])
+        print(f"{name}: {np.mean(errors < 1):.1%} of {errors.size} within the 95 % interval")
     for row in good:
-        wrong = [(name, round(z, 1)) for name, z in row["off"] if abs(z) > WRONG]
+        wrong = [(name, round(z, 1)) for name, z in row["errors"] if abs(z) > WRONG]
         if wrong:
             print(
                 f"wrong and ok: seed {row['seed']}, {', '.join(row['faults']) or 'clean'}: {wrong}"

@@ -1,8 +1,8 @@
-"""Stick-slip recordings with everything that goes wrong, read: faults where all checks are ok.
+"""Measurements of faulty stick-slip recordings: wrong numbers although all checks are ok.
 
     python -m benchmarks.hostile_stick_slip [--recordings 100] [--seed 0]
 
-Motions, what the recorder adds, and what a fault is: `benchmarks.stick_slip_recordings`.
+`benchmarks.stick_slip_recordings` has the motions, the recorder and the definition of a fault.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from benchmarks.stick_slip_recordings import judged, recorded, tables
 
 
 def main():
-    """Print faults, and shares of intervals that hold the truth."""
+    """Print faults, and shares of intervals that contain the truth."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)

@@ -1,9 +1,10 @@
-"""Inertial responses against heyoka and SciPy: ``python -m benchmarks.inertial``.
+"""Responses with inertia, compared with heyoka and SciPy: ``python -m benchmarks.inertial``.
 
-With elastic asperities the equations are not stiff, and heyoka shoots with variational equations;
-without them they are, and SciPy's Radau does. Both start within 1e-5 of the answer, which is
-generous: asperity starts from nothing. A second row has heyoka start where asperity does, from the
-averaged limit. One core; errors are the largest relative differences of mean and first harmonics.
+With elastic asperities the equations are not stiff, and heyoka shoots with variational equations.
+With rigid asperities they are stiff, and SciPy's Radau shoots. Both start within 1e-5 of the
+answer, asperity without an initial guess. In a second row heyoka starts at the averaged limit, as
+asperity does. Times are on one core; errors are the largest relative differences of mean and first
+harmonics.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from benchmarks.clock import pin_to_one_core, timed
 _OMEGA = 2 * np.pi * FREQUENCY
 _SAMPLES = 128
 _TOLERANCE = 1e-10
-#: Newton's method: closed from this step on, steps at most, and change of an exponent in one.
+#: Newton's method: step at convergence, most steps, and largest change of an exponent in a step.
 _CLOSED, _NEWTON_STEPS, _LARGEST_CHANGE = 1e-8, 20, 3.0
 
 
@@ -73,12 +74,12 @@ class HeyokaShooting:
 
     def solve(self, points: Batch, start: np.ndarray) -> np.ndarray:
         """Mean, mu1 and mu2 of each point, (3, points), from `start`, (4, points)."""
-        numbers, found = numbers_of(points), []
+        numbers, answers = numbers_of(points), []
         filled = np.resize(np.arange(len(points)), -(-len(points) // self.lanes) * self.lanes)
         for part in filled.reshape(-1, self.lanes):
             table = np.array([numbers[name][part] for name in self.names])
-            found.append(self._shoot(table, start[:, part]))
-        return np.concatenate(found, axis=1)[:, : len(points)]
+            answers.append(self._shoot(table, start[:, part]))
+        return np.concatenate(answers, axis=1)[:, : len(points)]
 
     def _shoot(self, table: np.ndarray, start: np.ndarray) -> np.ndarray:
         offset, kappa = start[0], table[self.names.index("kappa")]
@@ -91,7 +92,7 @@ class HeyokaShooting:
             path = self.integrator.propagate_grid(self.grid)[-1]
             monodromy = np.moveaxis(path[-1, 4:].reshape(4, 4, -1), -1, 0)
             step = np.linalg.solve(monodromy - np.eye(4), (y - path[-1, :4]).T[..., None])[..., 0].T
-            # The velocity counts too: it bears the second harmonic.
+            # The velocity must converge too, as the second harmonic depends on it.
             if np.abs(step[1:]).max() < _CLOSED:
                 break
             A, B = (table[self.names.index(name)] for name in "AB")
@@ -105,7 +106,7 @@ def scipy_radau(points: Batch, start: np.ndarray) -> np.ndarray:
     """Shooting with SciPy's Radau and differences; states (F/W0, ln(v/V), ln(V Phi/D0))."""
     from scipy.integrate import solve_ivp
 
-    found = []
+    answers = []
     for i in range(len(points)):
         n = {name: float(value[i]) for name, value in numbers_of(points).items()}
 
@@ -132,8 +133,8 @@ def scipy_radau(points: Batch, start: np.ndarray) -> np.ndarray:
                 break
         path = flow(y, dense_output=True).sol(np.linspace(0, 2 * np.pi, _SAMPLES, endpoint=False))
         spectrum = np.fft.rfft(path[0]) / _SAMPLES
-        found.append(np.abs([spectrum[0], 2 * spectrum[1], 2 * spectrum[2]]))
-    return np.stack(found, axis=1)
+        answers.append(np.abs([spectrum[0], 2 * spectrum[1], 2 * spectrum[2]]))
+    return np.stack(answers, axis=1)
 
 
 def _near(answers: asp.orbit.PeriodicResponse, points: Batch) -> np.ndarray:
@@ -145,7 +146,7 @@ def _near(answers: asp.orbit.PeriodicResponse, points: Batch) -> np.ndarray:
 
 
 def _averaged(points: Batch) -> np.ndarray:
-    """The states that asperity starts from, in the same form."""
+    """The initial guess of asperity, in the same form."""
     drive = {"velocity": points.velocity, "epsilon": points.epsilon, "frequency": FREQUENCY}
     problem = checked_problem(points.slider(), inertia=True, **drive)
     start = np.array(averaged_start(flatten(problem)[0])[0])
@@ -155,15 +156,15 @@ def _averaged(points: Batch) -> np.ndarray:
 
 def _compare(law: str, count: int, peer_count: int, peers: dict[str, tuple]) -> None:
     points = batch(law, count)
-    seconds, found = timed(lambda: respond(points), 3 if count > 200 else 1)
-    assert found.converged.all()
+    seconds, response = timed(lambda: respond(points), 3 if count > 200 else 1)
+    assert response.converged.all()
     few = points.part(slice(peer_count))
-    mine = np.stack([found.mean_friction, found.mu1, found.mu2])[:, :peer_count]
+    expected = np.stack([response.mean_friction, response.mu1, response.mu2])[:, :peer_count]
     each = seconds / count * 1e6
     for peer, (solve, start_of, warm_up) in peers.items():
-        start = start_of(found, few)
+        start = start_of(response, few)
         peer_seconds, answer = timed(lambda: solve(few, start), 1, warm_up=warm_up)  # noqa: B023
-        error, theirs = np.abs(answer / mine - 1).max(), peer_seconds / peer_count * 1e6
+        error, theirs = np.abs(answer / expected - 1).max(), peer_seconds / peer_count * 1e6
         print(
             f"| {law} | {each:,.0f} | {peer} | {theirs:,.0f} | {theirs / each:.3g} | {error:.0e} |"
         )

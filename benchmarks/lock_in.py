@@ -1,7 +1,7 @@
 """Time and accuracy of the lock-in on ten minutes at 10 kHz: ``python -m benchmarks.lock_in``.
 
-Two channels of six million samples, read with an even clock and with a jittering one, beside the
-time that summing, and copying, the same arrays twice takes. On one core.
+Two channels of six million samples with an even and with a jittering clock, on one core. For
+comparison the same arrays are summed twice, and copied twice.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=6_000_000)
     parser.add_argument("--repeats", type=int, default=5)
     arguments = parser.parse_args()
-    # Before NumPy is loaded: it counts the cores when it is.
+    # Before NumPy is imported, which counts the cores.
     pin_to_one_core()
     import numpy as np
 

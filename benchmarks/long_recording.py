@@ -1,12 +1,12 @@
-"""A recording of ten minutes at 10 kHz: read, averaged over blocks and fitted.
+"""A recording of ten minutes at 10 kHz is read, averaged over blocks and fitted.
 
 ``python -m benchmarks.long_recording [--seconds 600] [--rate 10000] [--full] [--sets N]``
 
 The motion is computed by SciPy (`benchmarks.coverage`): velocity steps, two holds and load steps.
 The noise of the gauge is white, a resonance at 300 Hz (an autoregression of order 2), wanders over
 0.5 and 8 s, and has the mains with a harmonic, whose frequency wanders too. With ``--full`` the
-same recording is fitted at its full rate besides. With ``--sets`` there are so many recordings of
-six seconds and faster steps instead, with a third of the noise, whose intervals are counted.
+same recording is also fitted at its full rate. With ``--sets N`` the intervals of N recordings of
+six seconds are counted instead, with faster steps and a third of the noise.
 """
 
 from __future__ import annotations
@@ -77,15 +77,15 @@ def columns(case: Case, seed: int = 0) -> dict[str, np.ndarray]:
 
 
 def written(path: Path, table: dict[str, np.ndarray]) -> None:
-    """A text file of 8 significant digits."""
-    whole = np.stack(list(table.values()), axis=1)
+    """Write a text file with 8 significant digits."""
+    values = np.stack(list(table.values()), axis=1)
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(table) + "\n")
-        for part in np.array_split(whole, max(1, len(whole) // 100_000)):
+        for part in np.array_split(values, max(1, len(values) // 100_000)):
             np.savetxt(file, part, fmt="%.8g", delimiter=",")
 
 
-#: Six seconds in which contacts slide as far as they do in minutes at usual velocities.
+#: Six seconds, in which the slip is that of minutes at usual velocities.
 SHORT = Case((3e-5, 1e-4, 3e-5, 0.0, 1e-4), (1.2, 2.4, 3.6, 4.2), 6.0, 1e4)
 
 
@@ -106,9 +106,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--rate", type=float, default=1e4)
-    parser.add_argument("--file", type=Path, help="use this file, and write it where it is not")
-    parser.add_argument("--full", action="store_true", help="fit at the full rate besides")
-    parser.add_argument("--sets", type=int, help="count intervals of so many short recordings")
+    parser.add_argument("--file", type=Path, help="use this file; written if it is missing")
+    parser.add_argument("--full", action="store_true", help="also fit at the full rate")
+    parser.add_argument(
+        "--sets", type=int, help="number of short recordings whose intervals are counted"
+    )
     arguments = parser.parse_args()
     if arguments.sets:
         print_shares("short", covered(short_runs(SHORT, arguments.sets), SHORT, starts=1))
@@ -121,22 +123,24 @@ def main() -> None:
         pin_to_one_core()
         begun = clock.perf_counter()
         trace = read(path)
-        read_in = clock.perf_counter() - begun
+        read_at = clock.perf_counter() - begun
         run = recorded_run(trace)
-        cut_in = clock.perf_counter() - begun
-        print(f"{run.time.size} samples: read in {read_in:.1f} s, drive found by {cut_in:.1f} s")
+        drive_at = clock.perf_counter() - begun
+        print(
+            f"{run.time.size} samples: read in {read_at:.1f} s, drive detected by {drive_at:.1f} s"
+        )
         for rate in (None, "full") if arguments.full else (None,):
             begun = clock.perf_counter()
-            found = fit(run, case.law, FREE, runs=RunOptions(fit_rate=rate))
-            took = clock.perf_counter() - begun
+            result = fit(run, case.law, FREE, runs=RunOptions(fit_rate=rate))
+            seconds = clock.perf_counter() - begun
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-            print(f"rate {rate or 'by the data'}: fit in {took:.1f} s, {peak:.2f} GB at most")
-            print(found.objective.terms[0].noise)
+            print(f"rate {rate or 'by the data'}: fit in {seconds:.1f} s, {peak:.2f} GB at most")
+            print(result.objective.terms[0].noise)
             for name, truth in case.true.items():
-                p = found.parameters[name]
-                off = (p.value - truth) / p.se
-                print(f"  {name:6} {p.value:.5g} +- {p.se:.2g} {p.unit}, {off:+.1f} s.e. off")
-            print(*found.warnings, sep="\n")
+                p = result.parameters[name]
+                error = (p.value - truth) / p.se
+                print(f"  {name:6} {p.value:.5g} +- {p.se:.2g} {p.unit}, {error:+.1f} s.e. off")
+            print(*result.warnings, sep="\n")
 
 
 if __name__ == "__main__":

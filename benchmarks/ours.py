@@ -17,7 +17,7 @@ from benchmarks.equations import Answer
 from benchmarks.peers import reference
 from benchmarks.table import Row
 
-#: Points in a block of the rows that are compiled here: their arrays fit into a core's cache.
+#: Points in a block of the programs compiled here: the arrays fit into the cache of a core.
 _BLOCK = 240
 _NODES = 32
 
@@ -33,23 +33,23 @@ def respond(points: Batch, **options) -> asp.orbit.PeriodicResponse:
     )
 
 
-def _answer(found: asp.orbit.PeriodicResponse) -> Answer:
-    """The form in which all are compared; every point must have converged."""
-    if not found.converged.all():
-        raise RuntimeError(f"{(~found.converged).sum()} points of the batch did not converge")
-    return Answer(found.mean_friction, found.mu1, found.mu2, found.multipliers.T)
+def _answer(response: asp.orbit.PeriodicResponse) -> Answer:
+    """The response in the form that is compared; every point must have converged."""
+    if not response.converged.all():
+        raise RuntimeError(f"{(~response.converged).sum()} points of the batch did not converge")
+    return Answer(response.mean_friction, response.mu1, response.mu2, response.multipliers.T)
 
 
 def response_row(law: str, points: int, repeats: int, what: str, **options) -> Row:
     """`periodic_response`, with mean, eight harmonics and multipliers."""
-    everything = batch(law, points)
-    seconds, found = timed(lambda: respond(everything, workers=1, **options), repeats)
+    whole = batch(law, points)
+    seconds, response = timed(lambda: respond(whole, workers=1, **options), repeats)
     row = Row(f"{what}, {law}", points, seconds)
-    return row.with_errors(_answer(found), reference(batch, law, points))
+    return row.with_errors(_answer(response), reference(batch, law, points))
 
 
 def _blocks(points: Batch) -> tuple[QuasiStatic, Harmonic]:
-    """System and load of the batch, sorted as the search does, in blocks."""
+    """System and load of the batch in blocks, sorted like the search sorts them."""
     whole = len(points) - len(points) % _BLOCK
     part = points.part(np.argsort(points.velocity)[:whole] if whole else np.zeros(_BLOCK, int))
     system = QuasiStatic(part.slider(), part.velocity, 2 * np.pi * FREQUENCY)
@@ -68,10 +68,10 @@ def rates_row(law: str, points: int, repeats: int) -> Row:
 
     def rates(block: tuple[QuasiStatic, Harmonic]) -> jax.Array:
         system, load = block
-        # Different at every node, or exponentials would be taken once for all.
+        # States differ at every node; the compiler would compute equal exponentials only once.
         states = system.steady()[:, None] + 1e-3 * jnp.cos(theta)
         values = system.rates(states, load.at(theta))
-        # Only means leave the cache: writing all values to memory would cost three times as much.
+        # Only means leave the cache; writing all values to memory would take three times as long.
         return jnp.stack([share @ rate for rate in values])
 
     compiled = jax.jit(lambda inputs: jax.lax.map(rates, inputs))
@@ -80,9 +80,9 @@ def rates_row(law: str, points: int, repeats: int) -> Row:
 
 
 def gradient_rows(law: str, points: int, repeats: int) -> list[Row]:
-    """Mean and two harmonics, and their derivatives to all parameters, as a fit asks for them.
+    """Mean and two harmonics, and these with their derivatives by all parameters, as in a fit.
 
-    The errors of the second row are those of the derivatives by the logarithm of A, held against
+    The errors of the second row are those of the derivatives by the logarithm of A, compared with
     Richardson's extrapolation of differences of `periodic_response`.
     """
     part = batch(law, points)
@@ -93,21 +93,23 @@ def gradient_rows(law: str, points: int, repeats: int) -> list[Row]:
     parameters |= {"V": part.velocity, "epsilon": part.epsilon, "frequency": FREQUENCY}
     model = asp.response_function(law)
     forward = timed(lambda: jax.block_until_ready(model(parameters)), repeats)
-    both = timed(lambda: jax.block_until_ready(model.value_and_jacobian(parameters)), repeats)
+    with_slopes = timed(
+        lambda: jax.block_until_ready(model.value_and_jacobian(parameters)), repeats
+    )
     exact = respond(part)
     row = Row(f"mean and two harmonics, {law}", points, forward[0])
     first = _with_errors(row, forward[1], exact.mean_friction, exact.harmonics)
-    slope = jax.tree.map(lambda a: a * parameters["A"], both[1][1]["A"])
-    note = f"{both[0] / forward[0]:.2f} x forward"
-    second = Row(f"the same with all derivatives, {law}", points, both[0], note=note)
+    slope = jax.tree.map(lambda a: a * parameters["A"], with_slopes[1][1]["A"])
+    note = f"{with_slopes[0] / forward[0]:.2f} x forward"
+    second = Row(f"the same with all derivatives, {law}", points, with_slopes[0], note=note)
     return [first, _with_errors(second, slope, *_slopes(part))]
 
 
-def _with_errors(row: Row, found: asp.orbit.ResponseValues, mean, harmonics) -> Row:
+def _with_errors(row: Row, values: asp.orbit.ResponseValues, mean, harmonics) -> Row:
     """Errors relative to the largest of all points."""
     size = np.abs(harmonics[:, :2]).max(0)
-    mu1, mu2 = np.abs(np.asarray(found.harmonics) - harmonics[:, :2]).max(0) / size
-    error = np.abs(np.asarray(found.mean_friction) - mean).max() / np.abs(mean).max()
+    mu1, mu2 = np.abs(np.asarray(values.harmonics) - harmonics[:, :2]).max(0) / size
+    error = np.abs(np.asarray(values.mean_friction) - mean).max() / np.abs(mean).max()
     return dataclasses.replace(row, mean=float(error), mu1=float(mu1), mu2=float(mu2))
 
 
@@ -117,13 +119,13 @@ def _slopes(part: Batch) -> tuple[np.ndarray, np.ndarray]:
     def at(change: float) -> np.ndarray:
         slider = part.slider()
         law = dataclasses.replace(slider.law, A=slider.law.A * (1 + change))
-        found = asp.periodic_response(
+        response = asp.periodic_response(
             asp.Slider(law, spring=slider.K, load=slider.W0, mass=slider.M),
             velocity=part.velocity,
             epsilon=part.epsilon,
             frequency=FREQUENCY,
         )
-        return np.column_stack([found.mean_friction, found.harmonics[:, :2]])
+        return np.column_stack([response.mean_friction, response.harmonics[:, :2]])
 
     coarse, fine = ((at(h) - at(-h)) / (2 * h) for h in (2e-3, 1e-3))
     slopes = (4 * fine - coarse) / 3
@@ -131,7 +133,7 @@ def _slopes(part: Batch) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sensitivities_row(law: str, points: int) -> Row:
-    """All outputs to all parameters, by the robust method."""
+    """Derivatives of all outputs by all parameters, by the robust method."""
     part = batch(law, points)
 
     def run() -> asp.orbit.Sensitivities:

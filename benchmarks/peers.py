@@ -18,7 +18,7 @@ REFERENCES = 32
 
 @cache
 def reference(make: Callable[[str, int], Batch], law: str, points: int) -> Answer:
-    """The first points of the batch by SciPy's DOP853 at the limit of the arithmetic."""
+    """The first points of the batch by SciPy's DOP853 at the smallest useful tolerance."""
     part = make(law, points).part(slice(REFERENCES))
     return scipy_shooting.solve(part, scipy_shooting.REFERENCE)
 
@@ -36,7 +36,7 @@ def _row(
 
 
 def heyoka_row(law: str, points: int, repeats: int) -> Row | None:
-    """Shooting with heyoka, None where it is not installed."""
+    """Shooting with heyoka; None if it is not installed."""
     if importlib.util.find_spec("heyoka") is None:
         return None
     solve = heyoka_shooting.Shooting().solve
@@ -57,10 +57,10 @@ def scipy_marching_row(law: str, points: int) -> Row:
 
 
 def diffrax_marching_row(law: str, points: int) -> Row | None:
-    """Marching with diffrax, None where it is not installed; stable points only."""
+    """Marching with diffrax, stable points only; None if it is not installed."""
     if importlib.util.find_spec("diffrax") is None:
         return None
     solve = diffrax_marching.Marching().solve
     stable, true = stable_batch(law, points), reference(stable_batch, law, points)
-    solve(stable, most_periods=1)  # what is compiled
+    solve(stable, most_periods=1)  # compiles
     return _row("diffrax marching", solve, stable, true)

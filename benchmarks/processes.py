@@ -1,4 +1,4 @@
-"""What is measured in a process of its own: all cores, memory, and the time until an answer."""
+"""Measurements in separate processes: all cores, memory, and the time of a command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.table import Row
 _WHOLE_BATCH = """
 import json, os, resource, sys, time
 
-if len(sys.argv) > 4:  # before anything counts the cores
+if len(sys.argv) > 4:  # before libraries count the cores
     os.sched_setaffinity(0, map(int, sys.argv[4:]))
 from benchmarks.cases import batch
 from benchmarks.ours import respond
@@ -30,13 +30,13 @@ if __name__ == "__main__":
         converged = respond(everything, workers=cores).converged
         times.append(time.perf_counter() - start)
     assert converged.all()
-    # Kibibytes on Linux, bytes on macOS. Of the workers, the system tells the largest.
+    # Kibibytes on Linux, bytes on macOS; for the workers it is the largest of them.
     unit = 1 if sys.platform == "darwin" else 1024
-    own, worker = (
+    driver, worker = (
         resource.getrusage(who).ru_maxrss * unit
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
-    print(json.dumps({"seconds": times, "cores": cores, "bytes": own, "worker": worker}))
+    print(json.dumps({"seconds": times, "cores": cores, "bytes": driver, "worker": worker}))
 """
 
 _COMMAND = (sys.executable, "-m", "asperity")
@@ -48,7 +48,7 @@ _RESPONSE = (
 
 
 def whole_batch_rows(law: str, points: int, repeats: int, cores: set[int]) -> list[Row]:
-    """`periodic_response` on all cores, the processes running already and not yet."""
+    """`periodic_response` on all cores: the first call, which starts processes, and later calls."""
     measured = _on_all_cores(law, points, repeats + 1, cores)
     first, *warm = measured["seconds"]
     used = measured["cores"]
@@ -69,7 +69,7 @@ def _on_all_cores(law: str, points: int, repeats: int, cores: set[int]) -> dict:
 
 
 def start_up_rows(repeats: int) -> list[Row]:
-    """Wall time of two commands in fresh processes, compiled programs in the cache."""
+    """Wall time of two commands in new processes, with compiled programs in the cache."""
     commands = {"asperity --version": (*_COMMAND, "--version"), "asperity response": _RESPONSE}
     return [
         Row(f"{what}, fresh process", 1, _wall_time(command, repeats))

@@ -1,15 +1,16 @@
-"""Fits to tables of random truths: minima missed, and coverage of the intervals.
+"""Fits to tables with random true values: missed minima, and coverage of the intervals.
 
     python -m benchmarks.random_truths [--law elasto-plastic] [--tables 40] [--seed 0] [--slow]
         [--compare] [--out FILE]
 
 Each table has 25 to 60 rows at two to four velocities of 0.1 to 100 um/s and one to three
 frequencies of 1 Hz to 1 kHz, with mu0, A, B, D0, eps_ratio (and lambda or alpha) drawn over a
-decade or two, 1 % noise in either part of the harmonics and 0.3 % in the mean; every second table
-is without phases. All of them are free. A minimum is missed if one begun at the truth is lower by
-0.01. With --slow, each row has a velocity of 0.3 to 10 um/s and a frequency of 0.1 to 10 Hz of its
-own, amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as stable sliding needs.
-With --compare, each table is compared with three laws, and the verdict on the true one is counted.
+decade or two, 1 % noise in both parts of the harmonics and 0.3 % in the mean; every second table
+has no phases. All these parameters are free. A minimum is missed if a minimisation from the truth
+ends lower by 0.01. With --slow, each row has another velocity of 0.3 to 10 um/s and another
+frequency of 0.1 to 10 Hz, amplitudes are below 0.25 and the spring is 1.1 to 4 times as stiff as
+stable sliding needs. With --compare, each table is compared with three laws, and the verdicts on
+the true law are counted.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from asperity.orbit import Outcome, response_function
 #: Rows that are computed together, so that all tables share one compiled program.
 ROWS = 64
 
-#: Parameters that are free in a comparison, of each law those that it has.
+#: Free parameters of a comparison, if the law has them.
 FREE = ("mu0", "A", "B", "D0", "eps_ratio", "alpha", "lambda")
 
 
@@ -52,7 +53,7 @@ def drawn_truth(rng, law):
 
 
 def fast_point(rng, law):
-    """A truth, fixed numbers and operating points that the fast method solves."""
+    """True values, fixed numbers and operating points that the fast method solves."""
     truth = drawn_truth(rng, law)
     K, W0 = float(log_uniform(rng, 2e4, 2e6)), float(log_uniform(rng, 3, 16))
     rows = int(rng.integers(30, 61))
@@ -64,7 +65,7 @@ def fast_point(rng, law):
 
 
 def slow_point(rng, law):
-    """The same under slow modulation, of a spring with which steady sliding is stable."""
+    """As `fast_point`, under slow modulation with a spring that makes steady sliding stable."""
     truth = drawn_truth(rng, law)
     while truth["B"] <= truth["A"]:
         truth = drawn_truth(rng, law)
@@ -79,17 +80,17 @@ def slow_point(rng, law):
 
 
 def drawn_table(seed, law, response, drawn=fast_point):
-    """A table of a random truth, with the truth and the fixed numbers."""
+    """Random true values, fixed numbers, and a table of their responses with noise."""
     rng = np.random.default_rng([seed, len(law)])
     while True:
         truth, fixed, point = drawn(rng, law)
         rows = point["V"].size
-        whole = {n: np.pad(v, (0, ROWS - rows), mode="edge") for n, v in point.items()}
-        whole["epsilon"] = truth["eps_ratio"] * whole["epsilon"]
+        padded = {n: np.pad(v, (0, ROWS - rows), mode="edge") for n, v in point.items()}
+        padded["epsilon"] = truth["eps_ratio"] * padded["epsilon"]
         numbers = {n: v for n, v in truth.items() if n != "eps_ratio"} | fixed
-        exact = response(whole | {n: np.full(ROWS, v) for n, v in numbers.items()})
-        good = np.asarray(exact.outcome)[:rows] == Outcome.CONVERGED
-        if good.sum() >= 25:
+        exact = response(padded | {n: np.full(ROWS, v) for n, v in numbers.items()})
+        converged = np.asarray(exact.outcome)[:rows] == Outcome.CONVERGED
+        if converged.sum() >= 25:
             break
     mean, harmonics = np.asarray(exact.mean_friction)[:rows], np.asarray(exact.harmonics)[:rows]
     error = 3e-3 * np.abs(mean)
@@ -102,34 +103,34 @@ def drawn_table(seed, law, response, drawn=fast_point):
         columns |= {f"mu{n}": np.abs(c), f"mu{n}_err": error}
         if seed % 2 == 0:
             columns |= {f"phase{n}": np.angle(c), f"phase{n}_err": error / np.abs(c)}
-    return truth, fixed, table_of({name: column[good] for name, column in columns.items()})
+    return truth, fixed, table_of({name: column[converged] for name, column in columns.items()})
 
 
 def fitted(seed, law, response, drawn=fast_point):
-    """What a fit to one table gets right."""
+    """Result of a fit to one table, compared with the truth."""
     truth, fixed, table = drawn_table(seed, law, response, drawn)
     began = time.process_time()
-    found = fit(table, law, list(truth), fixed=fixed)
+    result = fit(table, law, list(truth), fixed=fixed)
     seconds = time.process_time() - began
-    objective = found.objective
+    objective = result.objective
     from_truth = objective.minimise(objective.coordinates(truth))[1]
     inside = {}
     for name, value in truth.items():
-        p = found.parameters[name]
+        p = result.parameters[name]
         inside[name] = [low <= value <= high for low, high in (p.interval_68, p.interval_95)]
     return {
         "seed": seed,
-        "p_value": found.p_value,
-        "missed_by": found.chi2 - from_truth,
+        "p_value": result.p_value,
+        "missed_by": result.chi2 - from_truth,
         "inside": inside,
-        "undetermined": found.undetermined,
-        "minima": 1 + len(found.optima),
+        "undetermined": result.undetermined,
+        "minima": 1 + len(result.optima),
         "seconds": seconds,
     }
 
 
 def compared(seed, law, response, drawn=fast_point):
-    """The verdict of a comparison of three laws on the true one."""
+    """Verdict on the true law in a comparison of three laws."""
     truth, fixed, table = drawn_table(seed, law, response, drawn)
     laws = ["rice-ruina", "linker-dieterich", "elasto-plastic"]
     began, wall = time.process_time(), time.perf_counter()

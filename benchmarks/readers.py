@@ -1,7 +1,7 @@
-"""Reading a recording, against the plain readers: ``python -m benchmarks.readers``.
+"""Time to read a recording, compared with plain readers: ``python -m benchmarks.readers``.
 
-What is read is checked beside the time: a plain reader gives the numbers, `asperity` gives them in
-SI with everything that was found in them.
+A plain reader gives the numbers; `asperity` gives them in SI and checks the recording. The numbers
+are compared with the true ones.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _BYTES_A_ROW = 38
 
 
 class Row(NamedTuple):
-    """One reading, of a file of so many bytes."""
+    """Time and error of reading a file of `size` bytes."""
 
     what: str
     size: int
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
 
 def _recording(rows: int) -> dict[str, np.ndarray]:
-    """Time, load, force and displacement with noise, in as many digits as a text will have."""
+    """Time, load, force and displacement with noise, rounded to the digits of the text."""
     rng = np.random.default_rng(0)
     time = np.arange(rows) / _RATE
     wave = np.cos(2 * np.pi * 120 * time)
@@ -101,7 +101,9 @@ def rows(megabytes: float, repeats: int, folder: Path) -> Iterator[Row]:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.readers", description=__doc__)
     parser.add_argument("--megabytes", type=float, default=100.0, help="size of the text")
-    parser.add_argument("--repeats", type=int, default=5, help="the median of so many is shown")
+    parser.add_argument(
+        "--repeats", type=int, default=5, help="repetitions, of which the median is shown"
+    )
     arguments = parser.parse_args()
     pin_to_one_core()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,12 +1,12 @@
-"""A, B, D0 and K of real velocity steps by four laws, with the choice of the window.
+"""A, B, D0 and K of real velocity steps by four laws, with the uncertainty of the window.
 
 ``python -m benchmarks.real_recordings FOLDER``
 
 Each law is fitted in three windows by `asperity.inference.fit_windows`: an estimate is the mean
-over the windows, weighted by precision (of logarithms, as all of these are positive); its
+over the windows, weighted by precision (of logarithms, as all parameters are positive); its
 uncertainty adds the spread over the windows to that of noise. Columns: law, parameter, value, 95 %
-interval, standard error of noise and of the window, standard error that least squares with white
-noise gives in the first window, and the value in each window.
+interval, standard errors by noise and by the window, standard error of least squares with white
+noise in the first window, and the value in each window.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 from asperity.inference import RunOptions, fit, fit_windows
 
-#: File, windows (s), the middle one first, and the channel of the load where it has no usual name.
+#: File and windows (s), the middle one first.
 RECORDINGS = {
     "basalt, 3 to 10 um/s": (
         "velstep4_BRAVA_expb819_basalt.txt",
@@ -41,17 +41,17 @@ def main() -> None:
             print(f"{title}: no {file} in {folder}")
             continue
         for law, fixed in LAWS.items():
-            over = fit_windows(
+            result = fit_windows(
                 folder / file, law, FREE, windows, reading={"name": file}, fixed=fixed
             )
-            first = over.fits[0]
+            first = result.fits[0]
             (term,) = first.objective.terms
             run = term.run
             start = {n: first.values[n] for n in FREE}
             options = RunOptions(order=0)
             white = fit(run, law, FREE, fixed=fixed, starts=4, start=start, runs=options)
             for name in (*FREE, "K"):
-                p = over.parameters[name]
+                p = result.parameters[name]
                 scale = 1 / run.W0 if name == "K" else 1.0
                 unit = "1/m" if name == "K" else p.unit
                 column = ("K/W0" if name == "K" else name) + (f" ({unit})" if unit else "")
@@ -61,7 +61,7 @@ def main() -> None:
                     f"| {law} | {column} | {scale * p.value:.4g} | {low:.3g} to {high:.3g} | "
                     f"{scale * p.se_noise:.2g} | {scale * p.se_window:.2g} | "
                     f"{scale * white.parameters[name].se:.2g} | {each} |"
-                    + (" undetermined" if name in over.undetermined else ""),
+                    + (" undetermined" if name in result.undetermined else ""),
                     flush=True,
                 )
             noise = term.noise

@@ -1,16 +1,16 @@
-"""Fit, posterior and comparison of one recording of 10,000 samples, beside what is at hand.
+"""Fit, posterior and comparison of one recording of 10,000 samples, compared with other programs.
 
     python -m benchmarks.recording_fits [--samples 10000] [--draws 1000] [--without-peers]
 
 Two velocity steps by SciPy, with noise of the coverage benchmark; free are A, B, D0, K and the
-times of the two steps. Rows of the answer, beside those of asperity:
+times of the two steps. Besides asperity, the rows are:
 
-- SciPy's `least_squares` with differences over SciPy's integration, under the noise of asperity's
-  fit, from 10 % off the truth, which asperity is not told;
-- emcee with the density of asperity; left out where it is not installed.
+- SciPy's `least_squares` with differences over SciPy's integration and the noise of asperity's fit,
+  started 10 % from the truth; asperity has no start;
+- emcee with the density of asperity; left out if it is not installed.
 
-"Off" and the effective draws are those of `benchmarks.fits`, in whose table of times programs are
-compiled too. asperity's chains run in one process to a core.
+"Off" and the effective draws are those of `benchmarks.fits`; times of samplers include compilation,
+as there. asperity's chains run in one process for each core.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ FREE = ("A", "B", "D0", "K")
 LAWS = ("rice-ruina", "ruina-slip", "perrin-rice-zheng", "nagata")
 
 
-def recorded(found: Fit, values: dict[str, float]) -> np.ndarray:
+def recorded(result: Fit, values: dict[str, float]) -> np.ndarray:
     """Friction of the ageing law at the samples of a fit, by SciPy."""
-    (term,) = found.objective.terms
+    (term,) = result.objective.terms
     run = term.run
     numbers = {**term.fixed, **values, "alpha": 0.0, "k": values["K"] / run.W0}
     changes = [
@@ -44,13 +44,13 @@ def recorded(found: Fit, values: dict[str, float]) -> np.ndarray:
     return integrated(numbers, edges, run.velocities, run.time, tolerance=1e-10)
 
 
-def scipy_fit(found: Fit) -> dict[str, float]:
-    """Least squares under the noise and the priors of asperity's fit, with forward differences."""
-    (term,) = found.objective.terms
+def scipy_fit(result: Fit) -> dict[str, float]:
+    """Least squares with the noise and the priors of asperity's fit, by forward differences."""
+    (term,) = result.objective.terms
     (model,) = term.models
     sizes = {n: TRUTH.get(n, STIFFNESS * LOAD) for n in FREE}
-    unknowns = {k.name: k for k in found.objective.unknowns}
-    times = [n for n in found.values if n not in FREE]
+    unknowns = {k.name: k for k in result.objective.unknowns}
+    times = [n for n in result.values if n not in FREE]
 
     def named(u: np.ndarray) -> dict[str, float]:
         logs = {n: s * np.exp(x) for (n, s), x in zip(sizes.items(), u, strict=False)}
@@ -58,7 +58,7 @@ def scipy_fit(found: Fit) -> dict[str, float]:
 
     def residuals(u: np.ndarray) -> np.ndarray:
         values = named(u)
-        white = model.whiten((recorded(found, values) - term.run.friction)[:, None])[:, 0]
+        white = model.whiten((recorded(result, values) - term.run.friction)[:, None])[:, 0]
         white -= term.basis @ (term.basis.T @ white)
         priors = [(values[n] - unknowns[n].prior.mean) / unknowns[n].prior.sd for n in times]
         return np.concatenate([white, priors])
@@ -67,19 +67,19 @@ def scipy_fit(found: Fit) -> dict[str, float]:
     return named(least_squares(residuals, start, diff_step=1e-5, x_scale="jac").x)
 
 
-def emcee_draws(found: Fit, draws: int) -> np.ndarray:
+def emcee_draws(result: Fit, draws: int) -> np.ndarray:
     """Draws of 32 walkers about the fit in its whitened coordinates; (walkers, draws, n)."""
     emcee = importlib.import_module("emcee")
-    whitened = Whitened.of(found)
+    whitened = Whitened.of(result)
     density, data = whitened.compiled()
     compiled = jax.jit(lambda z: density(z, data))
     rng = np.random.default_rng(1)
-    n = len(found.values)
+    n = len(result.values)
     sampler = emcee.EnsembleSampler(32, n, lambda z: float(np.nan_to_num(compiled(z), nan=-np.inf)))
     sampler.run_mcmc(0.5 * rng.normal(size=(32, n)), draws + draws // 2)
     u = whitened.u_of(np.moveaxis(sampler.get_chain(discard=draws // 2), 0, 1))
-    values = [k.to_value(u[..., i]) for i, k in enumerate(found.objective.unknowns)]
-    return np.stack([values[list(found.values).index(n)] for n in FREE], axis=-1)
+    values = [k.to_value(u[..., i]) for i, k in enumerate(result.objective.unknowns)]
+    return np.stack([values[list(result.values).index(n)] for n in FREE], axis=-1)
 
 
 def main() -> None:
@@ -95,22 +95,22 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for k, run in enumerate(runs):
         first, _ = timed(lambda run=run: fit(run, "rice-ruina", FREE))
-        seconds, found = timed(lambda run=run: fit(run, "rice-ruina", FREE))
+        seconds, result = timed(lambda run=run: fit(run, "rice-ruina", FREE))
         print(
             f"| asperity fit, noise {k + 1} (the first {first:.1f} s) | {seconds:.2f} | 0 | | |",
             flush=True,
         )
-    several = [*FREE, "c"]
-    seconds, compared = timed(lambda: compare(runs[-1], LAWS, several))
-    name = f"asperity compare, four laws, best {compared.best}"
+    free = [*FREE, "c"]
+    seconds, comparison = timed(lambda: compare(runs[-1], LAWS, free))
+    name = f"asperity compare, four laws, best {comparison.best}"
     print(f"| {name} | {seconds:.0f} | | | |", flush=True)
-    samplers = {"asperity posterior": lambda: asperity_draws(found, FREE, chosen.draws)}
+    samplers = {"asperity posterior": lambda: asperity_draws(result, FREE, chosen.draws)}
     if not chosen.without_peers:
-        seconds, values = timed(lambda: scipy_fit(found))
+        seconds, values = timed(lambda: scipy_fit(result))
         name = "SciPy least_squares, differences"
-        print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
-        samplers["emcee, same density"] = lambda: emcee_draws(found, chosen.draws)
-    print_samplers(samplers, found, FREE)
+        print(f"| {name} | {seconds:.0f} | {off(values, result):.0e} | | |", flush=True)
+        samplers["emcee, same density"] = lambda: emcee_draws(result, chosen.draws)
+    print_samplers(samplers, result, FREE)
 
 
 if __name__ == "__main__":

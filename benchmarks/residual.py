@@ -1,8 +1,8 @@
-"""Answers put back into the equations of motion, which are written here once more.
+"""Residuals of answers in the equations of motion, which are written here independently.
 
 The waveform (F/W0, slip rate) that the package returns is differentiated spectrally and must obey
-spring, age law and friction law; its harmonics must be those of the answer. An answer that claims
-convergence and is no solution shows up whichever method found it.
+the equations of the spring, of the age and of friction; its harmonics must be those of the answer.
+This detects answers that claim convergence and are no solution, by any method.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from asperity.orbit import PeriodicResponse
 from asperity.orbit.search import CHOICES
 from asperity.slider.problem import Problem, checked_problem, flatten
 
-#: Residual of either equation over its largest term. The waveform is good to 3e-5 of its swing,
-#: more in its steepest parts, and is differentiated once.
+#: Residual of either equation over its largest term. The waveform has an error of 3e-5 of its
+#: swing, more in its steepest parts, and is differentiated once.
 RESIDUAL = 1e-3
-#: Mean slip rate over V: not differentiated, and what the mean of F hangs on.
+#: Error of the mean slip rate over V; it needs no derivative and determines the mean of F.
 SLIP = 1e-6
-#: Harmonics of the waveform over its swing.
+#: Error of harmonics over the swing of the waveform.
 HARMONICS = 3e-5
-#: A spectrum whose last 16th is below this, relative, is resolved by its samples.
+#: A spectrum is resolved by its samples if its last 16th, over its maximum, is below this.
 RESOLVED = 1e-6
 
-#: Change of the exponents between the samples that are marched from, and the fewest of these.
+#: Largest change of the exponents between samples at which an integration starts, and the least
+#: number of these samples.
 _CHANGE, _LEAST = 0.25, 100
-#: Evaluations after which an integration has run away.
+#: An integration with more evaluations has run away.
 _MOST_CALLS = 300_000
 
 LAWS = {"rice-ruina": RiceRuina, "elasto-plastic": ElastoPlastic}
@@ -39,7 +40,7 @@ Numbers = dict[str, np.ndarray]
 
 
 def draw(law: str, count: int, seed: int) -> Numbers:
-    """Operating points (SI) over the whole range that the package answers for, each (count,)."""
+    """Operating points (SI) over the whole range of the package, each (count,)."""
     random = np.random.default_rng(seed)
 
     def spread(low: float, high: float) -> np.ndarray:
@@ -57,14 +58,14 @@ def draw(law: str, count: int, seed: int) -> Numbers:
 
 
 def slider_of(law: str, numbers: Numbers) -> Slider:
-    """The sliders of some points."""
+    """Sliders of the points."""
     kind = LAWS[law]
     parameters = {f.name: numbers[f.name] for f in dataclasses.fields(kind)}
     return Slider(kind(**parameters), spring=numbers["K"], load=numbers["W0"])
 
 
 def problem_of(law: str, numbers: Numbers) -> Problem:
-    """Equations and load of some points."""
+    """Equations and load of the points."""
     drive = {"velocity": numbers["V"], "epsilon": numbers["epsilon"], "frequency": numbers["f"]}
     return flatten(checked_problem(slider_of(law, numbers), **drive))[0]
 
@@ -72,7 +73,7 @@ def problem_of(law: str, numbers: Numbers) -> Problem:
 def answer(
     law: str, numbers: Numbers, samples: int, methods: tuple[str, ...] = CHOICES
 ) -> PeriodicResponse:
-    """What the package says of these points, with waveforms."""
+    """Response of the package at the points, with waveforms."""
     return periodic_response(
         slider_of(law, numbers),
         velocity=numbers["V"],
@@ -96,18 +97,18 @@ def faults(
     waveform : array, shape (2, points, samples)
         F/W0 and ln(slip rate/V).
     mean : array, shape (points,)
-        Of F/W0.
+        Mean of F/W0.
     harmonics : array, shape (points, count), complex
-        Of F/W0.
+        Harmonics of F/W0.
 
     Returns
     -------
     wrong, resolved : bool array, shape (points,)
-        What is not resolved is not wrong.
+        A point that is not resolved is not marked as wrong.
     """
     n = {name: a[:, None] for name, a in numbers.items()}
     wrong, resolved = np.zeros((2, waveform.shape[1]), dtype=bool)
-    for step in (8, 4, 2, 1):  # as few samples as resolve: more of them amplify round-off
+    for step in (8, 4, 2, 1):  # the fewest samples that resolve: more of them amplify round-off
         friction, log_slip = waveform[..., ::step]
         residual, end = _residuals(n, friction, log_slip)
         swing = np.ptp(friction, axis=1)
@@ -126,9 +127,9 @@ def faults_marched(
 ) -> np.ndarray:
     """Which points contradict the equations, by SciPy from sample to sample.
 
-    For pulses too narrow for `faults`. From samples between which states change little the printed
-    equations are integrated to the next of them, where they must arrive at its slip rate and age;
-    mean and harmonics are integrated along. Arguments as there.
+    For pulses too narrow for `faults`, whose arguments it has. The printed equations are integrated
+    from sample to sample, selected so that states change little between them. At each sample slip
+    rate and age must be those of the waveform; mean and harmonics are integrated along.
     """
     return np.array(
         [
@@ -177,8 +178,8 @@ def _is_wrong(
     base, gap, integrals = friction.mean(), 0.0, np.zeros(2 + 2 * len(orders))
     states = np.stack([log_slip, phi])
     path = np.abs(np.diff(states, append=states[:, :1])).sum(0)
-    # At most a hundredth of the period and the time of ageing apart, within which a disturbance
-    # grows by a few e, and a change of the states by about a quarter.
+    # Samples are at most a hundredth of the period and the time of ageing apart, in which a
+    # disturbance grows by a few e; between them the states change by about a quarter.
     least = max(_LEAST, 2 * np.pi * n["V"] / (n["D0"] * omega))
     passed = np.floor(np.cumsum(path) / _CHANGE + np.arange(samples) * least / samples)
     nodes = np.flatnonzero(np.diff(passed, prepend=-1.0))
@@ -193,14 +194,14 @@ def _is_wrong(
             return True
         end, following = run.y[:, -1], after % samples
         arrived = np.log(slip_of(load[after], base + end[0], end[1]))
-        # All of them together: what is wrong everywhere is hardly so from one sample to the next.
+        # Gaps are added up, as an error spread over the period is small between two samples.
         gap += abs(arrived - log_slip[following]) + abs(end[1] - phi[following])
         integrals += end[2:] / (2 * np.pi)
     cosines, sines = np.split(integrals[2:], 2)
     swing = np.ptp(friction)
-    off = np.abs(2 * (cosines + 1j * sines) - harmonics).max()
-    off = max(off, abs(base + integrals[1] - mean))
-    return bool(gap > RESIDUAL or abs(integrals[0]) > SLIP or off > HARMONICS * swing)
+    error = np.abs(2 * (cosines + 1j * sines) - harmonics).max()
+    error = max(error, abs(base + integrals[1] - mean))
+    return bool(gap > RESIDUAL or abs(integrals[0]) > SLIP or error > HARMONICS * swing)
 
 
 def _derivative(y: np.ndarray) -> np.ndarray:
@@ -229,7 +230,7 @@ def _residuals(
     # v_pl = d/dt (x - F lambda/W), over V
     elastic = n["lambda_"] * n["K"] / n["W0"] if "lambda_" in n else 0.0
     strained = elastic / gain * (d_friction / w - friction * dw / w**2)
-    # What differentiation makes of the last digit of the force counts for nothing.
+    # The amplification of the last digit of the force by differentiation is no residual.
     noise = np.finfo(float).eps * samples / 2 * np.abs(friction).max(1) / gain[:, 0]
     spring = np.maximum(np.abs(v - strained - slip).max(1) - noise, 0.0) / slip.max(1)
     phi = _age(n, w, friction, log_slip)

@@ -1,7 +1,7 @@
 """Peer: marching in time with SciPy's LSODA until the response repeats.
 
-From the averaged limit: at full amplitude, a start from steady sliding runs away, because steady
-sliding is unstable with the paper's parameters and no inertia holds the slider back.
+Marching starts from the averaged limit. At full amplitude a start in steady sliding runs away, as
+steady sliding is unstable with the paper's parameters and the slider has no inertia.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from benchmarks.cases import Batch
 from benchmarks.equations import Answer, averaged_limit, force_rest, rates, read
 
 _SAMPLES = 32
-#: Change of the states over a period that ends the march, if none of the last was larger. The
-#: transients decay by a hundredth per period, so a hundred times as much is still to go.
+#: The march ends if no change of the states over each of the last periods is larger. Transients
+#: decay by a hundredth per period, so that the remaining change is a hundred times this one.
 SETTLED, LAST = 1e-10, 10
 _MOST_PERIODS = 5000
 
 
 def solve(batch: Batch) -> Answer:
-    """March each point to its steady state."""
+    """March each point to its periodic state."""
     numbers = batch.numbers()
     z0, chi0 = averaged_limit(numbers)
     answers = [

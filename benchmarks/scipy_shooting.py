@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from benchmarks.cases import Batch
 from benchmarks.equations import Answer, averaged_limit, force_rest, multipliers_of, newton_step
 
-#: Of the reference; the arithmetic allows no better.
+#: Tolerance of the reference, the smallest that round-off allows.
 REFERENCE = 1e-13
 
 
@@ -31,7 +31,7 @@ def _solve_point(numbers: dict, z0: float, chi0: float, tolerance: float) -> Ans
     start = np.array([0.0, chi0])
     for _ in range(12):
         state = np.concatenate([start, np.eye(2).ravel(), np.zeros(5)])
-        # y and chi differ by orders of magnitude from their variations: absolute errors in each.
+        # y and chi differ by orders of magnitude from their variations, so that each has its scale.
         scale = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, *[numbers["kappa"]] * 5])
         run = solve_ivp(
             _rates,

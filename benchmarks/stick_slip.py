@@ -1,16 +1,16 @@
-"""Stick-slip recordings of known truth, read: false and missed events, coverage, speed.
+"""Measurements of simulated stick-slip: false and missed events, coverage, campaigns, speed.
 
     python -m benchmarks.stick_slip [--recordings 200] [--campaigns 20] [--healing 40] [--seed 0]
 
 Recordings are straight loading and slips of a free slider at constant friction, with noise of 1 to
 30 % of the drop, white or correlated, impulses, small events among large ones, a gauge that rings,
-creep, and a friction level that drifts along the track, each drawn at random; what a fault is:
-`benchmarks.stick_slip_recordings`. Campaigns are motions
-of a slider with inertia over K and V on both sides of the threshold, measured and given to the
-paper's own steps: columns are A, B and D0, and the mean over the velocities of K/W0 and each
-frequency at the threshold, less their truth over their standard errors. Healing is B - A from
-recordings of one machine at four velocities, each a limit cycle with inertia over and over, with
-noise of 1 to 10 % of the drop and cycles whose sizes spread by up to 10 %.
+creep, and a friction level that drifts along the track, each drawn at random;
+`benchmarks.stick_slip_recordings` defines a fault. Campaigns are motions of a slider with inertia
+at stiffnesses and velocities on both sides of the threshold, from which the steps of the paper
+determine A, B and D0. Printed are the errors over standard errors of these, of K/W0 at the
+threshold (mean over velocities) and of each frequency there. Healing is B - A from recordings of
+one machine at four velocities, each a repeated limit cycle with inertia, with noise of 1 to 10 % of
+the drop and drops that spread by up to 10 %.
 """
 
 import argparse
@@ -40,7 +40,7 @@ from benchmarks.stick_slip_recordings import (
 
 
 def campaign_numbers(seed):
-    """A, B and D0 of a campaign of random truth by the paper's steps, less truth, over se."""
+    """Errors of A, B and D0 by the steps of the paper over standard errors; a random campaign."""
     from asperity_papers.bureau2000.recipe import THRESHOLD_COLUMNS, Thresholds, paper_procedure
 
     rng = np.random.default_rng([seed, 2])
@@ -70,7 +70,7 @@ def campaign_numbers(seed):
     bifurcations = {n: [getattr(end, n) for end in ends] for n in THRESHOLD_COLUMNS}
     result = paper_procedure(table_of(columns), Thresholds("made", **bifurcations))
     numbers = {n: (result.numbers[n].value - truth[n]) / result.numbers[n].se for n in truth}
-    # Brackets have one error in common; frequencies at the velocities have their own.
+    # Errors of K/W0 are common to all velocities; those of the frequencies are independent.
     limit = critical / W0
     numbers["K/W0"] = np.mean([(end.K_over_W0 - limit) / end.K_over_W0_err for end in ends])
     root = np.sqrt((truth["B"] - A) / A) / (2 * np.pi * truth["D0"])
@@ -81,7 +81,7 @@ def campaign_numbers(seed):
 
 
 def healing_interval(seed):
-    """B - A over its truth: the ends of the 95 % interval, and why it cannot be told."""
+    """Ends of the 95 % interval of B - A over the truth, and a reason if there is no interval."""
     rng = np.random.default_rng([seed, 3])
     A = rng.uniform(0.008, 0.02)
     difference, D0, W0 = A * rng.uniform(0.3, 2.0), 10 ** rng.uniform(-6.7, -5.0), 5.0
@@ -108,7 +108,7 @@ def healing_interval(seed):
 
 
 def main():
-    """Print what became of the recordings and the campaigns."""
+    """Print the results of recordings, campaigns and healing, and the time of a long recording."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=200)
     parser.add_argument("--campaigns", type=int, default=20)
@@ -123,8 +123,8 @@ def main():
         print(f"| campaign {seed} | " + " | ".join(words), flush=True)
     for seed in range(chosen.seed, chosen.seed + chosen.healing):
         low, high, reason = healing_interval(seed)
-        said = reason or f"{low:.2f} to {high:.2f} times the truth"
-        print(f"| B - A {seed} | {said} |", flush=True)
+        cell = reason or f"{low:.2f} to {high:.2f} times the truth"
+        print(f"| B - A {seed} | {cell} |", flush=True)
     long = saw(0, events=1500, cycle=480, spread=0.2)
     start = clock.perf_counter()
     measure_stick_slip(long.trace())

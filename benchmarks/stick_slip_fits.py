@@ -1,13 +1,12 @@
-"""Fits of regular stick-slip of known truth: how often 95 % intervals hold it, and what they cost.
+"""Fits of simulated regular stick-slip: share of 95 % intervals with the truth, and their time.
 
     python -m benchmarks.stick_slip_fits [--recordings 40] [--seed 0] [--free B,D0] [--spread 0]
         [--velocities 1]
 
 Each recording repeats the limit cycle of a Rice-Ruina law with inertia 40 times, with white noise
 of 1 to 10 % of the drop. A, B, D0, K, V, M, the sampling rate and the noise are drawn at random.
-With `--spread` the drops differ by this share: the law has no such cycles, and the fit must say so.
-With `--velocities 2` a second recording at eight times the velocity is fitted together with it. An
-interval without bounds on one side holds what lies on the other.
+With `--spread` the drops differ by this share: the law has no such cycles, and the fit must warn.
+With `--velocities 2` a second recording at eight times the velocity is fitted together with it.
 """
 
 import argparse
@@ -27,18 +26,18 @@ W0, CYCLES = 1.0, 40
 
 
 def random_machine(rng):
-    """Numbers of a law and a machine below the threshold of stick-slip, and the velocity (m/s)."""
+    """Numbers of a law and a machine with stick-slip, and the velocity (m/s)."""
     A = rng.uniform(0.006, 0.02)
     B, D0 = A * rng.uniform(1.2, 1.8), 10 ** rng.uniform(-6.5, -5.3)
     K = (B - A) * W0 / D0 * 10 ** rng.uniform(-1.5, -0.5)
     V = 10 ** rng.uniform(-5, -3.5)
-    # The slip lasts for 1 to 3 % of the time that loads the spring by ten times B - A.
+    # The slip lasts 1 to 3 % of the time that loads the spring by ten times (B - A) W0.
     M = K * (rng.uniform(0.01, 0.03) * 10 * (B - A) * W0 / (K * V) / np.pi) ** 2
     return {"A": A, "B": B, "D0": D0, "K": K, "M": M}, V
 
 
 def averaged(truth, V, V0, rng, spread=0.0):
-    """The averaged cycle of a recording at a velocity; None where there is no stick-slip."""
+    """The averaged cycle of a recording at a velocity; None if there is no stick-slip."""
     law = RiceRuina(mu0=0.5, V0=V0, A=truth["A"], B=truth["B"], D0=truth["D0"])
     cycle = limit_cycle(Slider(law, spring=truth["K"], load=W0, mass=truth["M"]), V)
     if cycle.end is not CycleEnd.REPEATS:
@@ -53,7 +52,7 @@ def averaged(truth, V, V0, rng, spread=0.0):
 
 
 def judged(seed, free, spread, velocities):
-    """Whether each interval holds the truth, its width, and the seconds that the fit took."""
+    """Whether each interval contains the truth, its width, and the processor time of the fit."""
     rng = np.random.default_rng([seed, 5])
     truth, V = random_machine(rng)
     cycles = [averaged(truth, V * 8**i, V, rng, spread) for i in range(velocities)]
@@ -62,13 +61,13 @@ def judged(seed, free, spread, velocities):
     fixed = {n: v for n, v in truth.items() if n not in free}
     start = time.process_time()
     result = fit(cycles, "rice-ruina", free, fixed={**fixed, "V0": V}, starts=16)
-    held = {}
+    inside = {}
     for name in free:
         low, high = result.parameters[name].interval_95
-        held[name] = bool(low <= truth[name] <= high)
+        inside[name] = bool(low <= truth[name] <= high)
     return {
         "seed": seed,
-        "held": held,
+        "inside": inside,
         "width": {
             n: float(np.log(p.interval_95[1] / p.interval_95[0])) if p.interval_95[0] else np.inf
             for n, p in result.parameters.items()
@@ -81,7 +80,7 @@ def judged(seed, free, spread, velocities):
 
 
 def main():
-    """Print each recording, then how often the intervals hold the truth."""
+    """Print each recording, then how often the intervals contain the truth."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
@@ -90,28 +89,26 @@ def main():
     parser.add_argument("--velocities", type=int, default=1)
     chosen = parser.parse_args()
     free = chosen.free.split(",")
-    read = []
+    rows = []
     for seed in range(chosen.seed, chosen.seed + chosen.recordings):
-        one = judged(seed, free, chosen.spread, chosen.velocities)
-        if one is None:
+        row = judged(seed, free, chosen.spread, chosen.velocities)
+        if row is None:
             print(f"| {seed} | no regular stick-slip |", flush=True)
             continue
-        read.append(one)
+        rows.append(row)
         print(
-            f"| {seed} | " + " | ".join(f"{k} {v}" for k, v in one.items() if k != "seed") + " |",
+            f"| {seed} | " + " | ".join(f"{k} {v}" for k, v in row.items() if k != "seed") + " |",
             flush=True,
         )
     for name in free:
-        count = sum(one["held"][name] for one in read)
-        width = np.median([one["width"][name] for one in read])
-        print(
-            f"| {name} | held by {count} of {len(read)} | median width {width:.3g} of a logarithm |"
-        )
+        count = sum(row["inside"][name] for row in rows)
+        width = np.median([row["width"][name] for row in rows])
+        print(f"| {name} | in {count} of {len(rows)} | median width {width:.3g} of a logarithm |")
     print(
-        f"| warned of irregular cycles | {sum(one['irregular'] for one in read)} of {len(read)} |"
+        f"| warned of irregular cycles | {sum(row['irregular'] for row in rows)} of {len(rows)} |"
     )
-    print(f"| p below 0.01 | {sum(one['p'] < 0.01 for one in read)} of {len(read)} |")
-    print(f"| seconds of processor time | {np.median([one['seconds'] for one in read]):.3g} |")
+    print(f"| p below 0.01 | {sum(row['p'] < 0.01 for row in rows)} of {len(rows)} |")
+    print(f"| seconds of processor time | {np.median([row['seconds'] for row in rows]):.3g} |")
 
 
 if __name__ == "__main__":

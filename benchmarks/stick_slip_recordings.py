@@ -1,9 +1,9 @@
-"""Stick-slip recordings of known truth, and how a reading of one is judged.
+"""Simulated stick-slip recordings, and the comparison of their measurement with the truth.
 
 A motion is straight loading and slips of one shape (`chain`), or that of a slider with inertia, a
-rate-and-state law and friction that varies along the track (`motion_of_a_law`). The recorder, with
-the filters of the virtual tribometer, adds what it does to the force (`recorded`). The truth stands
-in `Recording`, and `judged` is the only place that says what a fault is.
+rate-and-state law and friction that varies along the track (`motion_of_a_law`). `recorded` adds the
+effects of a recorder, with the filters of the virtual tribometer. `Recording` has the truth, and
+`judged` defines a fault.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,30 +23,30 @@ from asperity.transients import transient
 from asperity.tribometer.sensors import filtered, low_pass, resonant
 
 RATE = 2000.0
-#: Samples of a motion to one of the recorder.
+#: Samples of a motion for one sample of the recorder.
 FINE = 4
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A force and the slips that it is made of.
+    """A force and its true slips.
 
     Attributes
     ----------
     force : array, (n,)
         F/W, sampled at `rate`.
     onset, fast, end : array, (k,)
-        Times (s): peak of the force, where its fall is a tenth of the steepest, trough.
+        Times (s) of the peak of the force, of the first tenth of its steepest fall, of its trough.
     drop : array, (k,)
-        Of F/W.
+        Drops of F/W.
     loading_slope : (float, float)
-        Rate of F/W in the sticks (1/s), by K V and, with the creep that lasts throughout, as it is.
+        Lowest and highest rate of F/W in the sticks (1/s): K V/W0, and that with creep.
     rate : float
-        Hz.
+        Samples per second.
     lag, tail : float
-        By how much onset and end may be late (s), and the gauge's exponential tail.
+        Largest delay of onset and end (s), and the time constant of the gauge's exponential tail.
     options : dict
-        What the recorder added.
+        Effects of the recorder.
     """
 
     force: np.ndarray
@@ -66,7 +66,7 @@ class Recording:
         return np.arange(self.force.size) / self.rate
 
     def trace(self):
-        """The recording as the program reads it."""
+        """The recording for `measure_stick_slip`."""
         return trace_of(self.time, self.force)
 
 
@@ -76,7 +76,7 @@ def trace_of(time, friction):
 
 
 def repeated(cycle, cycles, step, rng, spread=0.0):
-    """Times and F/W of a limit cycle over and over, from a random instant of it.
+    """Times and F/W of a repeated limit cycle, from a random instant of it.
 
     The height of a cycle varies by the relative standard deviation `spread`.
     """
@@ -88,22 +88,22 @@ def repeated(cycle, cycles, step, rng, spread=0.0):
 
 
 def free(u, loaded):
-    """A free slider at constant friction, where the drive loads this share of the drop meanwhile.
+    """Force of a free slider at constant friction, a cosine from -a to pi + a.
 
-    A cosine from -a to pi + a.
+    During the slip the drive loads the spring by the share `loaded` of the drop.
     """
     a = brentq(lambda a: (np.pi / 2 + a) * np.tan(a) - loaded, 0.0, 1.5)
     return (1 + np.cos((np.pi + 2 * a) * u - a) / np.cos(a)) / 2
 
 
 def damped(u, damping):
-    """From rest to rest of an oscillator."""
+    """Force of a damped oscillator from rest to rest."""
     pole = np.pi * damping / np.sqrt(1 - damping**2)
     swing = np.exp(-pole * u) * (np.cos(np.pi * u) + pole / np.pi * np.sin(np.pi * u))
     return (swing + np.exp(-pole)) / (1 + np.exp(-pole))
 
 
-#: The force falls from 1 to 0 as u goes from 0 to 1; x, from 0 to 1, is which one of its kind.
+#: Shapes of a slip: force from 1 to 0 as u goes from 0 to 1; x, from 0 to 1, varies the shape.
 SHAPES = {
     "free": lambda u, _: (1 + np.cos(np.pi * u)) / 2,
     "straight": lambda u, _: 1 - u,
@@ -129,9 +129,9 @@ def chain(drops, slips, sticks, slope, shape, *, first, creep=0.0):
     slips, sticks : int array, (k,)
         Samples of each slip and of the stick after it.
     slope : float
-        Of the loading, per sample.
+        Slope of the loading per sample.
     shape : callable
-        Of u in (0, 1] and the number of the slip.
+        Force from 1 to 0 by u in (0, 1] and the number of the slip.
     first : int
         Samples before the first slip.
     creep : float
@@ -195,7 +195,7 @@ def saw(
     slope, scatter = drop / cycle, rng.standard_normal((events, 2))
     drops = drop * np.maximum(1 + spread * scatter[:, 0], 0.25)
     drops[rng.random(events) < small] = small_size * drop
-    # Creep takes longer to load.
+    # With creep the loading takes longer.
     sticks = (1 + creep) * drops / slope * (1 + 0.3 * spread * scatter[:, 1])
     sticks, slips = np.maximum(sticks.astype(int), 8), np.full(events, slip)
     clean, onset, end = chain(
@@ -207,7 +207,7 @@ def saw(
         first=cycle // 2,
         creep=creep,
     )
-    # Six samples long; it has died out after a hundred.
+    # An oscillation with a period of six samples that dies out within a hundred.
     swing = np.zeros(clean.size)
     swing[end] = -ringing * drops
     j = np.arange(200)
@@ -232,7 +232,7 @@ def _impulses(rng, samples, share):
 
 
 def often(rng, share, low, high):
-    """A number from a range, log-uniform, or zero."""
+    """A log-uniform number from a range with the probability `share`, otherwise zero."""
     number = 10 ** rng.uniform(np.log10(low), np.log10(high))
     return float(number) if rng.random() < share else 0.0
 
@@ -277,7 +277,7 @@ def straight_lines(rng):
 
 
 def motion_of_a_law(rng):
-    """As `straight_lines`, of a slider of random law and machine whose stick-slip has developed."""
+    """As `straight_lines`, for a slider of random law and machine with developed stick-slip."""
     while True:
         A, D0, W0 = rng.uniform(0.008, 0.02), 10 ** rng.uniform(-6.7, -5.3), rng.uniform(1, 20)
         B = A * rng.uniform(1.4, 3)
@@ -299,15 +299,15 @@ def motion_of_a_law(rng):
         duration = min(rng.integers(45, 180) * cycle, 240_000 / rate)
         slider = Slider(law, spring=K, load=W0, mass=K * (slip / np.pi) ** 2)
         drive = Programme(Slide(duration=duration, velocity=V), load=W0, velocity=V / 2)
-        moved = transient(slider, drive, sampling=rate, inertia=True, rtol=1e-6)
-        force = np.asarray(moved.force) / W0
+        motion = transient(slider, drive, sampling=rate, inertia=True, rtol=1e-6)
+        force = np.asarray(motion.force) / W0
         at = turning_points(force, 0.02 * np.ptp(force[force.size // 4 :]))
         peak = np.flatnonzero(np.diff(force[at]) < 0)
         onset, end = at[peak], at[peak + 1]
         inside = (onset > 0) & (end < force.size - 1)
         onset, end = onset[inside], end[inside]
         drop = force[onset] - force[end]
-        # Those that come to slide steadily, or stop, are no stick-slip.
+        # Motions that end in steady sliding or at rest are no stick-slip.
         lasts = onset.size >= 15 and force.size - end[-1] < 2.5 * np.median(np.diff(onset))
         if not lasts or np.median(drop[-5:]) < 0.3 * np.median(drop):
             continue
@@ -319,11 +319,11 @@ def motion_of_a_law(rng):
 
 
 def recorded(seed):
-    """A random motion at a random recorder; times of the truth count samples.
+    """A random motion at a random recorder; true times are in samples.
 
-    Noise of 0.3 to 20 % of the drop, white or correlated, and each of these in some: a gauge that
-    rings with a period of 0.1 to twice a slip, an exponential tail of 0.05 to 0.8 of a slip, hum,
-    noise of 1/f, drift, a level that wanders, impulses, steps and a limit.
+    Noise is 0.3 to 20 % of the drop, white or correlated. Some recordings have a gauge that rings
+    with a period of 0.1 to 2 slips, an exponential tail of 0.05 to 0.8 of a slip, hum, 1/f noise,
+    drift, a level that wanders, impulses, rounding, or clipping.
     """
     rng = np.random.default_rng([seed, 5])
     clean, onset, fast, end, slope = (motion_of_a_law if rng.random() < 0.6 else straight_lines)(
@@ -334,24 +334,24 @@ def recorded(seed):
     every = int(rng.choice([4, 4, 4, 8])) if slip >= 32 else FINE
     options, force = {}, clean
 
-    def some(share, name, low, high):
+    def sometimes(share, name, low, high):
         number = often(rng, share, low, high)
         if number:
             options[name] = round(number, 4)
         return number
 
-    if ring := some(0.3, "ringing", 0.1, 2):
+    if ring := sometimes(0.3, "ringing", 0.1, 2):
         damping = 10 ** rng.uniform(-1.7, -0.7)
         force = filtered(force, 1.0, *resonant(1 / max(ring * slip, 2.2), damping))
-    if tail := some(0.3, "tail", 0.05, 0.8):
+    if tail := sometimes(0.3, "tail", 0.05, 0.8):
         force = filtered(force, 1.0, *low_pass(1, 1 / (2 * np.pi * tail * slip)))
     force = force[::every]
     n, time = force.size, np.arange(force.size)
     white = rng.standard_normal(n)
-    if memory := some(0.2, "correlation", 0.3, 0.9):
-        white = lfilter([np.sqrt(1 - memory**2)], [1, -memory], white)
-    force = force + some(1.0, "noise", 10**-2.5, 10**-0.7) * D * white
-    if size := some(0.3, "hum", 10**-2.3, 0.1):
+    if correlation := sometimes(0.2, "correlation", 0.3, 0.9):
+        white = lfilter([np.sqrt(1 - correlation**2)], [1, -correlation], white)
+    force = force + sometimes(1.0, "noise", 10**-2.5, 10**-0.7) * D * white
+    if size := sometimes(0.3, "hum", 10**-2.3, 0.1):
         period = slip * 10 ** rng.uniform(-0.5, 1.3)
         options["period"] = round(period / slip, 2)
         phase = 2 * np.pi * time * every / period + rng.uniform(0, 2 * np.pi)
@@ -361,21 +361,21 @@ def recorded(seed):
         if period > np.median(np.diff(onset)) / 4:
             begin, close = (np.minimum(at // every, n - 1) for at in (onset, end))
             drop = drop + hum[begin] - hum[close]
-    if size := some(0.25, "noise of 1/f", 10**-2.3, 0.1):
+    if size := sometimes(0.25, "noise of 1/f", 10**-2.3, 0.1):
         spectrum = np.fft.rfft(rng.standard_normal(2 * n))
         spectrum[1:] /= np.sqrt(np.arange(1, spectrum.size))
         slow = np.fft.irfft(spectrum)[:n]
         force = force + size * D * (slow - slow.mean()) / slow.std()
-    if size := some(0.3, "drift", 0.1, 3):
+    if size := sometimes(0.3, "drift", 0.1, 3):
         force = force + rng.choice([-1, 1]) * size * D * (time / n) ** rng.choice([1, 2])
-    if size := some(0.15, "wander", 0.3, 2):
+    if size := sometimes(0.15, "wander", 0.3, 2):
         walk = np.cumsum(rng.standard_normal(n))
         force = force + size * D * gaussian_filter1d(walk / np.abs(walk).max(), 5 * n / drop.size)
-    if share := some(0.4, "impulses", 10**-3.5, 1e-2):
+    if share := sometimes(0.4, "impulses", 10**-3.5, 1e-2):
         force = force + D * rng.uniform(0.2, 1) * _impulses(rng, n, share)
-    if share := some(0.1, "limit", 0.005, 0.1):
+    if share := sometimes(0.1, "limit", 0.005, 0.1):
         force = np.minimum(force, np.quantile(force, 1 - share))
-    if size := some(0.2, "step", 10**-2.3, 0.1):
+    if size := sometimes(0.2, "step", 10**-2.3, 0.1):
         force = size * D * np.rint(force / (size * D))
     middles = (
         (e + (o - e) // 4, o - (o - e) // 4) for e, o in zip(end[:-1], onset[1:], strict=True)
@@ -389,15 +389,15 @@ def recorded(seed):
 
 
 def judged(truth):
-    """How a recording is read: numbers, what is flagged, and faults.
+    """Measurement of a recording compared with the truth: shares, flagged checks, and faults.
 
-    A fault is: more than 1 % (and one) of the events are false, more than 2 % (and one) of those
-    above the stated threshold are missed, the 95 % intervals of onset, end or drop hold less than
-    95 % by three standard errors of that share, the loading slope is off by more than three
-    standard uncertainties and 1 %, or the regime is another. The truth of an onset is anywhere from
-    the peak of the force to where its fall reaches a tenth of the steepest; onset and end may be
-    later by the gauge's time constant and by the inverse of the angular frequency with which it
-    rings. Ends are not judged where the gauge has a tail.
+    Faults are: more than 1 % (and one) of the events are false; more than 2 % (and one) of those
+    above the stated threshold are missed; the share of 95 % intervals of onset, end, drop or
+    recurrence that contain the truth is three of its standard errors below 95 %; the loading slope
+    is more than three standard uncertainties and 1 % off; the regime is another. The true onset is
+    anywhere from the peak of the force to the first tenth of its steepest fall; onset and end may
+    be later by the gauge's time constant and by the inverse of the angular frequency of its
+    ringing. Ends are not compared if the gauge has a tail.
     """
     result = measure_stick_slip(truth.trace())
     events, slip = result.events, float(np.median(truth.end - truth.onset))
@@ -405,30 +405,30 @@ def judged(truth):
     answer = {"options": truth.options, "flags": flags, "events": truth.drop.size}
     if not len(events):
         return answer | {"faults": ["no event"]}
-    true, read = matched(truth, events)
+    true, measured = matched(truth, events)
     drop, last = truth.drop, truth.time[-1]
     inside = (truth.onset > 3 * slip) & (truth.end < last - 3 * slip)
-    seen = np.flatnonzero((drop > result.smallest_drop) & inside)
-    missed, false = np.setdiff1d(seen, true).size, len(events) - read.size
-    begin = np.clip(events.onset[read], truth.onset[true], truth.fast[true] + truth.lag)
-    finish = np.clip(events.end[read], truth.end[true], truth.end[true] + truth.lag)
-    timing = events.timing_uncertainty[read]
-    recurrence = np.diff(events.onset[read] - begin)[np.diff(true) == 1]
-    doubt = np.hypot(timing[1:], timing[:-1])[np.diff(true) == 1]
+    large = np.flatnonzero((drop > result.smallest_drop) & inside)
+    missed, false = np.setdiff1d(large, true).size, len(events) - measured.size
+    begin = np.clip(events.onset[measured], truth.onset[true], truth.fast[true] + truth.lag)
+    finish = np.clip(events.end[measured], truth.end[true], truth.end[true] + truth.lag)
+    timing = events.timing_uncertainty[measured]
+    recurrence = np.diff(events.onset[measured] - begin)[np.diff(true) == 1]
+    uncertainty = np.hypot(timing[1:], timing[:-1])[np.diff(true) == 1]
     scores = {
-        "onset": (events.onset[read] - begin) / timing,
-        "end": (events.end[read] - finish) / timing,
-        "drop": (events.drop[read] - drop[true]) / events.drop_uncertainty[read],
-        "recurrence": recurrence / doubt,
+        "onset": (events.onset[measured] - begin) / timing,
+        "end": (events.end[measured] - finish) / timing,
+        "drop": (events.drop[measured] - drop[true]) / events.drop_uncertainty[measured],
+        "recurrence": recurrence / uncertainty,
     }
     if truth.tail:
         del scores["end"]
-    held = {name: float(np.mean(np.abs(z) < 1.96)) for name, z in scores.items() if z.size}
+    shares = {name: float(np.mean(np.abs(z) < 1.96)) for name, z in scores.items() if z.size}
     least = 0.95 - 3 * np.sqrt(0.95 * 0.05 / max(true.size, 1))
-    faults = [f"{name} {share:.2f}" for name, share in held.items() if not share >= least]
-    off = result.loading_slope - np.clip(result.loading_slope, *truth.loading_slope)
-    score = off / result.loading_slope_uncertainty
-    if abs(score) > 3 and abs(off) > 0.01 * truth.loading_slope[1]:
+    faults = [f"{name} {share:.2f}" for name, share in shares.items() if not share >= least]
+    error = result.loading_slope - np.clip(result.loading_slope, *truth.loading_slope)
+    score = error / result.loading_slope_uncertainty
+    if abs(score) > 3 and abs(error) > 0.01 * truth.loading_slope[1]:
         faults.append(f"slope {score:.1f}")
     if false > max(1, 0.01 * len(events)):
         faults.append(f"false {false}")
@@ -436,41 +436,41 @@ def judged(truth):
         faults.append(f"missed {missed}")
     if not any(part.sticks for part in result.regimes if part.stop - part.first > 2):
         faults.append(result.kind)
-    held["slope"] = float(abs(score) < 1.96)
-    return answer | {"held": held, "false": false, "missed": missed, "faults": faults}
+    shares["slope"] = float(abs(score) < 1.96)
+    return answer | {"held": shares, "false": false, "missed": missed, "faults": faults}
 
 
 def matched(truth, events):
-    """Indices of true events and of those read that belong together, by their middles."""
+    """Indices of true events and of the measured events that match them, by their middles."""
     slip = truth.end - truth.onset
     reach = np.maximum(slip, np.median(slip)) + 2 / truth.rate + 2 * truth.lag
-    away = np.abs((events.onset + events.end)[:, None] - (truth.onset + truth.end)) / 2
-    read = away.argmin(0)
-    true = np.flatnonzero(away.min(0) < reach)
-    # One that is read is one event.
-    true = true[np.unique(read[true], return_index=True)[1]]
-    return true, read[true]
+    distance = np.abs((events.onset + events.end)[:, None] - (truth.onset + truth.end)) / 2
+    nearest = distance.argmin(0)
+    true = np.flatnonzero(distance.min(0) < reach)
+    # A measured event matches one true event only.
+    true = true[np.unique(nearest[true], return_index=True)[1]]
+    return true, nearest[true]
 
 
-def tables(read):
-    """Lines that say how recordings of a population were read, and the faulty ones."""
-    ok = [one for one in read if not one["flags"]]
-    faulty = [one for one in ok if one["faults"]]
+def tables(rows):
+    """Lines with the results of a population of recordings, and its faulty recordings."""
+    ok = [row for row in rows if not row["flags"]]
+    faulty = [row for row in ok if row["faults"]]
     lines = [
         "| recordings, with a fault | all checks ok, with a fault |",
-        f"| {len(read)}, {sum(bool(one['faults']) for one in read)} | {len(ok)}, {len(faulty)} |",
+        f"| {len(rows)}, {sum(bool(row['faults']) for row in rows)} | {len(ok)}, {len(faulty)} |",
     ]
     for name in ("onset", "end", "drop", "recurrence", "slope"):
         shares = [
-            np.mean([one["held"][name] for one in some if name in one.get("held", {})] or [np.nan])
-            for some in (read, ok)
+            np.mean([row["held"][name] for row in part if name in row.get("held", {})] or [np.nan])
+            for part in (rows, ok)
         ]
-        lines.append(f"| 95 % intervals of {name} that hold it, all and ok | {shares[0]:.3f}, "
+        lines.append(f"| 95 % intervals of {name} with the truth, all and ok | {shares[0]:.3f}, "
                      f"{shares[1]:.3f} |")  # fmt: skip
     for name in ("false", "missed"):
         counts = [
-            f"{sum(one.get(name, 0) for one in some)} of {sum(one['events'] for one in some)}"
-            for some in (read, ok)
+            f"{sum(row.get(name, 0) for row in part)} of {sum(row['events'] for row in part)}"
+            for part in (rows, ok)
         ]
         lines.append(f"| {name} events, all and ok | {', '.join(counts)} |")
-    return lines + [f"{one['seed']} {one['faults']} {one['options']}" for one in faulty]
+    return lines + [f"{row['seed']} {row['faults']} {row['options']}" for row in faulty]

@@ -1,8 +1,8 @@
-"""A sweep that is killed ten times at random moments, against an undisturbed one.
+"""A sweep that is killed ten times at random moments, compared with an undisturbed one.
 
     python benchmarks/sweep_killed.py [KILLS] [SEED]
 
-Every file of both stores but the attributes of the group, which say who ran it, must be the same.
+All files of both stores must be equal, except the attributes, which have version and machine.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ count = 200
 
 
 def files_of(store: Path) -> dict[str, bytes]:
-    """Everything in a store but its attributes."""
+    """All files of a store except its attributes."""
     return {
         str(f.relative_to(store)): f.read_bytes()
         for f in store.rglob("*")
@@ -46,7 +46,7 @@ def files_of(store: Path) -> dict[str, bytes]:
 
 
 def started(plan: Path, store: Path, workers: int) -> subprocess.Popen[bytes]:
-    """A driver in a process group of its own."""
+    """A driver in a new process group."""
     command = [sys.executable, "-m", "asperity", "sweep", str(plan), "--out", str(store)]
     return subprocess.Popen(
         [*command, "--workers", str(workers)],
@@ -57,21 +57,21 @@ def started(plan: Path, store: Path, workers: int) -> subprocess.Popen[bytes]:
 
 
 def children(process: int) -> list[int]:
-    """Processes that a process has started, and theirs."""
-    found = []
+    """Processes that a process has started, and those that these have started."""
+    processes = []
     for task in Path(f"/proc/{process}/task").glob("*/children"):
         for child in task.read_text().split():
-            found += [int(child), *children(int(child))]
-    return found
+            processes += [int(child), *children(int(child))]
+    return processes
 
 
 def done(store: Path) -> int:
-    """Chunks with a status."""
+    """Number of chunks with a status."""
     return sum(len(names) for _, _, names in os.walk(store / "status" / "c"))
 
 
 def main(kills: int, seed: int, law: str = "rice-ruina", frequency: str = "120 Hz") -> bool:
-    """Kill, compare, print; whether the bits are the same."""
+    """Kill, compare and print; True if all files are equal."""
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
         plan = Path(folder, "plan.toml")
@@ -83,32 +83,32 @@ def main(kills: int, seed: int, law: str = "rice-ruina", frequency: str = "120 H
         while sum(counts.values()) < kills:
             before = done(broken) if broken.exists() else 0
             driver = started(plan, broken, 2)
-            # Somewhere between the start and some chunks later.
-            wanted = before + rng.choice([0, 1, 2, 3])
-            while driver.poll() is None and (done(broken) if broken.exists() else 0) <= wanted:
+            # The kill comes up to three chunks later.
+            target = before + rng.choice([0, 1, 2, 3])
+            while driver.poll() is None and (done(broken) if broken.exists() else 0) <= target:
                 time.sleep(0.05)
             time.sleep(rng.random() * 0.3)
             if driver.poll() is not None:
                 break
             who = rng.choice(["driver", "worker"])
-            others = children(driver.pid)
-            if who == "worker" and others:
-                os.kill(rng.choice(others), signal.SIGKILL)
+            children_of_driver = children(driver.pid)
+            if who == "worker" and children_of_driver:
+                os.kill(rng.choice(children_of_driver), signal.SIGKILL)
                 counts["worker"] += 1
                 time.sleep(rng.random())
             if driver.poll() is None:
                 os.kill(driver.pid, signal.SIGKILL)
                 counts["driver"] += 1
             driver.wait()
-            for process in others:
+            for process in children_of_driver:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(process, signal.SIGKILL)
             sys.stdout.write(f"{counts}: {done(broken)} of {total} chunks\n")
             sys.stdout.flush()
         code = started(plan, broken, 2).wait()
         same = files_of(whole) == files_of(broken)
-        left = [p.name for p in Path(folder).iterdir() if p.name.endswith((".lock",))]
-        sys.stdout.write(f"killed {counts}, exit {code}, same bits: {same}, left: {left}\n")
+        locks = [p.name for p in Path(folder).iterdir() if p.name.endswith((".lock",))]
+        sys.stdout.write(f"killed {counts}, exit {code}, same bits: {same}, left: {locks}\n")
         return same
 
 

@@ -1,4 +1,4 @@
-"""Rows of the benchmark: a time beside the error that was reached in it."""
+"""Rows of the benchmark: times and errors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HEADER = "| what | points | cores | us/point | points/s | mean | mu1 | mu2 | mu
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One measurement; errors are the largest relative ones, NaN where nothing is compared."""
+    """One measurement; errors are the largest relative ones, NaN if there is no reference."""
 
     what: str
     points: int
@@ -58,7 +58,7 @@ def markdown(rows: list[Row]) -> str:
 
 
 def write(rows: list[Row], path: Path) -> None:
-    """The rows as JSON, errors that do not exist as null."""
+    """Write the rows as JSON, missing errors as null."""
     records = []
     for row in rows:
         record = dataclasses.asdict(row)

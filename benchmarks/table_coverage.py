@@ -1,11 +1,11 @@
-"""Coverage of the intervals of fits to lock-in tables, beside what is usually done.
+"""Coverage of the intervals of fits to lock-in tables, compared with the usual least squares.
 
     python -m benchmarks.table_coverage [--sets 200] [--posterior 40]
 
 Synthetic tables of two velocities and eight amplitudes each, from the elasto-plastic law with the
 numbers of Bureau et al. (2000), with normal noise in the mean and in both parts of each harmonic.
-Five parameters are free. A row of the result says how often intervals hold the truth, as a share
-over all parameters, with the lowest share of any parameter.
+Five parameters are free. A row of the result has the share of intervals that contain the truth,
+over all parameters, and the lowest share of a parameter.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ LEVELS = (math.erf(1 / math.sqrt(2)), 0.95)
 
 def exact_response(material):
     slider = asp.Slider(material.law("elasto-plastic"), spring=material.K, load=material.W0)
-    found = asp.periodic_response(
+    response = asp.periodic_response(
         slider, velocity=V, epsilon=TRUTH["eps_ratio"] * EPSILON, frequency=FREQUENCY
     )
     return (
-        found.delta_mu,
-        found.mu1 * np.exp(1j * found.phase1),
-        found.mu2 * np.exp(1j * found.phase2),
+        response.delta_mu,
+        response.mu1 * np.exp(1j * response.phase1),
+        response.mu2 * np.exp(1j * response.phase2),
     )
 
 
@@ -65,10 +65,10 @@ def noisy_table(exact, rng, shared, *, correlated):
 
 
 def by_fit(objective):
-    """Intervals of the normal approximation, from the minimum beside the truth."""
+    """Intervals of the normal approximation at the minimum next to the truth."""
     u = objective.coordinates(TRUTH)
-    found = described_fit(objective, [objective.minimise(u)], profile=False)
-    return {n: (p.interval_68, p.interval_95) for n, p in found.parameters.items()}
+    result = described_fit(objective, [objective.minimise(u)], profile=False)
+    return {n: (p.interval_68, p.interval_95) for n, p in result.parameters.items()}
 
 
 def by_moduli(objective):
@@ -86,30 +86,30 @@ def by_moduli(objective):
         parts |= {f"mu{n}": np.abs(predicted.harmonics[:, n - 1]) for n in (1, 2)}
         return np.concatenate([(parts[n] - table.values[n]) / size[n] for n in parts])
 
-    found = least_squares(residuals, np.ones(len(TRUTH)), bounds=(1e-2, 1e2), max_nfev=60)
-    variance = 2 * found.cost / (found.fun.size - len(TRUTH))
-    sd = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance)
+    minimum = least_squares(residuals, np.ones(len(TRUTH)), bounds=(1e-2, 1e2), max_nfev=60)
+    variance = 2 * minimum.cost / (minimum.fun.size - len(TRUTH))
+    sd = np.sqrt(np.diag(np.linalg.pinv(minimum.jac.T @ minimum.jac)) * variance)
     return {
         n: tuple(
             (t * (x - norm.isf((1 - q) / 2) * s), t * (x + norm.isf((1 - q) / 2) * s))
             for q in LEVELS
         )
-        for (n, t), x, s in zip(TRUTH.items(), found.x, sd, strict=True)
+        for (n, t), x, s in zip(TRUTH.items(), minimum.x, sd, strict=True)
     }
 
 
-def by_posterior(objective, material, table):
-    found = fit(table, "elasto-plastic", list(TRUTH), material=material)
-    posterior = sample_posterior(found, chains=2, draws=500)
+def by_posterior(table, material):
+    result = fit(table, "elasto-plastic", list(TRUTH), material=material)
+    posterior = sample_posterior(result, chains=2, draws=500)
     return {n: (p.interval_68, p.interval_95) for n, p in posterior.parameters.items()}
 
 
-def coverage(name, method, cases):
-    if not cases:
+def coverage(name, intervals_of, tables):
+    if not tables:
         return
     inside, began = [], time.perf_counter()
-    for case in cases:
-        intervals = method(*case)
+    for table in tables:
+        intervals = intervals_of(table)
         inside.append([[low <= TRUTH[n] <= high for low, high in intervals[n]] for n in TRUTH])
     shares = np.mean(inside, axis=0)
     whole, lowest = 100 * shares.mean(0), 100 * shares.min(0)
@@ -131,32 +131,24 @@ def main():
     chosen = parser.parse_args()
     material = asp.materials.load("bureau2000")
     exact = exact_response(material)
-    tables = {
+    kinds = {
         "independent errors": (0.0, False),
         "correlated, covariance given": (SHARED, True),
         "correlated, covariance ignored": (SHARED, False),
     }
     print("| data, method | sets | 68.3 % | 95 % | Monte Carlo | s a set |")
     print("|---|---|---|---|---|---|")
-    for name, (shared, correlated) in tables.items():
-        cases = []
-        for seed in range(chosen.sets):
-            table = noisy_table(exact, np.random.default_rng(seed), shared, correlated=correlated)
-            # One start suffices: the truth is known here.
-            cases.append((table,))
-
-        def problem(table):
-            return fit_problem(table, material)
-
-        coverage(f"{name}: fit", lambda t: by_fit(problem(t)), cases)
+    for name, (shared, correlated) in kinds.items():
+        tables = [
+            noisy_table(exact, np.random.default_rng(seed), shared, correlated=correlated)
+            for seed in range(chosen.sets)
+        ]
+        coverage(f"{name}: fit", lambda t: by_fit(fit_problem(t, material)), tables)
         if not correlated and not shared:
-            coverage(f"{name}: least squares of moduli", lambda t: by_moduli(problem(t)), cases)
-            some = cases[: chosen.posterior]
-            coverage(
-                f"{name}: posterior",
-                lambda t: by_posterior(problem(t), material, t),
-                some,
-            )
+            squares = f"{name}: least squares of moduli"
+            coverage(squares, lambda t: by_moduli(fit_problem(t, material)), tables)
+            few = tables[: chosen.posterior]
+            coverage(f"{name}: posterior", lambda t: by_posterior(t, material), few)
 
 
 def fit_problem(table, material):

@@ -1,11 +1,11 @@
-"""The rows of transients: a protocol marched in time, beside SciPy on a plain right-hand side.
+"""The rows of transients: protocols integrated in time, compared with SciPy.
 
 Three protocols with the paper's numbers: a load modulation switched on, elasto-plastic law and a
-stiffer spring, with and without inertia; and stick-slip with inertia on rigid asperities. Times are
-of one protocol; errors are the largest of F/W0 over its samples, relative to the largest F/W0,
-against SciPy's integrators at the limit of the arithmetic. SciPy's tolerance is the loosest that is
-as accurate as the package, or the tightest that it takes where none is; `solve_ivp` and the older
-`odeint`, which calls the same LSODA with less ado, are both shown.
+stiffer spring, with and without inertia; and stick-slip with inertia on rigid asperities. A time is
+that of one protocol; an error is the largest of F/W0 over its samples, relative to the largest
+F/W0, compared with SciPy's integrators at their smallest tolerance. SciPy's LSODA has the loosest
+tolerance that is as accurate as the package, or its smallest if none is. It is called by
+`solve_ivp` and by the older `odeint`, which has less overhead.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from benchmarks.table import Row
 MU0, A, B, D0, V0, W0, M, LAMBDA = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0, 1.6, 6.2e-7
 _TOLERANCES = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 
-#: TrialStep steps that go astray must not overflow.
+#: Largest exponent, so that failing trial steps do not overflow.
 _LARGEST = 300.0
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """A transient as both sides are given it.
+    """A transient for the package and for SciPy.
 
     Attributes
     ----------
     name : str
     rates : callable
-        (t, y) -> dy/dt; plain Python, the first state being F/W0.
+        (t, y) -> dy/dt in plain Python; the first state is F/W0.
     start : list of float
     times : array
         Samples (s).
     ours : callable
         rtol -> F/W0 at the samples.
     reference : str
-        Method of `solve_ivp` that is exact here.
+        Method of `solve_ivp` for the exact solution.
     """
 
     name: str
@@ -84,13 +84,13 @@ def modulation(seconds: float, inertia: bool) -> Protocol:
 
     def ours(rtol: float) -> np.ndarray:
         slider = _slider(asp.laws.ElastoPlastic, K, lambda_=LAMBDA)
-        found = asp.transient(slider, programme, sampling=times, inertia=inertia, rtol=rtol)
-        return found.force / W0
+        motion = asp.transient(slider, programme, sampling=times, inertia=inertia, rtol=rtol)
+        return motion.force / W0
 
     if inertia:
         start = [MU0, 0.0, V, MU0, 0.0]
         return Protocol("inertial modulation on", inertial, start, times, ours, "DOP853")
-    # The load steps up by 24 %: spring and asperities share the force anew, and the slider moves.
+    # The load steps up by 24 %: the asperities become stiffer, and the slider moves.
     f = MU0 * (1 + ratio) / (1 + ratio / 1.24)
     x = (MU0 - f) * W0 / K
     start = [f, -x / D0, x]
@@ -115,10 +115,10 @@ def stick_slip(seconds: float) -> Protocol:
     programme = Programme(Slide(seconds, V), load=W0, velocity=1e-5)
 
     def ours(rtol: float) -> np.ndarray:
-        found = asp.transient(
+        motion = asp.transient(
             _slider(asp.laws.RiceRuina, K), programme, sampling=times, inertia=True, rtol=rtol
         )
-        return found.force / W0
+        return motion.force / W0
 
     log_v = np.log(1e-5 / V0)
     start = [MU0 + (A - B) * log_v, log_v, -log_v, 0.0]
@@ -144,8 +144,8 @@ def transient_rows(seconds: float, repeats: int) -> list[Row]:
                 )
                 if error(force) <= max(reached, 1e-9):
                     break
-            less = "" if error(force) <= max(reached, 1e-9) else ", less accurate"
-            note = f"rtol {tolerance:.0e}{less}; {peer / time:.1f} x asperity"
+            remark = "" if error(force) <= max(reached, 1e-9) else ", less accurate"
+            note = f"rtol {tolerance:.0e}{remark}; {peer / time:.1f} x asperity"
             rows.append(Row(f"{name}, {protocol.name}", 1, peer, mean=error(force), note=note))
     return rows
 

@@ -1,10 +1,10 @@
-"""Random points over the whole range: what becomes of each, and whether the answers are right.
+"""Random points over the whole range: their outcomes, and the residuals of the answers.
 
     python -m benchmarks.whole_range --points 100000 --out whole_range
 
-Every answer that claims convergence is put back into the equations (`benchmarks.residual`).
-Works in slices that are written as they are done; called again it goes on where it was. Two calls
-with `--part 1/2` and `--part 2/2` share the work between two cores.
+Every answer that claims convergence is tested in the equations (`benchmarks.residual`). Points are
+solved in slices, each of which is written when it is done; another call continues after the last
+one. Two calls with `--part 1/2` and `--part 2/2` share the work between two cores.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from asperity.orbit import Outcome, PeriodicResponse
 from benchmarks.residual import LAWS, Numbers, answer, draw, faults, faults_marched
 
 SLICE = 2000
-#: Samples of the waveform; for narrow pulses more of them, and so many points at a time; and for
-#: pulses that pass between two of those, within which round-off grows a thousandfold.
+#: Samples of the waveform; those for narrow pulses, and how many such points are solved together;
+#: and those for pulses between two samples, within which round-off grows a thousandfold.
 SAMPLES, FINE_SAMPLES, _FEW, FINEST_SAMPLES = 2**12, 2**20, 32, 2**24
 
 
@@ -58,12 +58,12 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
         response.mean_friction[converged],
         response.harmonics[converged],
     )
-    left = converged[~resolved[converged]]
+    unresolved = converged[~resolved[converged]]
     marched = np.zeros_like(resolved)
-    for rows in np.array_split(left, -(-len(left) // _FEW)) if len(left) else ():
-        _look_again(law, numbers, response, rows, FINE_SAMPLES, (wrong, resolved, marched))
+    for rows in np.array_split(unresolved, -(-len(unresolved) // _FEW)) if len(unresolved) else ():
+        _test_finer(law, numbers, response, rows, FINE_SAMPLES, (wrong, resolved, marched))
     for row in np.flatnonzero(wrong & marched):
-        _look_again(
+        _test_finer(
             law, numbers, response, np.array([row]), FINEST_SAMPLES, (wrong, resolved, marched)
         )
     resolved |= marched
@@ -77,7 +77,7 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     }
 
 
-def _look_again(
+def _test_finer(
     law: str,
     numbers: Numbers,
     response: PeriodicResponse,
@@ -85,23 +85,23 @@ def _look_again(
     samples: int,
     verdict: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
-    """Look at points again with more samples, by integration where these do not resolve either.
+    """Test points with more samples, and by integration if these do not resolve the pulses either.
 
-    Mean and harmonics are those of the answer, the waveform that of the methods for such orbits.
+    Mean and harmonics are those of the answer, the waveform that of methods for narrow pulses.
     """
     wrong, resolved, marched = verdict
-    again = answer(law, _rows(numbers, rows), samples, ("series", "collocation"))
-    rows, waveform = rows[again.converged], again.waveform[:, again.converged]
+    finer = answer(law, _rows(numbers, rows), samples, ("series", "collocation"))
+    rows, waveform = rows[finer.converged], finer.waveform[:, finer.converged]
     part, mean, harmonics = (
         _rows(numbers, rows),
         response.mean_friction[rows],
         response.harmonics[rows],
     )
     wrong[rows], resolved[rows] = faults(part, waveform, mean, harmonics)
-    late = ~resolved[rows]
-    marched[rows] = late
-    wrong[rows[late]] = faults_marched(
-        _rows(part, late), waveform[:, late], mean[late], harmonics[late]
+    narrow = ~resolved[rows]
+    marched[rows] = narrow
+    wrong[rows[narrow]] = faults_marched(
+        _rows(part, narrow), waveform[:, narrow], mean[narrow], harmonics[narrow]
     )
 
 

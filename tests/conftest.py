@@ -1,4 +1,4 @@
-"""References that the tests of several rooms share, and how rooms go to the processes of xdist."""
+"""Shared references of the tests, and which process of xdist runs which folder ("room")."""
 
 import gc
 import os
@@ -18,29 +18,30 @@ pytest_plugins = [
     "references.published_equations",
 ]
 
-# XLA makes up to 32 modules of a program, to compile them on several cores; here other tests run on
-# those, and one module takes a sixth less processor time. Read when JAX first looks for devices.
+# XLA splits a program into up to 32 modules to compile them on several cores. Here other tests use
+# the other cores, and a single module takes a sixth less processor time. JAX reads this option when
+# it first looks for devices.
 _ONE_MODULE = "--xla_cpu_parallel_codegen_split_count=1"
 if _ONE_MODULE not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_ONE_MODULE}".strip()
 
-# The threads of a BLAS wait for each other actively, which takes the other process its core. Read
-# when NumPy is imported.
+# The threads of a BLAS wait for each other in loops, which takes processor time from the other
+# process. NumPy reads this variable when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-#: Rooms that take longest from an empty compilation cache; they come first.
+#: Rooms that take longest from an empty compilation cache; they run first.
 LONGEST = (
     *("orbit", "inference", "papers", "branches", "docs", "transients", "study", "app"),
     *("measurement", "cli", "laws", "theory", "lock_in"),
 )
 
-#: Rooms that go to the processes file by file: the longest, and those that compile nothing.
+#: Rooms that are distributed file by file: the longest, and those that compile nothing.
 BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 
-#: Beginnings of the names of files whose programs take longer to be optimised than they run, in
-#: processes that their tests start too. Others run what users run. JAX keeps a program in memory
-#: however it was compiled, so that these come last: what is left to them is optimised, while
-#: programs of theirs would cost the others several times as long.
+#: Files, by the beginnings of their names, whose programs are compiled with few optimisations, as
+#: optimising them takes longer than running them; processes that they start do the same. The other
+#: files run optimised programs, as users do, and run first: JAX keeps programs in memory, and those
+#: with few optimisations would take them several times as long.
 BRIEF = (
     *("orbit/", "docs/", "theory/", "transients/", "laws/", "app/", "study/"),
     "papers/bureau2000/",
@@ -63,7 +64,7 @@ def is_brief(nodeid):
 
 
 def scope(nodeid):
-    """What one process of xdist runs at a time: a file, or the part of a room compiled alike."""
+    """Unit that one process of xdist runs: a file, or the files of a room compiled alike."""
     if room(nodeid) in BY_FILE:
         return nodeid.split("::")[0]
     return f"{room(nodeid)} brief" if is_brief(nodeid) else room(nodeid)
@@ -71,7 +72,7 @@ def scope(nodeid):
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items):
-    """Sort rooms, briefly compiled ones last, and mark the tests of `make quick`."""
+    """Sort rooms, those with few optimisations last, and mark the tests of `make quick`."""
     for _, file in groupby(items, key=lambda item: item.path):
         short = (i for i in file if not any(map(i.get_closest_marker, ("slow", "long"))))
         for first in islice(short, 1):
@@ -82,7 +83,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Leave what is imported out of the collections of garbage, a twentieth of the time."""
+    """Exclude imported objects from garbage collection, which saves a twentieth of the time."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
@@ -90,16 +91,16 @@ def pytest_collection_finish():
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """With `pytest -n`, one process runs a room: its tests share compiled programs.
+    """With `pytest -n`, a room runs in one process, where its tests share compiled programs.
 
-    By xdist's default each process compiles those of nearly every room. `--dist loadgroup` does not
-    group with pytest 9.2 and pytest-xdist 3.8.
+    By default of xdist each process would compile programs of nearly every room. `--dist loadgroup`
+    does not group with pytest 9.2 and pytest-xdist 3.8.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByRoom(LoadScopeScheduling):
         def _split_scope(self, nodeid):
-            # The first tests of the files share hardly a program.
+            # The first tests of the files hardly share programs.
             return nodeid if config.option.markexpr == "quick" else scope(nodeid)
 
     if config.getvalue("dist") != "load":
@@ -110,7 +111,7 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.hookimpl(tryfirst=True)  # before fixtures are made
 def pytest_runtest_setup(item):
-    """Programs are compiled in half the time, and run several times as long, in some rooms."""
+    """In some files compile programs in half the time; they run several times as long."""
     import jax
 
     brief = is_brief(item.nodeid)

@@ -1,4 +1,4 @@
-"""Imports point one way, and nothing of one machine is left in a file."""
+"""Rooms, the folders of the package, import in one direction; no file has details of a machine."""
 
 import ast
 import importlib
@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "asperity"
 
-#: What every room may use.
+#: Rooms that every room may import.
 _BASE = {"arrays", "_jax", "_lazy", "_processes", "_version", "errors", "outputs"}
 _BASE |= {"parameters", "units"}
 _EQUATIONS = _BASE | {"laws", "loads", "slider"}
@@ -22,7 +22,7 @@ _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
 _RESULTS = _EQUATIONS | _SOLVERS | _SIGNALS | {"air", "materials", "questions"}
 _STUDIES = {"experiment", "protocol", "samples", "study"}
 
-#: The rooms, and what each may import besides itself: the one place where the order is written.
+#: The rooms, and what each may import besides itself.
 MAY_IMPORT: dict[str, set[str]] = {
     "_version": set(),
     "arrays": set(),
@@ -66,14 +66,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     | _STUDIES
     | {"inference", "figures", "operating_point", "ledger", "app", "fit_report"},
     "__main__": {"cli"},
-    # The package itself names its rooms as text, and imports them when they are asked for.
+    # The package itself imports its rooms lazily, by name.
     "__init__": {"_lazy"},
 }
 
 #: The papers: users of the library, found by an entry point.
 PAPERS = ROOT / "src" / "asperity_papers"
 
-# Put together here, so that this file does not hold what it looks for.
+# Concatenated, so that this file does not match itself.
 _HOSTS = ["pypi" + ".org", "files.python" + "hosted", "test.pypi" + ".org"]
 _FORBIDDEN = re.compile(
     "|".join(
@@ -115,53 +115,53 @@ def imported_rooms(source: str) -> Iterator[tuple[str, int]]:
 
 
 def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """Nodes that run: what only a type checker reads loads nothing."""
+    """Nodes that run, without those that only a type checker reads."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-            yield from (n for other in child.orelse for n in (other, *_running(other)))
+            yield from (n for statement in child.orelse for n in (statement, *_running(statement)))
         else:
             yield child
             yield from _running(child)
 
 
 def wrong_imports(package: Path) -> list[str]:
-    """Every import against the order, as ``file:line: room -> room``."""
-    found = []
+    """Imports that `MAY_IMPORT` does not allow, as ``file:line: room -> room``."""
+    wrong = []
     for module in sorted(package.rglob("*.py")):
         room = room_of(module, package)
         for target, line in imported_rooms(module.read_text(encoding="utf-8")):
             if target != room and target not in MAY_IMPORT.get(room, set()):
-                found.append(f"{module.relative_to(package)}:{line}: {room} -> {target}")
-    return found
+                wrong.append(f"{module.relative_to(package)}:{line}: {room} -> {target}")
+    return wrong
 
 
 def imports_within(room: Path, package: Path = PACKAGE) -> dict[str, set[str]]:
-    """What each part of a room imports from its other parts."""
+    """For each part of a room, the other parts that it imports."""
     inside = ".".join(("asperity", *room.relative_to(package).parts, ""))
-    found: dict[str, set[str]] = {}
+    imports: dict[str, set[str]] = {}
     for module in sorted(room.rglob("*.py")):
         part = room_of(module, room)
         if part == "__init__":
             continue
-        parts = found.setdefault(part, set())
+        parts = imports.setdefault(part, set())
         for node in _running(ast.parse(module.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(inside):
                 target = (node.module or "").removeprefix(inside).split(".")[0]
                 parts |= {target} - {part}
-    return found
+    return imports
 
 
 def rooms_in_a_cycle(allowed: dict[str, set[str]]) -> set[str]:
-    """Rooms that cannot be put into an order in which each comes after what it imports."""
-    rest = dict(allowed)
-    while leaves := [room for room, others in rest.items() if not others & set(rest)]:
+    """Rooms that import each other in a cycle, and rooms that import these."""
+    remaining = dict(allowed)
+    while leaves := [room for room, others in remaining.items() if not others & set(remaining)]:
         for room in leaves:
-            del rest[room]
-    return set(rest)
+            del remaining[room]
+    return set(remaining)
 
 
 def private_names(source: str) -> list[str]:
-    """What a module imports from the library that is not public, with the line.
+    """Imports of names of the library that are not public, with the line.
 
     Public are the package, its rooms, and the names that a room lists in ``__all__``.
     """
@@ -182,7 +182,7 @@ def private_names(source: str) -> list[str]:
 
 
 def repository_files() -> list[Path]:
-    """Text files that are, or would be, part of the repository."""
+    """Text files of the repository, new ones included."""
     if shutil.which("git") and (ROOT / ".git").exists():
         listed = subprocess.run(
             ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
@@ -201,27 +201,27 @@ def repository_files() -> list[Path]:
     return [f for f in files if f.is_file() and (f.suffix in _TEXT or f.name in _TEXT_NAMES)]
 
 
-def test_imports_point_one_way() -> None:
+def test_rooms_import_in_one_direction() -> None:
     assert wrong_imports(PACKAGE) == []
 
 
-def test_every_room_has_its_place_in_the_order() -> None:
+def test_every_room_has_an_entry_in_the_table_of_imports() -> None:
     rooms = {room_of(module) for module in PACKAGE.rglob("*.py")}
     assert rooms <= set(MAY_IMPORT)
     assert {"errors", "units", "laws", "materials"} <= rooms
 
 
-def test_the_order_has_no_cycle() -> None:
+def test_the_table_of_imports_has_no_cycle() -> None:
     assert rooms_in_a_cycle(MAY_IMPORT) == set()
 
 
-def test_the_parts_of_no_room_import_in_a_cycle() -> None:
+def test_parts_of_a_room_do_not_import_in_a_cycle() -> None:
     rooms = [d for d in sorted(PACKAGE.rglob("*")) if d.is_dir() and d.name != "__pycache__"]
     assert "fitting" in imports_within(PACKAGE / "inference")["comparison"]
     assert {str(r): c for r in rooms if (c := rooms_in_a_cycle(imports_within(r)))} == {}
 
 
-def test_a_planted_cycle_is_caught(tmp_path: Path) -> None:
+def test_a_planted_cycle_is_detected(tmp_path: Path) -> None:
     (tmp_path / "orbit" / "methods").mkdir(parents=True)
     for place, line in (
         ("mesh.py", "from asperity.orbit.methods.newton import x"),
@@ -229,8 +229,8 @@ def test_a_planted_cycle_is_caught(tmp_path: Path) -> None:
         ("period.py", "from asperity.orbit.mesh import z"),
     ):
         (tmp_path / "orbit" / place).write_text(line, encoding="utf-8")
-    found = rooms_in_a_cycle(imports_within(tmp_path / "orbit", tmp_path))
-    assert found == {"mesh", "methods", "period"}
+    cycle = rooms_in_a_cycle(imports_within(tmp_path / "orbit", tmp_path))
+    assert cycle == {"mesh", "methods", "period"}
 
 
 @pytest.mark.parametrize(
@@ -253,13 +253,13 @@ def test_a_planted_cycle_is_caught(tmp_path: Path) -> None:
         ("utils", "from asperity.errors import InputError", "errors"),
     ],
 )
-def test_a_planted_wrong_import_is_caught(
+def test_a_planted_wrong_import_is_detected(
     tmp_path: Path, room: str, line: str, target: str
 ) -> None:
     (tmp_path / room).mkdir()
     (tmp_path / room / "planted.py").write_text(line, encoding="utf-8")
-    (found,) = wrong_imports(tmp_path)
-    assert found.endswith(f"{room} -> {target}")
+    (wrong,) = wrong_imports(tmp_path)
+    assert wrong.endswith(f"{room} -> {target}")
 
 
 def test_papers_use_public_names_only() -> None:
@@ -285,16 +285,16 @@ def test_the_library_imports_no_paper() -> None:
         "def f():\n    from asperity.inference.tables.term import LockInTerm",
     ],
 )
-def test_a_planted_private_name_is_caught(line: str) -> None:
+def test_a_planted_private_name_is_detected(line: str) -> None:
     assert len(private_names(line)) == 1
 
 
-def test_public_names_pass() -> None:
+def test_public_names_are_accepted() -> None:
     public = "import asperity as asp\nfrom asperity import Slider, theory\n"
     assert private_names(f"{public}from asperity.theory import closed_forms as cf\n") == []
 
 
-def test_right_imports_pass(tmp_path: Path) -> None:
+def test_allowed_imports_are_accepted(tmp_path: Path) -> None:
     (tmp_path / "orbit").mkdir()
     (tmp_path / "orbit" / "right.py").write_text(
         "from typing import TYPE_CHECKING\nimport numpy\nfrom asperity.slider import Slider\n"
@@ -305,16 +305,16 @@ def test_right_imports_pass(tmp_path: Path) -> None:
     assert wrong_imports(tmp_path) == []
 
 
-def test_no_file_names_a_registry_or_a_machine() -> None:
+def test_no_file_has_a_registry_or_a_path_of_a_machine() -> None:
     files = repository_files()
     assert ROOT / "pyproject.toml" in files
     assert ROOT / "requirements" / "run.txt" in files
-    found = [
+    matches = [
         f"{f.relative_to(ROOT)}: {match[0]}"
         for f in files
         if (match := _FORBIDDEN.search(f.read_text(encoding="utf-8")))
     ]
-    assert found == []
+    assert matches == []
 
 
 @pytest.mark.parametrize(
@@ -327,11 +327,11 @@ def test_no_file_names_a_registry_or_a_machine() -> None:
         "--extra-index" + "-url x",
     ],
 )
-def test_planted_machine_details_are_caught(text: str) -> None:
+def test_planted_machine_details_are_detected(text: str) -> None:
     assert _FORBIDDEN.search(text)
 
 
-def test_ordinary_paths_are_not_taken_for_machine_details() -> None:
+def test_ordinary_paths_are_accepted() -> None:
     assert not _FORBIDDEN.search("src/work/main.py, $HOME/work/ and ./root/x")
 
 

@@ -1,9 +1,9 @@
-"""From a slider's movement to the picture, in a browser: five figures and three laws.
+"""Time from the movement of a slider to the picture in a browser, with five figures and three laws.
 
-``python -m benchmarks.page.latency`` opens Explore with the air layer, so that all five figures are
-there, and moves the slider of the amplitude by keyboard. The page itself takes the times: from the
+``python -m benchmarks.page.latency`` opens Explore with the air layer, so that it has all five
+figures, and moves the slider of the amplitude by keyboard. The page measures the times, from the
 event of the slider to the frame after the figures were written (`performance.measure`). The first
-movements are left out, and movements whose request a newer one replaced have no time.
+movements are left out; a movement whose request was replaced by a newer one has no time.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _WARM = 10
 
 
 def times(page: Any) -> list[float]:
-    """Times (ms) that the page has taken."""
-    found: list[float] = page.evaluate(_TIMES)
-    return found
+    """Times (ms) that the page has measured."""
+    milliseconds: list[float] = page.evaluate(_TIMES)
+    return milliseconds
 
 
 def opened(browser: Any, port: int, view: str = VIEW) -> Any:
@@ -55,11 +55,11 @@ def main() -> None:
             handle.press("ArrowRight" if number % 100 < 50 else "ArrowLeft")
             while len(times(page)) == before:
                 page.wait_for_timeout(5)
-        found = times(page)[-options.movements :]
+        last = times(page)[-options.movements :]
         print(
-            f"{len(found)} movements, {shown} figures, 3 laws: median "
-            f"{statistics.median(found):.0f} ms, p95 {quantile(found, 0.95):.0f} ms, longest "
-            f"{max(found):.0f} ms; {load()}"
+            f"{len(last)} movements, {shown} figures, 3 laws: median "
+            f"{statistics.median(last):.0f} ms, p95 {quantile(last, 0.95):.0f} ms, longest "
+            f"{max(last):.0f} ms; {load()}"
         )
 
 

@@ -1,4 +1,4 @@
-"""A server for a benchmark, a browser that shows its page, and what the machine was doing."""
+"""A server for a benchmark, a browser that shows its page, and the load of the machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
-#: What draws into memory only: the picture is rasterised by the processor.
+#: The browser draws into memory, and the processor rasterises the picture.
 _OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 
 

@@ -1,8 +1,8 @@
 """The page left open while its sliders move: memory of the page and of the server.
 
-``python -m benchmarks.page.soak --minutes 60`` moves three sliders of Explore in turn, some times a
-second, and says at intervals what the page's scripts hold after a garbage collection, how many
-elements and listeners the page has, and the resident memory of the server and of its workers.
+``python -m benchmarks.page.soak --minutes 60`` moves three sliders of Explore in turn, ``--rate``
+times a second. At intervals it prints the memory of the page's scripts after a garbage collection,
+the numbers of elements and listeners, and the resident memory of the server and of its workers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from benchmarks.page.serving import chromium, load, serving
 SLIDERS = ("relative amplitude", "pulling velocity", "stiffness of the pulling")
 
 
-def own(process: int) -> float:
+def memory(process: int) -> float:
     """Resident memory (MB) of a process alone."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return next(int(x.split()[1]) / 1024 for x in lines if x.startswith("VmRSS"))
@@ -28,14 +28,14 @@ def resident(process: int) -> float:
     """Resident memory (MB) of a process and all that it started."""
     tasks = Path(f"/proc/{process}/task").iterdir()
     started = [int(child) for task in tasks for child in (task / "children").read_text().split()]
-    return own(process) + sum(map(resident, started))
+    return memory(process) + sum(map(resident, started))
 
 
 def counted(session: Any) -> dict[str, float]:
-    """What the page holds after a garbage collection."""
+    """Metrics of the page after a garbage collection."""
     session.send("HeapProfiler.collectGarbage")
-    found = session.send("Performance.getMetrics")["metrics"]
-    return {metric["name"]: metric["value"] for metric in found}
+    metrics = session.send("Performance.getMetrics")["metrics"]
+    return {metric["name"]: metric["value"] for metric in metrics}
 
 
 def main() -> None:
@@ -64,7 +64,7 @@ def main() -> None:
                 print(
                     f"{(now - start) / 60:7.1f}  {moved:9}  {held['JSHeapUsedSize'] / 1e6:7.1f}  "
                     f"{held['Nodes']:8.0f}  {held['JSEventListeners']:9.0f}  "
-                    f"{own(server.process):9.0f}  {resident(server.process):15.0f}  {load()}",
+                    f"{memory(server.process):9.0f}  {resident(server.process):15.0f}  {load()}",
                     flush=True,
                 )
             if over:

@@ -1,8 +1,8 @@
 """Many users of the page at once: time from a question of Explore to its answer.
 
-``python -m benchmarks.page.users`` starts a server and as many clients as ``--users``, each of
-which asks again as soon as it is answered, as a slider that never rests would, while one more
-client has asked for the largest map.
+``python -m benchmarks.page.users`` starts a server and ``--users`` clients. Each client sends the
+next question as soon as it has an answer, like a slider in motion, while one more client waits for
+the largest map.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""All that a user can name is in the documentation; its parts fit together, its examples run."""
+"""The documentation has every name that a user can type; its links resolve, its examples run."""
 
 import base64
 import dataclasses
@@ -27,12 +27,12 @@ PAGES = {p.relative_to(DOCS).as_posix(): p.read_text(encoding="utf-8") for p in 
 PAGES = {name: text for name, text in PAGES.items() if not name.startswith("_build")}
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 API = "\n".join(text for name, text in PAGES.items() if name.startswith("api/"))
-#: Laws of the package; a test of another module may have registered one of its own.
+#: Laws of the package, without those that other tests have registered.
 LAWS = sorted(n for n, law in registered().items() if law.__module__.startswith("asperity."))
 
 
 def code(text: str) -> set[str]:
-    """Everything that stands in code."""
+    """Words inside backticks."""
     return {
         word for part in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"[\w-]+", part)
     }
@@ -40,13 +40,13 @@ def code(text: str) -> set[str]:
 
 def options(name: str) -> list[str]:
     module = importlib.import_module(main.modules[name])
-    # An option that is hidden is there to be refused.
-    seen = [p for p in getattr(module, name).params if not getattr(p, "hidden", False)]
-    return [option for p in seen for option in p.opts if option[0] == "-"]
+    # Hidden options only exist to be refused with a sentence.
+    visible = [p for p in getattr(module, name).params if not getattr(p, "hidden", False)]
+    return [option for p in visible for option in p.opts if option[0] == "-"]
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_every_law_is_named(law) -> None:
+def test_every_law_is_documented(law) -> None:
     for text in (README, *(PAGES[p] for p in ("getting_started.md", "command_line.md"))):
         assert law in code(text)
     assert f"`{law}`" in PAGES["theory/equations.md"]
@@ -54,7 +54,7 @@ def test_every_law_is_named(law) -> None:
 
 
 def generated_names(which: str) -> set[str]:
-    """Names in a table of the page of nomenclature, as its extension writes it."""
+    """Names in a table of the page of nomenclature, which an extension writes."""
     assert f"{{parameters}} {which}" in PAGES["nomenclature.md"]
     folder = str(DOCS / "_ext")
     sys.path.insert(0, folder)
@@ -78,7 +78,7 @@ def test_the_nomenclature_has_the_response_and_the_machine() -> None:
     assert "omega" in code(PAGES["nomenclature.md"])
 
 
-def test_every_proof_that_the_page_names_is_there() -> None:
+def test_every_test_named_by_the_page_of_proofs_exists() -> None:
     page = PAGES["what_is_proven.md"]
     rows = [row.split(" | ")[2] for row in page.splitlines() if row.count(" | ") == 3]
     named = {name for row in rows for name in re.findall(r"`([\w/]+(?:\.py)?)`", row)}
@@ -91,11 +91,11 @@ def test_every_proof_that_the_page_names_is_there() -> None:
 
 
 @pytest.mark.parametrize("command", sorted(main.modules))
-def test_every_command_and_option_has_its_place(command) -> None:
+def test_every_command_and_option_is_documented(command) -> None:
     page = PAGES["command_line.md"]
     assert f"## asperity {command}" in page
-    own = [part for part in re.split(r"^## ", page, flags=re.M) if f"asperity {command}" in part]
-    named = set(re.findall(r"(?<![\w-])--?[\w-]+", "\n".join(own)))
+    sections = [p for p in re.split(r"^## ", page, flags=re.M) if f"asperity {command}" in p]
+    named = set(re.findall(r"(?<![\w-])--?[\w-]+", "\n".join(sections)))
     assert set(options(command)) <= named
     assert f"asperity {command}" in README
 
@@ -111,7 +111,7 @@ def test_every_public_name_is_in_the_reference(name) -> None:
 def test_every_public_name_of_a_room_is_in_the_reference(room) -> None:
     module = importlib.import_module(f"asperity.{room}")
     named = set(re.findall(rf":: asperity\.(?:{room}\.)?(\w+)", API))
-    # A type alias has no page of its own.
+    # A type alias has no page.
     assert set(module.__all__) - {"State"} <= named | {"KINDS"}
 
 
@@ -126,7 +126,7 @@ def test_every_attribute_of_a_response_is_described(field) -> None:
     assert field in code(PAGES["results.md"])
 
 
-def test_every_material_is_named() -> None:
+def test_every_material_is_documented() -> None:
     for name in materials.available():
         assert name in PAGES["command_line.md"]
 
@@ -136,7 +136,7 @@ def test_every_page_is_in_the_contents() -> None:
     assert sorted(f"{name}.md" for name in listed) == sorted(set(PAGES) - {"index.md"})
 
 
-def test_links_of_the_readme_lead_somewhere() -> None:
+def test_links_of_the_readme_lead_to_files() -> None:
     targets = re.findall(r"\]\(([^)#]+)\)", README) + re.findall(r'src="([^"]+)"', README)
     local = [t for t in targets if "://" not in t]
     assert len(local) > 8
@@ -155,14 +155,14 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_the_ten_lines_of_the_vision_are_ten() -> None:
+def test_the_vision_has_ten_numbered_lines() -> None:
     text = (ROOT / "VISION.md").read_text(encoding="utf-8")
     assert re.findall(r"^(\d+)\.", text, re.M) == [str(n) for n in range(1, 11)]
 
 
 @pytest.fixture
 def extension(monkeypatch):
-    """A module of docs/_ext, where what it needs is installed."""
+    """A function that imports a module of docs/_ext; skips the test where Sphinx is missing."""
 
     def load(name: str):
         pytest.importorskip("sphinx")
@@ -173,7 +173,7 @@ def extension(monkeypatch):
     return load
 
 
-def test_a_planted_asset_from_elsewhere_is_seen(extension) -> None:
+def test_a_planted_asset_of_another_site_is_detected(extension) -> None:
     foreign = extension("offline").foreign_assets
     assert foreign('<script src="https://example.org/x.js"></script>')
     assert foreign('<link rel="stylesheet" href="//example.org/x.css">')
@@ -182,7 +182,7 @@ def test_a_planted_asset_from_elsewhere_is_seen(extension) -> None:
     assert not foreign('<link rel="canonical" href="https://example.org/"><img src="x.png">')
 
 
-def test_docstrings_are_made_safe(extension) -> None:
+def test_special_characters_of_docstrings_are_escaped(extension) -> None:
     escaped = extension("docstrings").escaped
     assert escaped(["mu = |c_1|, lambda_ of `lambda_`"]) == [r"mu = \|c_1\|, lambda\_ of `lambda_`"]
     assert escaped(["lambda_ : |x|"]) == [r"lambda_ : \|x\|"]
@@ -190,17 +190,17 @@ def test_docstrings_are_made_safe(extension) -> None:
     assert escaped(literal) == [*literal[:-1], r"after \|x\|"]
 
 
-def test_formulas_become_mathml_and_unknown_commands_are_told(extension, caplog) -> None:
+def test_formulas_become_mathml_and_unknown_commands_are_reported(extension, caplog) -> None:
     pytest.importorskip("latex2mathml")
     module = extension("mathml")
     assert module.to_mathml(r"\arg c_n", display=False).startswith("<math")
-    named = []
-    module._log = type("Log", (), {"warning": lambda self, *a, **k: named.append(a)})()
+    warnings = []
+    module._log = type("Log", (), {"warning": lambda self, *a, **k: warnings.append(a)})()
     module.to_mathml(r"\nosuchcommand x", display=True)
-    assert named
+    assert warnings
 
 
-def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None:
+def test_a_tutorial_becomes_a_notebook_with_its_text_and_python(extension) -> None:
     page = PAGES["tutorials/vibration.md"]
     made = json.loads(extension("notebooks").notebook(page, DOCS / "tutorials"))
     assert (made["nbformat"], {c["cell_type"] for c in made["cells"]}) == (4, {"code", "markdown"})
@@ -211,7 +211,7 @@ def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None
     text = "\n".join("".join(c["source"]) for c in made["cells"] if c["cell_type"] == "markdown")
     assert "# Lowering friction by vibration" in text
     assert "asperity measure recording.csv" in text
-    # What a block prints, which tests compare with the page, is the output of its cell.
+    # The printed text after a block is the output of its cell.
     assert "35.2 %" not in text
     (first, *_) = [c for c in made["cells"] if c["cell_type"] == "code"]
     assert "35.2 %" in "".join(first["outputs"][0]["text"])
@@ -220,7 +220,7 @@ def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None
     assert picture == (DOCS / "images" / "vibration.png").read_bytes()
 
 
-def test_the_gallery_shows_every_tutorial() -> None:
+def test_the_gallery_links_every_tutorial() -> None:
     gallery = PAGES["tutorials/gallery.md"]
     for name, text in PAGES.items():
         if name.startswith("tutorials/") and name != "tutorials/gallery.md":
@@ -241,14 +241,14 @@ def test_outside_the_repository_the_readme_has_no_links_into_it() -> None:
     assert "getting started" in text.lower()
 
 
-#: What starts a server, which `tests/app/test_notebook.py` calls, and what no one calls.
+#: An exception, and a function that starts a server, which `tests/app/test_notebook.py` calls.
 OTHERS = {"InputError", "explore"}
 FUNCTIONS = [n for n in asp.__all__ if callable(getattr(asp, n)) and n not in OTHERS]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_the_example_runs(name, tmp_path, monkeypatch) -> None:
+def test_the_example_of_a_function_runs(name, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     mpl.use("agg")
     examples = doctest.DocTestParser().get_examples(inspect.getdoc(getattr(asp, name)) or "")

@@ -1,12 +1,10 @@
-"""Every runnable part of the README and of the pages runs, and prints what the page says."""
+"""Every runnable part of the README and of the pages runs, and prints what the page shows."""
 
 import csv
-import importlib.util
 import json
 import math
 import re
 import runpy
-import sys
 import tomllib
 from pathlib import Path
 
@@ -19,23 +17,19 @@ from asperity.inference.design.plan import plan_of
 from asperity.laws import registry
 from asperity.questions.recording import ReadingRecipe
 from asperity.study.plan import SweepPlan, plan_record
-
-_spec = importlib.util.spec_from_file_location("snippets", Path(__file__).with_name("snippets.py"))
-pages = importlib.util.module_from_spec(_spec)
-sys.modules["snippets"] = pages
-_spec.loader.exec_module(pages)
+from references import snippets as pages
 
 ROOT = pages.ROOT
-#: Pages whose code takes more than about eight seconds. What they do, others prove in every run:
-#: fits of the same recording and of tables (`tests/inference`), folds, bifurcations and boundaries
-#: (`tests/branches`).
+#: Pages whose code takes more than about eight seconds. Other tests prove their content in every
+#: run: fits of the same recording and of tables (`tests/inference`), folds, bifurcations and
+#: boundaries (`tests/branches`).
 SLOW = {
     "docs/tutorials/python.md",
     "docs/tutorials/velocity_step.md",
     *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
     *("docs/healing.md", "docs/fitting.md", "docs/theory/continuation.md"),
 }
-#: Pages that `tests/papers/test_claims.py` runs, with the ledger that it has computed.
+#: Pages that `tests/papers/bureau2000/test_claims.py` runs, with its computed ledger.
 ELSEWHERE = {"docs/claims.md"}
 
 
@@ -54,11 +48,11 @@ def invoke(*arguments: str):
 
 @pytest.fixture
 def workplace(tmp_path, monkeypatch):
-    """An empty folder, a registry of laws of its own, and no window for figures."""
+    """An empty folder, a separate registry of laws, and no windows for figures."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
     mpl.use("agg")
-    # However slow the machine is, no page shows a progress bar.
+    # No progress lines, however slow the machine is.
     monkeypatch.setattr("asperity.cli.progress._IN_LOG", math.inf)
     return tmp_path
 
@@ -74,7 +68,7 @@ def run_console(snippet, where, capsys, included) -> None:
     for command in pages.commands(snippet.text):
         program, *arguments = command.arguments
         if program == "asperity" and arguments[0] == "reproduce":
-            # Half a minute of work that tests/papers does; here its options are parsed.
+            # tests/papers proves the command, which takes half a minute; here options are parsed.
             import asperity.cli.papers as module
 
             module.reproduce.make_context("reproduce", arguments[1:])
@@ -91,14 +85,14 @@ def run_console(snippet, where, capsys, included) -> None:
         elif program == "python":
             capsys.readouterr()
             script = ROOT / arguments[0]
-            if script in included:  # its class has compiled programs
+            if script in included:  # programs of its class are compiled
                 included[script]["main"]()
             else:
                 runpy.run_path(str(script), run_name="__main__")
             printed = capsys.readouterr().out
             assert pages.difference(command.prints, printed) == "", f"{where}\n{printed}"
         else:
-            pytest.fail(f"{where}: nobody knows how to try '{program}'")
+            pytest.fail(f"{where}: no test runs '{program}'")
 
 
 @pytest.mark.parametrize(
@@ -108,7 +102,7 @@ def run_console(snippet, where, capsys, included) -> None:
         for p in RUNNABLE
     ],
 )
-def test_page_runs_as_it_says(page, workplace, capsys) -> None:
+def test_the_code_of_a_page_prints_what_it_shows(page, workplace, capsys) -> None:
     namespace, included = {"__name__": "page"}, {}
     for snippet in pages.snippets(page):
         where = f"{named(page)}:{snippet.line}"
@@ -130,14 +124,14 @@ def plans(page: str):
     return [tomllib.loads(b) for b in re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)]
 
 
-def test_plans_of_designs_and_recipes_on_pages_are_read() -> None:
+def test_plans_of_designs_and_recipes_on_pages_are_valid() -> None:
     (plan,) = plans("docs/design.md")
     assert plan_of(plan, require_unit=True).budget == plan["points"]
     (recipe,) = plans("docs/reading_recordings.md")
     assert ReadingRecipe(**recipe).title == recipe["title"]
 
 
-def test_parts_of_sweeps_on_pages_belong_to_plans(workplace) -> None:
+def test_plans_of_sweeps_on_pages_are_valid(workplace) -> None:
     table = "V,epsilon,frequency,mu1,mu1_err\n1e-6,0.1,120,1e-3,1e-5\n1e-6,0.2,120,2e-3,1e-5\n"
     for name in ("readings", "monday", "tuesday"):
         (workplace / f"{name}.csv").write_text(table)
@@ -145,7 +139,7 @@ def test_parts_of_sweeps_on_pages_belong_to_plans(workplace) -> None:
     base = {"law": "elasto-plastic", "material": "bureau2000", "axes": {"mu0": {"values": [0.3]}}}
     fits = {}
     for part in plans("docs/sweeps.md"):
-        if part.get("solve") == "fit":  # parts after it are of its plan
+        if part.get("solve") == "fit":  # later parts belong to the same plan
             fits = part
         whole = base | fits | part
         if "data" in whole["axes"]:
@@ -200,7 +194,7 @@ def test_result_columns_of_a_table_are_those_of_the_page(workplace) -> None:
         ("-23%", "-23%"),
     ],
 )
-def test_equal_outputs_are_equal(shown, printed) -> None:
+def test_equal_outputs_have_no_difference(shown, printed) -> None:
     assert pages.difference(shown, printed) == ""
 
 
@@ -219,7 +213,7 @@ def test_equal_outputs_are_equal(shown, printed) -> None:
         ("True", "False"),
     ],
 )
-def test_planted_differences_are_seen(shown, printed) -> None:
+def test_planted_differences_are_detected(shown, printed) -> None:
     assert pages.difference(shown, printed)
 
 

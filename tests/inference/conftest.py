@@ -6,14 +6,14 @@ import pytest
 from asperity import Slider, materials, periodic_response
 from asperity.inference import table_of
 
-#: What the readings are made with: the paper's numbers, and a share of the modulation.
+#: True values of the readings: the numbers of the paper, and eps_eff over epsilon.
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 V = np.repeat([1e-6, 1e-5], 8)
 EPSILON = np.tile(np.linspace(0.05, 0.5, 8), 2)
 FREQUENCY = 120.0
-#: Samples of the waveform, as in the tests of the solvers, and segments of the integration.
+#: Samples of the waveform, and segments of the integration.
 SAMPLES, SEGMENTS = 4096, 32
-#: Standard uncertainties of the mean and of either part of a harmonic.
+#: Standard uncertainties of the mean and of the real and imaginary part of a harmonic.
 MEAN, HARMONIC = 1e-3, 2e-5
 
 
@@ -24,27 +24,27 @@ def pmma():
 
 @pytest.fixture(scope="session")
 def exact(reference, pmma):
-    """Mean friction less mu_ss, and complex harmonics, of the elasto-plastic law."""
+    """Mean friction minus mu_ss, and complex harmonics, of the elasto-plastic law."""
     printed = reference.Printed(
         V=V[:, None], frequency=FREQUENCY, lambda_=TRUTH["lambda"], K=2e5, W0=7.0
     )
     epsilon = (TRUTH["eps_ratio"] * EPSILON)[:, None]
-    # Newton's method of the integration starts from the package's orbit, 0.1 % off.
-    near = periodic_response(
+    # The initial guess of the shooting is 0.1 % from the orbit of the package.
+    response = periodic_response(
         Slider(pmma.law("elasto-plastic"), spring=2e5, load=7.0),
         velocity=V,
         epsilon=epsilon[:, 0],
         frequency=FREQUENCY,
         waveform=SAMPLES,
     )
-    force, log_slip = near.waveform[..., :: SAMPLES // SEGMENTS]
+    force, log_slip = response.waveform[..., :: SAMPLES // SEGMENTS]
     shot = reference.multiple_shooting(printed, epsilon, force, 1.001 * log_slip)
     return shot.mean.ravel() - printed.mu.ravel(), shot.harmonics[:, :2]
 
 
 @pytest.fixture(scope="session")
 def readings(exact):
-    """A table with noise of a given seed; None for none."""
+    """A function that makes a table with noise of a seed; without noise for None."""
     drop, harmonics = exact
 
     def make(seed, planted=1.0):

@@ -1,4 +1,4 @@
-"""Laws from outside the package: by file, module and entry point; laws that are refused."""
+"""Laws from outside the package, by file, module and entry point, and the checks of such laws."""
 
 import importlib
 import sys
@@ -25,7 +25,7 @@ number = 3
 
 
 @pytest.fixture(autouse=True)
-def a_registry_of_its_own(monkeypatch):
+def separate_registry(monkeypatch):
     """Laws registered in a test are removed after it."""
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
     registry.installed.cache_clear()
@@ -68,7 +68,7 @@ def test_a_law_in_a_module_is_known_by_its_name(law_file, monkeypatch) -> None:
         ("{folder}:Mine", "file that exists"),
     ],
 )
-def test_a_wrong_place_is_one_sentence(law_file, place: str, message: str) -> None:
+def test_a_wrong_place_is_refused(law_file, place: str, message: str) -> None:
     broken = law_file.with_name("broken.py")
     broken.write_text("1 / 0", encoding="utf-8")
     text = place.format(file=law_file, broken=broken, folder=law_file.parent)
@@ -204,16 +204,16 @@ def test_a_law_that_breaks_an_assumption_is_refused(law, message) -> None:
     assert "\n" not in str(raised.value)
 
 
-def test_sound_laws_pass_with_any_number_of_points() -> None:
+def test_correct_laws_pass_for_one_and_for_many_points() -> None:
     assert Slider(Sound(**NUMBERS), spring=2e5, load=7.0).law.name == "sound"
     many = Sound(**NUMBERS | {"A": jnp.array([[0.01, 0.02]])})
     assert Slider(many, spring=2e5, load=7.0).law.A.shape == (1, 2)
 
 
 @pytest.mark.parametrize("law", sorted(registered()))
-def test_the_laws_of_the_package_pass_the_checks_of_a_users_law(law) -> None:
+def test_the_laws_of_the_package_pass_the_checks_of_user_laws(law) -> None:
     kind = type("Copy", (registered()[law],), {"__module__": "elsewhere"})
-    every = {"A": 0.013, "B": 0.026, "alpha": 0.2, "c": 0.2, "V1": 1e-8, "V2": 1e-4, "mu0": 0.5}
-    own = {n: every.get(n, 1e-6) for n in law_parameters(kind)}
-    own = {n + "_" * (n == "lambda"): value for n, value in own.items()}
-    checked_law(kind(**own))
+    known = {"A": 0.013, "B": 0.026, "alpha": 0.2, "c": 0.2, "V1": 1e-8, "V2": 1e-4, "mu0": 0.5}
+    numbers = {n: known.get(n, 1e-6) for n in law_parameters(kind)}
+    numbers = {n + "_" * (n == "lambda"): value for n, value in numbers.items()}
+    checked_law(kind(**numbers))

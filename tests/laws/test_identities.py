@@ -1,4 +1,4 @@
-"""Identities that every registered law obeys, and mutated laws that must be caught by them."""
+"""Identities that every registered law obeys, and mistakes planted in laws, which they detect."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ Parameters = Mapping[str, float]
 
 
 class Limit(NamedTuple):
-    """The law that another becomes for `exact` parameters, and nearly becomes for `near` ones.
+    """The law that another one becomes for `exact` parameters, and nearly becomes for `near` ones.
 
     states: turns a state of motion (Y, w) into one at which the two laws agree.
     """
@@ -55,18 +55,19 @@ class Limit(NamedTuple):
 
 
 def vanishing(law: str, **parameters: float) -> tuple[Limit, ...]:
-    """What a law becomes when these parameters, given with a typical size, vanish."""
+    """The limit of a law when these parameters, given with a typical size, vanish."""
     near = {name: 1e-12 * value for name, value in parameters.items()}
     return (Limit(law, dict.fromkeys(parameters, 0.0), near),)
 
 
 @dataclasses.dataclass(frozen=True)
 class Example:
-    """Parameters of a law, and what its published equations say of it.
+    """Parameters of a law, and what follows from its published equations.
 
-    slope: d mu_ss / d ln v. limits: what it becomes. load_step: F/W after W has jumped from w by a
-    factor, at constant v and continuous state, where it was f. age_velocity: the velocity that the
-    states see. memoryless: parameters with which friction forgets; rate: friction then.
+    slope: d mu_ss / d ln v. limits: laws that it becomes. load_step: F/W after W, equal to w, is
+    multiplied by a factor at constant v and continuous state, where F/W was f. age_velocity: the
+    velocity on which the rates of the states depend. memoryless: parameters with which friction
+    does not depend on the age; rate: friction with these.
     """
 
     parameters: Parameters
@@ -130,7 +131,7 @@ EXAMPLES = {
     ),
     "ruina-slip": Example(RATE_AND_STATE, age_velocity="plastic"),
     "perrin-rice-zheng": Example(RATE_AND_STATE),
-    # The values that the authors measured.
+    # Values measured by the authors.
     "nagata": Example(
         {**RATE_AND_STATE, "A": 0.051, "B": 0.0565, "c": 2.0},
         limits=vanishing("rice-ruina", c=2.0),
@@ -148,7 +149,7 @@ EXAMPLES = {
     "prakash-clifton": Example(
         {**RATE_AND_STATE, "L": 3e-7, "V_star": 1e-7},
         limits=(
-            # The effective load has reached the applied one.
+            # The effective load is the applied one.
             Limit("rice-ruina", {}, {}, lambda Y, w: Y.at[-1].set(jnp.log(w))),
         ),
         load_step=lambda p, f, w, factor: f / factor,
@@ -176,7 +177,7 @@ def motion(system: QuasiStatic, seed: int = 0) -> tuple[jax.Array, Excitation]:
     return Y, Excitation(jnp.asarray(w), jnp.asarray(slope))
 
 
-# The identities. Each raises AssertionError where a law breaks it.
+# The identities. Each raises AssertionError if a law violates it.
 
 
 def check_steady_state(law: Law, example: Example) -> None:
@@ -205,33 +206,35 @@ def check_age_velocity(law: Law, example: Example) -> None:
     """The rates of the states depend on the velocity that the law names, and on no other."""
     v, state, w = sample(law)
     rates = law.state_rate(v, v, state, w)
-    for rate, other, same in zip(
+    for rate, by_v, by_plastic in zip(
         rates,
         law.state_rate(2 * v, v, state, w),
         law.state_rate(v, 2 * v, state, w),
         strict=True,
     ):
-        idle, driven = (same, other) if example.age_velocity == "slider" else (other, same)
+        idle, driven = (
+            (by_plastic, by_v) if example.age_velocity == "slider" else (by_v, by_plastic)
+        )
         np.testing.assert_array_equal(idle, rate)
         assert np.all(driven != rate)
 
 
 def check_limits(law: Law, example: Example) -> None:
-    """At limits of its parameters a law becomes the one it extends, continuously."""
+    """At limits of its parameters a law continuously becomes the law that it extends."""
     for limit in example.limits:
         kind = get_law(limit.law)
-        own = [f.name for f in dataclasses.fields(kind)]
-        simple = quasi_static(kind(**{name: example.parameters[name] for name in own}))
+        names = [f.name for f in dataclasses.fields(kind)]
+        simple = quasi_static(kind(**{name: example.parameters[name] for name in names}))
         for changes, rtol in ((limit.exact, EXACT), (limit.near, 1e-6)):
             system = quasi_static(example.law(type(law), **changes))
             Y, at = motion(system)
             Y = limit.states(Y, at.w)
-            found, expected = system.rates(Y, at), simple.rates(Y[: simple.size], at)
-            np.testing.assert_allclose(found[: simple.size], expected, rtol=rtol)
+            rates, expected = system.rates(Y, at), simple.rates(Y[: simple.size], at)
+            np.testing.assert_allclose(rates[: simple.size], expected, rtol=rtol)
 
 
 def check_no_memory(law: Law, example: Example) -> None:
-    """B -> 0: friction forgets the age and keeps the direct effect."""
+    """B -> 0: friction does not depend on the age and keeps the direct effect."""
     p = {**example.parameters, **example.memoryless}
     v, state, w = sample(law)
     friction = type(law)(**p).friction(v, state, w)
@@ -247,20 +250,20 @@ def check_units(law: Law, example: Example) -> None:
 
     scaled = {k: convert(v, DIMENSIONS.get(k, (0, 0, 0))) for k, v in example.parameters.items()}
     system = quasi_static(law)
-    other = QuasiStatic(
+    converted = QuasiStatic(
         Slider(type(law)(**scaled), spring=convert(2e5, (-1, 0, 1)), load=convert(7.0, (0, 0, 1))),
         V=convert(SPEEDS, (1, -1, 0)),
         omega=convert(system.omega, (0, -1, 0)),
     )
-    where = motion(system)
-    np.testing.assert_allclose(other.steady(), system.steady(), rtol=EXACT)
-    np.testing.assert_allclose(other.force(*where), system.force(*where), rtol=EXACT)
+    state = motion(system)
+    np.testing.assert_allclose(converted.steady(), system.steady(), rtol=EXACT)
+    np.testing.assert_allclose(converted.force(*state), system.force(*state), rtol=EXACT)
     if example.invertible:
         # Exponents of some tens multiply round-off.
-        np.testing.assert_allclose(other.rates(*where), system.rates(*where), rtol=1e-9)
-    here, there = perturb(system), perturb(other)
-    np.testing.assert_allclose(there.transfer, here.transfer, rtol=1e-9)
-    np.testing.assert_allclose(there.mean_curvature, here.mean_curvature, rtol=1e-9)
+        np.testing.assert_allclose(converted.rates(*state), system.rates(*state), rtol=1e-9)
+    expected, response = perturb(system), perturb(converted)
+    np.testing.assert_allclose(response.transfer, expected.transfer, rtol=1e-9)
+    np.testing.assert_allclose(response.mean_curvature, expected.mean_curvature, rtol=1e-9)
 
 
 def check_kinematics(system: QuasiStatic) -> None:
@@ -275,7 +278,7 @@ def check_kinematics(system: QuasiStatic) -> None:
     v = system.V * (1 - along(system.force) / system.kappa)
     strain_rate = law.elastic_length * omega * along(lambda Y, at: system.force(Y, at) / at.w)
     plastic = v - strain_rate
-    # What is left of V after subtracting the stretching of springs: cancellation of some 1e3.
+    # V less the rates of stretching cancels to about 1e-3 of V.
     np.testing.assert_allclose(
         plastic / system.V, jnp.exp(system.log_slip(Y, at)), rtol=1e-9, atol=1e-10
     )
@@ -286,17 +289,17 @@ def check_kinematics(system: QuasiStatic) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_every_law_obeys_the_identities(name):
-    """All identities of one call, with the published slope and step of the load."""
+    """`check_law` with the published slope and step of the load."""
     example = EXAMPLES[name]
     law = example.law(get_law(name))
-    held = check_law(
+    checked = check_law(
         law,
         slope=lambda v: example.slope(example.parameters, v),
         load_step=lambda f, w, k: example.load_step(example.parameters, f, w, k),
     )
-    assert {"steady sliding", "element-wise", "derivatives", "units", "slope"} <= set(held)
-    assert ("inverse" in held) == example.invertible
-    assert ("exchange" in held) == bool(law.exchangeable)
+    assert {"steady sliding", "element-wise", "derivatives", "units", "slope"} <= set(checked)
+    assert ("inverse" in checked) == example.invertible
+    assert ("exchange" in checked) == bool(law.exchangeable)
     check_slope(law, example)
 
 
@@ -315,7 +318,7 @@ def test_slider_and_plastic_velocity_obey_the_kinematics():
     check_kinematics(quasi_static(EXAMPLES["elasto-plastic"].law(ElastoPlastic)))
 
 
-def test_the_null_model_is_amontons():
+def test_amontons_friction_is_constant():
     v, state, w = sample(law := get_law("amontons")(mu0=0.5))
     np.testing.assert_array_equal(law.friction(v, state, w), np.full(SPEEDS.shape, 0.5))
 
@@ -343,7 +346,7 @@ def test_a_law_without_an_example_is_detected(monkeypatch):
     assert without_example(registered()) == {"forgotten"}
 
 
-# Planted mistakes: each is one that has been made somewhere, and the identity that must catch it.
+# Planted mistakes, each with the identity that must detect it.
 
 
 class ProductTermDropped(StrengthArea):
@@ -477,9 +480,9 @@ class Unfinished(RiceRuina):
     ],
 )
 def test_one_call_names_every_broken_identity(mistake, broken):
-    with pytest.raises(identities.BrokenIdentityError, match="breaks") as found:
+    with pytest.raises(identities.BrokenIdentityError, match="breaks") as raised:
         check_law(mistake(**RATE_AND_STATE))
-    assert broken <= set(found.value.broken)
+    assert broken <= set(raised.value.broken)
 
 
 class LoadRateDropped(QuasiStatic):
@@ -494,8 +497,8 @@ class CompliancesSwapped(QuasiStatic):
 
 @pytest.mark.parametrize("mistake", [LoadRateDropped, CompliancesSwapped])
 def test_a_planted_mistake_in_the_kinematics_is_detected(mistake):
-    right = quasi_static(EXAMPLES["elasto-plastic"].law(ElastoPlastic))
-    wrong = mistake(right.slider, right.V, right.omega)
+    correct = quasi_static(EXAMPLES["elasto-plastic"].law(ElastoPlastic))
+    wrong = mistake(correct.slider, correct.V, correct.omega)
     assert isinstance(wrong, eqx.Module)
     with pytest.raises(AssertionError):
         check_kinematics(wrong)

@@ -1,7 +1,7 @@
-"""What is compiled of every law, `asperity.slider.pointwise`, against its equations as printed.
+"""The compiled equations of every law, `asperity.slider.pointwise`, and the printed equations.
 
-Away from steady sliding, at random states under a moving load: rates, slip velocity, and the
-Jacobian. Solvers of orbits on meshes see nothing else of a law.
+Rates, slip velocity and Jacobian are compared at random states away from steady sliding, under a
+changing load. Solvers of orbits on meshes use nothing else of a law.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 K, W0, V, FREQUENCY, EPSILON = 2e5, 7.0, 2e-6, 120.0, 0.3
 #: Round-off times exponents of some tens.
 EXACT = 1e-10
-#: By law: its parameters beyond `BASE`, and the variant of the printed equations.
+#: For each law its parameters besides `BASE`, and the options of the printed equations.
 CASES = {
     "rice-ruina": ({}, {}),
     "linker-dieterich": ({"alpha": 0.2}, {"alpha": 0.2}),
@@ -35,16 +35,16 @@ CASES = {
 
 
 def test_every_rate_dependent_law_is_compared_with_its_publication():
-    own = {
+    names = {
         name
         for name, law in registered().items()
         if law.__module__.startswith("asperity.") and law.rate_dependent
     }
-    assert own == set(CASES)
+    assert names == set(CASES)
 
 
 def compiled(name, theta, slip):
-    """Values of the compiled part at random states of the law and these slip velocities (m/s)."""
+    """Compiled values at random states of the law and these slip velocities (m/s)."""
     law = get_law(name)(**BASE | CASES[name][0])
     points = theta.shape[1]
     system = QuasiStatic(
@@ -61,7 +61,7 @@ def compiled(name, theta, slip):
 
 
 def absorbed(name, w, w_rate, force, force_rate):
-    """What the law's state has in it besides the logarithm of the printed one, and its rate."""
+    """What the state of the law adds to the logarithm of the printed state, and its rate."""
     p = BASE | CASES[name][0]
     if name == "linker-dieterich":
         return p["alpha"] / p["B"] * np.log(w), p["alpha"] / p["B"] * w_rate / w
@@ -70,7 +70,7 @@ def absorbed(name, w, w_rate, force, force_rate):
     return 0.0, 0.0
 
 
-#: What the states of a law are logarithms of is counted in these, SI: D0/V0 of an age.
+#: Units (SI) of the variables whose logarithms are the states of a law: D0/V0 for an age.
 SIZES = {"perrin-rice-zheng": [0.8], "two-state": [0.4, 1.5], "prakash-clifton": [0.4, W0]}
 
 
@@ -78,32 +78,32 @@ def compare(reference, name, **mistake):
     random = np.random.default_rng(5)
     theta = random.uniform(0, 2 * np.pi, (40, 2))
     slip = V * np.exp(random.normal(0, 1, theta.shape))
-    found, Y, at = compiled(name, theta, slip)
+    values, Y, at = compiled(name, theta, slip)
     p = reference.printed.get(name, reference.Printed)(
         V=V, frequency=FREQUENCY, **BASE | CASES[name][1] | mistake
     )
     # Force and its rate from z = F/W0 (1 + L/w), the first state.
-    force, ratio = np.asarray(found.force), p.lambda_ * K / W0
-    force_rate = (found.rates[0] + ratio * force * at.w_slope / at.w**2) / (1 + ratio / at.w)
-    more, its_rate = absorbed(name, at.w, at.w_slope, force, force_rate)
+    force, ratio = np.asarray(values.force), p.lambda_ * K / W0
+    force_rate = (values.rates[0] + ratio * force * at.w_slope / at.w**2) / (1 + ratio / at.w)
+    extra, extra_rate = absorbed(name, at.w, at.w_slope, force, force_rate)
     internal = [
-        size * np.exp(state - more)
+        size * np.exp(state - extra)
         for size, state in zip(SIZES.get(name, [0.4]), Y[1:], strict=True)
     ]
     plastic = p.slip(W0 * force, W0 * at.w, internal)
     np.testing.assert_allclose(plastic, slip, rtol=EXACT)
-    np.testing.assert_allclose(np.exp(found.log_slip), plastic / V, rtol=EXACT)
+    np.testing.assert_allclose(np.exp(values.log_slip), plastic / V, rtol=EXACT)
     printed = p.rates(theta / p.omega, [(force - p.mu) * W0 / K, *internal], EPSILON)
     expected = [r / x / p.omega for r, x in zip(printed[1:], internal, strict=True)]
-    for rate, other in (
+    for rate, exact in (
         (force_rate, printed[0] * K / W0 / p.omega),
-        *zip(found.rates[1:], np.array(expected) + its_rate, strict=True),
+        *zip(values.rates[1:], np.array(expected) + extra_rate, strict=True),
     ):
-        np.testing.assert_allclose(rate, other, rtol=0, atol=EXACT * np.abs(other).max())
+        np.testing.assert_allclose(rate, exact, rtol=0, atol=EXACT * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_rates_and_slip_are_those_of_the_published_equations(reference, name):
+def test_rates_and_slip_agree_with_the_printed_equations(reference, name):
     compare(reference, name)
 
 
@@ -119,29 +119,29 @@ def test_rates_and_slip_are_those_of_the_published_equations(reference, name):
         ("prakash-clifton", {"V_star": 2e-7}),
     ],
 )
-def test_planted_other_equations_are_detected(reference, name, mistake):
+def test_planted_mistakes_are_detected(reference, name, mistake):
     with pytest.raises(AssertionError, match="Not equal to tolerance"):
         compare(reference, name, **mistake)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_jacobian_is_that_of_the_rates(name):
-    """By central differences over two steps, extrapolated."""
+def test_the_jacobian_agrees_with_differences_of_the_rates(name):
+    """Central differences over two steps, extrapolated."""
     theta = np.random.default_rng(5).uniform(0, 2 * np.pi, (40, 2))
-    found, Y, at = compiled(name, theta, np.full(theta.shape, V))
+    values, Y, at = compiled(name, theta, np.full(theta.shape, V))
     law = get_law(name)(**BASE | CASES[name][0])
     system = QuasiStatic(
         asp.Slider(law, spring=np.full(2, K), load=W0), V=V, omega=2 * np.pi * FREQUENCY
     )
 
-    def values(k, h):
+    def outputs(k, h):
         moved = Y + h * np.eye(len(Y))[k][:, None, None]
-        there = values_at(system, at, np.zeros((len(Y), 2)), moved)
-        return np.concatenate([there.rates, there.log_slip[None]])
+        changed = values_at(system, at, np.zeros((len(Y), 2)), moved)
+        return np.concatenate([changed.rates, changed.log_slip[None]])
 
     for k in range(len(Y)):
-        coarse, fine = ((values(k, h) - values(k, -h)) / (2 * h) for h in (2e-3, 1e-3))
+        coarse, fine = ((outputs(k, h) - outputs(k, -h)) / (2 * h) for h in (2e-3, 1e-3))
         expected = (4 * fine - coarse) / 3
-        computed = np.concatenate([found.jacobian[:, k], found.slip_gradient[k][None]])
+        computed = np.concatenate([values.jacobian[:, k], values.slip_gradient[k][None]])
         error = np.abs(computed - expected).max((1, 2))
         assert (error < 1e-3 * np.abs(expected).max((1, 2)) + 1e-9).all()

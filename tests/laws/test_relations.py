@@ -93,15 +93,15 @@ class TestRestAndReversal:
 
 
 @pytest.mark.parametrize("kind", [RuinaSlip, PerrinRiceZheng])
-def test_near_steady_sliding_it_is_the_ageing_law(kind):
-    found, expected = linear(kind(**BASE)), linear(RiceRuina(**BASE))
-    np.testing.assert_allclose(found.transfer, expected.transfer, rtol=1e-10)
-    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, rtol=1e-10)
-    assert np.abs(found.mean_curvature / expected.mean_curvature - 1).max() > 0.1
+def test_the_law_linearised_at_steady_sliding_is_the_ageing_law(kind):
+    response, expected = linear(kind(**BASE)), linear(RiceRuina(**BASE))
+    np.testing.assert_allclose(response.transfer, expected.transfer, rtol=1e-10)
+    np.testing.assert_allclose(response.eigenvalues, expected.eigenvalues, rtol=1e-10)
+    assert np.abs(response.mean_curvature / expected.mean_curvature - 1).max() > 0.1
 
 
-def test_contacts_at_rest_age_by_all_laws_but_the_slip_law():
-    v = 1e-30  # no slip to speak of: dPhi/dt = 1 or 0, Phi = D0/V0 e^phi, or twice that
+def test_contacts_at_rest_age_in_all_laws_except_the_slip_law():
+    v = 1e-30  # negligible slip: dPhi/dt = 1 or 0, with Phi = D0/V0 e^phi or twice that
     growth = 1e-6 / 4e-7 * np.exp(-0.7)
     rate = {kind: kind(**BASE).state_rate(v, v, STATE, 1.0)[0] for kind in (RiceRuina, RuinaSlip)}
     np.testing.assert_allclose(rate[RiceRuina], growth, rtol=1e-12)
@@ -122,11 +122,11 @@ def test_each_state_relaxes_over_its_memory_length():
         np.testing.assert_allclose(rates, expected, rtol=1e-12)
 
 
-def test_eigenvalues_of_the_two_state_law_are_those_linearised_by_hand():
+def test_eigenvalues_of_the_two_state_law_agree_with_linearisation_by_hand():
     """Eigenvalues of steady sliding, linearised by hand in (F/W0, phi, phi2)."""
     A, B, B2, D0, D2 = 0.013, 0.026, 0.01, 4e-7, 5e-6
-    found = linear(TwoState(**BASE, B2=B2, D2=D2)).eigenvalues[0]
-    log_v = np.array([1, -B, -B2]) / A  # of the velocity, in the states
+    eigenvalues = linear(TwoState(**BASE, B2=B2, D2=D2)).eigenvalues[0]
+    log_v = np.array([1, -B, -B2]) / A  # derivatives of ln v by the states
     rates = [
         -K / W0 * V * log_v,
         -V / D0 * (np.eye(3)[1] + log_v),
@@ -135,13 +135,13 @@ def test_eigenvalues_of_the_two_state_law_are_those_linearised_by_hand():
     expected = np.linalg.eigvals(np.array(rates))
     order = np.lexsort
     np.testing.assert_allclose(
-        found[order((found.imag, found.real))],
+        eigenvalues[order((eigenvalues.imag, eigenvalues.real))],
         expected[order((expected.imag, expected.real))],
         rtol=1e-9,
     )
 
 
-def test_weakening_by_shear_stress_hides_part_of_the_direct_effect():
+def test_weakening_by_shear_stress_reduces_the_direct_effect():
     """At constant load a velocity jump v -> v' changes F/W by A/(1 + c) ln(v'/v)."""
     law = Nagata(**BASE | {"A": 0.051, "B": 0.0565}, c=2.0)
     steady = law.steady_state(V)
@@ -183,20 +183,20 @@ class TestMemoryOfTheLoad:
             expected = -(abs(v) + self.V_star) / self.L * (0.8 - 1.3)
             np.testing.assert_allclose(0.8 * rate, expected, rtol=1e-12)
 
-    def test_small_modulations_reach_the_contacts_through_a_low_pass(self):
-        """To first order W_e = W/(1 + i omega L/(V + V_star)), and F is what it was in W."""
+    def test_the_effective_load_is_a_low_pass_of_small_modulations(self):
+        """To first order W_e = W/(1 + i omega L/(V + V_star)), and F depends on W_e as on W."""
         through = 1 / (1 + 2j * np.pi * FREQUENCIES * self.L / (V + self.V_star))
         expected = linear(RiceRuina(**BASE)).transfer * through
         np.testing.assert_allclose(linear(self.law()).transfer, expected, rtol=1e-10, atol=1e-16)
 
 
 SPEEDS = 10.0 ** np.arange(-15, 4)
-#: Of ln v, about 35 at most: round-off of a friction near 1, over A.
+#: Error of ln v, of up to 35: round-off of a friction near 1, over A.
 ROUND_OFF = 1e-12
 
 
 class Viscous(RiceRuina):
-    """Rice-Ruina friction and a viscous term, which has no inverse in elementary functions."""
+    """Rice-Ruina friction and a viscous term, without an inverse in elementary functions."""
 
     name: ClassVar[str] = "viscous"
 
@@ -209,7 +209,7 @@ class Viscous(RiceRuina):
 
 
 def by_lambert(law, friction, log_age):
-    """V with A ln(v/V0) + drag v/V0 = friction - mu0 - B phi, as ln v; SciPy's function."""
+    """ln v with A ln(v/V0) + drag v/V0 = friction - mu0 - B phi, by SciPy's Lambert function."""
     A, drag = float(law.A), float(law.drag)
     exponent = (friction - float(law.mu0) - float(law.B) * log_age) / A
     return np.log(float(law.V0) * A / drag * lambertw(drag / A * np.exp(exponent)).real)
@@ -220,41 +220,41 @@ def test_the_inverse_of_a_viscous_law_is_lamberts_function(drag):
     law = Viscous(**BASE, drag=drag)
     log_age = np.random.default_rng(1).uniform(-8, 8, SPEEDS.shape)
     friction = law.friction(SPEEDS, (log_age,), 1.0)
-    found = law.log_velocity(friction, (log_age,), 1.0)
-    # Of a force that is mostly drag, A ln v is known to round-off of the force over A only.
+    log_v = law.log_velocity(friction, (log_age,), 1.0)
+    # In a force that is mostly drag, ln v is known to the round-off of the force over A only.
     error = ROUND_OFF * np.maximum(1, np.abs(np.asarray(friction)))
-    assert (np.abs(found - np.log(SPEEDS)) <= error).all()
-    finite = np.abs(friction - 0.5 - 0.026 * log_age) / 0.013 < 700  # of SciPy's argument
+    assert (np.abs(log_v - np.log(SPEEDS)) <= error).all()
+    finite = np.abs(friction - 0.5 - 0.026 * log_age) / 0.013 < 700  # for SciPy's argument
     expected = by_lambert(law, friction[finite], log_age[finite])
     assert finite.sum() >= 10
-    assert (np.abs(found[finite] - expected) <= error[finite]).all()
+    assert (np.abs(log_v[finite] - expected) <= error[finite]).all()
 
 
 @pytest.mark.parametrize("law", [RiceRuina(**BASE), Regularised(**BASE)], ids=["log", "asinh"])
 @pytest.mark.parametrize("log_age", [-30.0, 0.0, 30.0])
 def test_the_inverse_finds_any_velocity(law, log_age):
     state = (jnp.full(SPEEDS.shape, log_age),)
-    found = Law.log_velocity(law, law.friction(SPEEDS, state, 1.0), state, 1.0)
-    # Where friction saturates, at a vanishing force, ln v is as good as ln of the force.
-    np.testing.assert_allclose(found, np.log(SPEEDS), rtol=0, atol=2e-11)
+    log_v = Law.log_velocity(law, law.friction(SPEEDS, state, 1.0), state, 1.0)
+    # Where the force vanishes, ln v is as accurate as the logarithm of the force.
+    np.testing.assert_allclose(log_v, np.log(SPEEDS), rtol=0, atol=2e-11)
 
 
-def test_a_saturated_force_is_found_from_either_side():
+def test_the_inverse_finds_velocities_far_below_and_above_a_cut_off():
     law = CutOff(**BASE, V1=1e-3, V2=1e9)
     speeds = np.array([1e-9, 1e-6, 1e-3, 1.0, 1e3])
     state = (jnp.zeros(5),)
-    found = Law.log_velocity(law, law.friction(speeds, state, 1.0), state, 1.0)
-    # Far below V1 the force holds v/V1 to round-off of the force over A.
-    np.testing.assert_allclose(np.exp(found), speeds, rtol=1e-11, atol=1e-14 * 1e-3 / 0.013)
+    log_v = Law.log_velocity(law, law.friction(speeds, state, 1.0), state, 1.0)
+    # Far below V1 the force determines v/V1 to round-off of the force over A.
+    np.testing.assert_allclose(np.exp(log_v), speeds, rtol=1e-11, atol=1e-14 * 1e-3 / 0.013)
 
 
-def test_a_force_too_small_or_too_large_is_carried_at_no_velocity():
+def test_the_inverse_of_an_impossible_force_is_infinite():
     law = CutOff(**BASE, V1=1e-8, V2=1e9)
     threshold = law.friction(0.0, (0.0,), 1.0)
     friction = threshold + jnp.array([-0.1, -1e-6, 1e-6])
-    found = Law.log_velocity(law, friction, (jnp.zeros(3),), 1.0)
-    np.testing.assert_array_equal(found[:2], -np.inf)
-    np.testing.assert_allclose(found[2], law.log_velocity(friction[2], (0.0,), 1.0), atol=1e-9)
+    log_v = Law.log_velocity(law, friction, (jnp.zeros(3),), 1.0)
+    np.testing.assert_array_equal(log_v[:2], -np.inf)
+    np.testing.assert_allclose(log_v[2], law.log_velocity(friction[2], (0.0,), 1.0), atol=1e-9)
 
     class Bounded(RiceRuina):
         name = "bounded"
@@ -262,13 +262,13 @@ def test_a_force_too_small_or_too_large_is_carried_at_no_velocity():
         def friction(self, v, state, w):
             return self.mu0 + self.A * v / (v + self.V0)
 
-    found = Law.log_velocity(Bounded(**BASE), jnp.array([0.49, 0.506, 0.52]), (), 1.0)
-    np.testing.assert_allclose(found, [-np.inf, np.log(1e-6 * 6 / 7), np.inf])
+    log_v = Law.log_velocity(Bounded(**BASE), jnp.array([0.49, 0.506, 0.52]), (), 1.0)
+    np.testing.assert_allclose(log_v, [-np.inf, np.log(1e-6 * 6 / 7), np.inf])
 
 
 @jax.jit
 def scaled_inverse(logs, friction, log_age):
-    """Of a viscous law whose parameters are multiplied by e^logs."""
+    """ln v of a viscous law whose parameters are multiplied by e^logs."""
     numbers = {**BASE, "drag": 1e-3}
     law = Viscous(**numbers | {k: numbers[k] * jnp.exp(log) for k, log in logs.items()})
     return law.log_velocity(friction, (log_age,), 1.0)
@@ -282,7 +282,7 @@ for _ in range(3):
 LOGS = {"mu0": 0.0, "A": 0.0, "B": 0.0, "V0": 0.0, "drag": 0.0}
 
 
-def test_derivatives_to_parameters_by_differences():
+def test_derivatives_by_parameters_agree_with_differences():
     friction = float(Viscous(**BASE, drag=1e-3).friction(1e-1, (0.3,), 1.0))
     inverse = lambda logs, f, phi: scaled_inverse(logs, friction + 0.01 * f, phi)  # noqa: E731
     options = {"order": 2, "modes": ["fwd"], "rtol": 1e-5, "atol": 1e-6, "eps": 1e-5}
@@ -290,14 +290,14 @@ def test_derivatives_to_parameters_by_differences():
 
 
 @pytest.mark.parametrize("v", [1e-12, 1e-1])
-def test_derivatives_to_the_third_order(v):
+def test_derivatives_by_friction_to_third_order_agree_with_closed_forms(v):
     log_age = 0.3
     friction = float(Viscous(**BASE, drag=1e-3).friction(v, (log_age,), 1.0))
-    # d ln v / dF = 1/(A + c), c = drag v/V0: derivatives of that with respect to F, by hand.
+    # d ln v / dF = 1/(A + c) with c = drag v/V0, and its derivatives by F.
     A, c = 0.013, 1e-3 * v / 1e-6
     expected = [1 / (A + c), -c / (A + c) ** 3, -c * (A - 2 * c) / (A + c) ** 5]
-    found = [slope(LOGS, friction, log_age) for slope in SLOPES[1:]]
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    slopes = [slope(LOGS, friction, log_age) for slope in SLOPES[1:]]
+    np.testing.assert_allclose(slopes, expected, rtol=1e-8)
 
 
 def test_the_inverse_works_within_jit_and_vmap():
@@ -305,8 +305,8 @@ def test_the_inverse_works_within_jit_and_vmap():
     state = (jnp.linspace(-3, 3, 4),)
     friction = jnp.linspace(0.4, 0.6, 4)
     expected = law.log_velocity(friction, state, 1.0)
-    one = jax.jit(jax.vmap(lambda f, phi: law.log_velocity(f, (phi,), 1.0)))
-    np.testing.assert_allclose(one(friction, *state), expected, rtol=1e-13)
+    compiled = jax.jit(jax.vmap(lambda f, phi: law.log_velocity(f, (phi,), 1.0)))
+    np.testing.assert_allclose(compiled(friction, *state), expected, rtol=1e-13)
     slopes = jax.jit(jax.vmap(jax.grad(lambda f, phi: law.log_velocity(f, (phi,), 1.0))))
     v = np.exp(expected)
     np.testing.assert_allclose(slopes(friction, *state), 1 / (0.013 + 1e-3 * v / 1e-6), rtol=1e-10)

@@ -17,14 +17,14 @@ LAW = laws.RiceRuina(mu0=MU0, A=A, B=B, D0=D0, V0=V0)
 K, M, W0, V = 5e4, 1.6, 7.0, 1e-4
 
 
-def test_the_motion_is_that_of_the_equation_with_mu0_of_the_position() -> None:
+def test_the_motion_agrees_with_scipy_with_mu0_of_the_position() -> None:
     law = on_uneven_track(LAW, amplitude=0.02, length="20 um", exponent=3.0, origin="1 mm")
     slider = Slider(law, spring=K, load=W0, mass=M)
     times = np.linspace(0, 0.5, 501)
     drive = Programme(Slide(duration=0.5, velocity=V), load=W0, velocity=V / 2)
     motion = transient(slider, drive, sampling=times, inertia=True, rtol=1e-9)
 
-    # Of the level, which `test_the_level_has_the_spectrum_of_its_formula` holds, a table.
+    # The level is tabulated; `test_the_level_has_the_spectrum_of_its_formula` tests it.
     places = np.linspace(-1, 6, 7001)
     level = CubicSpline(places, law.level(places))
 
@@ -41,7 +41,7 @@ def test_the_motion_is_that_of_the_equation_with_mu0_of_the_position() -> None:
     assert np.ptp(exact.y[0]) > 0.1 * W0
     np.testing.assert_allclose(motion.force, exact.y[0], atol=1e-4 * W0)
     np.testing.assert_allclose(motion.displacement, exact.y[3], atol=1e-4 * W0 / K)
-    # A level of no height is the law as it is.
+    # With an amplitude of zero the law is unchanged.
     short = Programme(Slide(duration=0.05, velocity=V), load=W0, velocity=V / 2)
     flat, even = (
         transient(Slider(law, spring=K, load=W0, mass=M), short, sampling=1e3, inertia=True)
@@ -61,15 +61,15 @@ def test_the_level_has_the_spectrum_of_its_formula(exponent) -> None:
     k = 2 * np.pi * np.fft.rfftfreq(x.size, step)
     for above in (0.3, 1.0, 3.0):
         share = power[k > above].sum() / power.sum()
-        # Integral of (p - 1) / (1 + u)^p; each of 32 modes has one part of it.
+        # Integral of (p - 1) / (1 + u)^p, to which each of 32 modes contributes one part.
         assert share == pytest.approx((1 + above) ** (1 - exponent), abs=1.5 / 32)
     # Places far apart are independent.
-    other = on_uneven_track(LAW, amplitude=0.01, length=length, exponent=exponent, origin=1.0)
-    correlation = np.corrcoef(level, np.asarray(other.level(x)))[0, 1]
+    far_law = on_uneven_track(LAW, amplitude=0.01, length=length, exponent=exponent, origin=1.0)
+    correlation = np.corrcoef(level, np.asarray(far_law.level(x)))[0, 1]
     assert abs(correlation) < 0.1
 
 
-def test_a_start_under_another_load_is_steady() -> None:
+def test_a_motion_under_another_load_starts_in_steady_sliding() -> None:
     law = on_uneven_track(LAW, amplitude=0.01, length="20 um")
     drive = Programme(StepLoad(8.0), Slide(duration=1e-3, velocity=V), load=8.0, velocity=V)
     motion = transient(Slider(law, spring=K, load=W0, mass=M), drive, inertia=True, rtol=1e-6)
@@ -87,13 +87,13 @@ def protocol(**track):
     )
 
 
-def test_a_protocol_has_a_track() -> None:
-    one = protocol(amplitude=0.02, length="20 um", origin="1 cm")
-    assert one.slider.law.state_names == ("log_age", "position")
-    assert float(one.slider.law.track_origin) == 0.01
-    assert float(one.slider.K) == K
-    # A run that was interrupted does not go on over another track.
-    assert one.inputs != protocol(amplitude=0.02, length="20 um", origin="2 cm").inputs
+def test_a_protocol_may_have_a_track() -> None:
+    run = protocol(amplitude=0.02, length="20 um", origin="1 cm")
+    assert run.slider.law.state_names == ("log_age", "position")
+    assert float(run.slider.law.track_origin) == 0.01
+    assert float(run.slider.K) == K
+    # An interrupted run is not resumed with another track.
+    assert run.inputs != protocol(amplitude=0.02, length="20 um", origin="2 cm").inputs
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_a_wrong_track_is_refused(track, message) -> None:
     assert message in str(raised.value)
 
 
-def test_there_is_no_periodic_response_on_an_uneven_track() -> None:
+def test_a_periodic_response_on_an_uneven_track_is_refused() -> None:
     slider = Slider(on_uneven_track(LAW, amplitude=0.01, length=1e-5), spring=K, load=W0)
     with pytest.raises(InputError, match="integrate it as a transient"):
         periodic_response(slider, velocity=V, epsilon=0.1, frequency=120.0)

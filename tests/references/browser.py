@@ -1,4 +1,4 @@
-"""Chromium of the system, driven by Playwright; tests that need it say why they are skipped."""
+"""Chromium of the system, driven by Playwright; tests that need it are skipped without it."""
 
 import shutil
 

@@ -1,4 +1,4 @@
-"""Sweeps with a solve in closed form, in this process or on any workers."""
+"""Sweeps whose solve is a closed form, in this process or on any workers."""
 
 import os
 import signal
@@ -57,16 +57,16 @@ class ClosedForm(SolveKind):
         answers = Answers.empty(self.defaults, len(points))
         answers.numbers["mu1"][:], answers.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
         answers.outcome[:] = SweepOutcome.CONVERGED
-        # A whole chunk without one answer, and a few single ones.
+        # A whole chunk without an answer, and a few single points.
         answers.fail(np.flatnonzero(K == 3.0), 4, 0.25)
         answers.fail(np.flatnonzero(epsilon > 0.9), SweepOutcome.STOPPED, 2.5)
         return answers
 
 
 class InClosedForm(Workers):
-    """Other workers, on which every task uses the closed form.
+    """Wraps other workers, on which every task uses the closed form.
 
-    The first task of the third chunk kills its process, which leaves the file `mark`.
+    The first task of the third chunk writes the file `mark` and kills its process.
     """
 
     def __init__(self, workers: Workers, mark: str) -> None:
@@ -122,7 +122,7 @@ def plan_of(epsilon: int = 20, stiffness: tuple[float, ...] = (1.0, 2.0, 3.0)) -
 
 
 def files_of(store: Path) -> dict[str, bytes]:
-    """Everything in a store but its attributes, which say who made it."""
+    """All files of a store except its attributes, which have the version and the machine."""
     return {
         str(file.relative_to(store)): file.read_bytes()
         for file in sorted(store.rglob("*"))

@@ -1,6 +1,6 @@
-"""A table at the end of a run of the tests: programs compiled in each room, and the time it took.
+"""The table at the end of a run of the tests: compiled programs and times of each folder ("room").
 
-Programs that tests compile in processes of their own are not counted.
+Programs compiled in processes that tests start are not counted.
 """
 
 from collections import Counter, defaultdict
@@ -13,7 +13,7 @@ _EVENTS = {
     "/jax/core/compile/jaxpr_trace_duration": "tracing",
 }
 
-#: Of each room: tests, programs, and seconds in all, compiling and tracing.
+#: For each room: tests, programs, and seconds in total, of compiling and of tracing.
 totals = defaultdict(Counter)
 _running = Counter()
 
@@ -31,7 +31,7 @@ def _room(nodeid):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session):
-    """Listen once tests are collected: whoever only lists them does not wait for JAX."""
+    """Count compilations once tests are collected; listing tests does not import JAX."""
     result = yield
     if not session.config.option.collectonly:
         import jax
@@ -42,7 +42,7 @@ def pytest_collection(session):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
-    """What a test compiles, its fixtures included, goes to its room."""
+    """Add the programs of a test and its fixtures to its room."""
     _running.clear()
     result = yield
     totals[_room(item.nodeid)].update(_running)
@@ -50,15 +50,15 @@ def pytest_runtest_protocol(item):
 
 
 def pytest_runtest_logreport(report):
-    """Time of all parts of a test."""
+    """Add the time of set-up, call and tear-down of a test."""
     counts = totals[_room(report.nodeid)]
-    # Processes of xdist send their reports here, and their programs at the end.
+    # Reports of the processes of xdist arrive here, their numbers of programs at the end.
     counts["seconds"] += report.duration
     counts["tests"] += report.when == "call"
 
 
 def pytest_sessionfinish(session):
-    """Send what one process of xdist compiled to the one that prints."""
+    """Send the numbers of a process of xdist to the process that prints."""
     output = getattr(session.config, "workeroutput", None)
     if output is not None:
         kinds = ("programs", "compiling", "tracing")
@@ -67,7 +67,7 @@ def pytest_sessionfinish(session):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
-    """Add what a process of xdist compiled."""
+    """Add the numbers of a process of xdist."""
     for room, counts in getattr(node, "workeroutput", {}).get("compilation", {}).items():
         totals[room].update(counts)
 

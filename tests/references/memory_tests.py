@@ -1,4 +1,4 @@
-"""Holds and velocity steps by SciPy, from the equations of the laws as their papers print them."""
+"""Holds and velocity steps by SciPy, from the printed equations of the laws."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STATE_RATES = {
 
 
 class Interface:
-    """A law of A, B, D0 on a spring of stiffness k = K/W0 (1/m), without inertia; mu less mu0."""
+    """A law on a spring of stiffness k = K/W0 (1/m), without inertia; mu is counted from mu0."""
 
     def __init__(self, name, A, B, D0, k, V0=1e-6):
         self.rate, self.A, self.B, self.D0, self.k, self.V0 = STATE_RATES[name], A, B, D0, k, V0
@@ -27,7 +27,7 @@ class Interface:
         return np.array([(self.A - self.B) * np.log(V / self.V0), y])
 
     def integrate(self, start, pull, duration, V, event=None):
-        """(mu, y, slip) at the end, or at the first crossing of v = V; time."""
+        """(mu, y, slip) and time at the end, or where v crosses V in the direction `event`."""
 
         def rates(_, Y):
             v = np.exp(self.log_v(Y[0], Y[1]))
@@ -37,24 +37,24 @@ class Interface:
             return self.log_v(Y[0], Y[1]) - np.log(V)
 
         crossing.terminal, crossing.direction = True, event or 0
-        done = solve_ivp(
+        run = solve_ivp(
             rates, (0, duration), [*start, 0.0], "DOP853", rtol=1e-12,
             atol=[1e-14, 1e-12, 1e-18], events=crossing if event else None,
         )  # fmt: skip
-        assert done.success, done.message
-        return done.y[:, -1], done.t[-1]
+        assert run.success, run.message
+        return run.y[:, -1], run.t[-1]
 
     def hold(self, V, time):
-        """Level, minimum, maximum, slip in the hold, slip of reloading."""
+        """Steady mu, minimum and maximum, slip during the hold and during reloading."""
         start = self.steady(V)
         (low, y, slip), _ = self.integrate(start, 0.0, time, V)
-        # The force cannot rise for longer than the law is strong.
+        # An upper bound of the time in which friction can rise.
         longest = 5 * (self.B * np.log(1e9 + time * V / self.D0) / self.k + 50 * self.D0) / V
         (high, _, more), _ = self.integrate([low, y], V, longest, V, event=1)
         return start[0], low, high, slip, more
 
     def step(self, V_before, V):
-        """mu before, at the extremum, and after."""
+        """Steady mu before the step, extremum, and steady mu after it."""
         up = 1 if V_before < V else -1
         longest = 1e3 * (1 / self.k + self.D0) / V
         (extremum, *_), _ = self.integrate(self.steady(V_before), V, longest, V, event=up)

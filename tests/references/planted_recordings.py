@@ -1,4 +1,4 @@
-"""Recordings with planted truths."""
+"""Recordings with known, planted numbers."""
 
 from dataclasses import dataclass, replace
 
@@ -12,18 +12,18 @@ from asperity.recording import Channel, Trace, check
 
 @dataclass(frozen=True)
 class Truth:
-    """What a recording is made of."""
+    """Numbers of a recording."""
 
     W0: float = 7.0
     epsilon: float = 0.24
     frequency: float = 60.013
     phase: float = 0.7
     mean_friction: float = 0.4
-    #: Phasors of F/W0 against the load.
+    #: Phasors of F/W0, with phases relative to the load.
     harmonics: tuple[complex, ...] = (2e-3 * np.exp(-1.5j), 3e-4 * np.exp(1j))
-    #: Phasors of W/W0 at 2f, 3f, ... against the load's fundamental.
+    #: Phasors of W/W0 at 2f, 3f, ..., with phases relative to the fundamental of the load.
     load_harmonics: tuple[complex, ...] = ()
-    #: Change of the friction per second, about the middle of the recording.
+    #: Change of the friction per second; zero in the middle of the recording.
     drift: float = 0.0
 
     def load(self, time):
@@ -51,7 +51,7 @@ class Truth:
 
 
 def covered(truth, noises, rate, names):
-    """Share of 95 % intervals that hold the truth, over pairs of noise of load and force."""
+    """Share of 95 % intervals that contain the truth, over pairs of noise of load and force."""
     hits = dict.fromkeys(names, 0)
     for of_load, of_force in noises:
         time = np.arange(of_load.size) / rate
@@ -70,7 +70,7 @@ def truth():
 
 @pytest.fixture
 def trace():
-    """Make a checked trace of arrays."""
+    """A function that makes a checked trace of arrays."""
 
     def make(time, load, force, **more):
         channels = {
@@ -86,7 +86,7 @@ def trace():
 
 @pytest.fixture
 def protocol():
-    """The paper's protocol: F(0), modulation, F(0) again; arrays time, load, force."""
+    """A function that makes time, load and force of sliding, modulation, and sliding again."""
 
     def make(truth, *, noise=2e-3, rate=1000.0, seed=0, on=(6.0, 26.0), end=36.0, decay=0.3):
         rng = np.random.default_rng(seed)
@@ -96,8 +96,8 @@ def protocol():
         drop = -np.expm1(-np.clip(time - on[0], 0, None) / decay)
         recovery = np.exp(-np.clip(time - on[1], 0, None) / decay)
         change = -0.08 * np.where(time < on[1], drop, recovery)
-        own = truth.force(time) - truth.W0 * truth.mean_friction
-        force = truth.W0 * (truth.mean_friction + change) + np.where(modulated, own, 0.0)
+        response = truth.force(time) - truth.W0 * truth.mean_friction
+        force = truth.W0 * (truth.mean_friction + change) + np.where(modulated, response, 0.0)
         load = load + noise * rng.standard_normal(time.size)
         return time, load, force + noise / 3 * rng.standard_normal(time.size)
 

@@ -1,4 +1,4 @@
-"""Many draws of one kind: few in every run of the suite, the others in `make test-long`."""
+"""Parametrised draws: a few of them in `make test`, the others in `make test-long`."""
 
 import pytest
 
@@ -9,14 +9,14 @@ def population(draws, *, short=1):
     Parameters
     ----------
     draws : int or iterable
-        How many seeds, or the values.
+        Number of seeds, or the values.
     short : int
-        How many of them `make test` runs.
+        Number of values that `make test` runs.
     """
     values = list(range(draws) if isinstance(draws, int) else draws)
     return [*values[:short], *(pytest.param(v, marks=pytest.mark.long) for v in values[short:])]
 
 
 def draws(few, many):
-    """How many draws a statistic is taken over: few in `make test`, many in `make test-long`."""
+    """Number of draws of a statistic: `few` in `make test`, `many` in `make test-long`."""
     return pytest.mark.parametrize("draws", [few, pytest.param(many, marks=pytest.mark.long)])

@@ -1,11 +1,10 @@
-"""An integration of the published equations that shares nothing with the package.
+"""Periodic solutions of the published equations, independent of the package.
 
-The equations are written in physical units as the papers print them. States: the extension d of
-the spring (m, counted from steady sliding) and those of the law, all positive, the age Phi (s)
-first; with inertia, also the velocity v (m/s) and the elastic displacement of the asperities (m).
-One period is integrated by SciPy's DOP853
-and the periodic solution found by Newton's method on the end point; `multiple_shooting` does so for
-many operating points, stable or not, and gives the Floquet multipliers too.
+The equations are in physical units as the papers print them. States are the extension d of the
+spring (m, from steady sliding) and those of the law, all positive, the age Phi (s) first; with
+inertia also the velocity v (m/s) and the elastic displacement of the asperities (m). SciPy's DOP853
+integrates over one period, and Newton's method makes the end equal to the start;
+`multiple_shooting` does so for many operating points, stable or not, and adds Floquet multipliers.
 """
 
 import dataclasses
@@ -22,7 +21,7 @@ SAMPLES = 32
 
 @dataclasses.dataclass(frozen=True)
 class Printed:
-    """Parameters of one experiment, SI; `ageing` and `load_rate` select variants."""
+    """Parameters of an experiment (SI); `ageing`, `product` and `load_rate` select variants."""
 
     mu0: float = 0.5
     A: float = 0.013
@@ -96,10 +95,10 @@ class Printed:
         return [self.ageing_rate(v, plastic, *internal, dW / W)]
 
     def internal_guess(self, F: np.ndarray, W: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
-        """States of the law with which the force F goes with the velocity v, roughly.
+        """Approximate states of the law at the force F and the velocity v.
 
-        Each shape (points, phases). One is given by the friction law; further ones are taken
-        to be constant over a period, which is short.
+        Each has the shape (points, phases). One follows from the friction law; the others are taken
+        as constant over a period.
         """
         return [self.age(F / W, v)]
 
@@ -268,7 +267,7 @@ class PrintedPrakashClifton(Printed):
         return [self.age(F / effective, v), effective]
 
 
-#: Laws with equations of their own, by the name that the package gives them.
+#: Laws whose equations are not variants of `Printed`, by their name in the package.
 PRINTED = {
     "regularised": PrintedRegularised,
     "cut-off": PrintedCutOff,
@@ -283,7 +282,7 @@ def one_period(p: Printed, start: np.ndarray, epsilon: float) -> np.ndarray:
     """States at SAMPLES + 1 instants of one period, shape (SAMPLES + 1, states)."""
     times = np.linspace(0, 1 / p.frequency, SAMPLES + 1)
     states = [start]
-    # Restarted at every sample: dense output is of lower order than the method.
+    # Restarted at every sample, as dense output has a lower order than the method.
     for begin, end in itertools.pairwise(times):
         run = solve_ivp(
             p.rates,
@@ -320,7 +319,7 @@ def periodic_response(p: Printed, epsilon: float) -> np.ndarray:
 def expansion(p: Printed, epsilon: float = 1e-3) -> np.ndarray:
     """(mean/eps^2, c1/eps, c2/eps^2) in the limit eps -> 0, by Richardson extrapolation.
 
-    Each is an even series in eps; two amplitudes leave an error of order (eps mu/A)^4.
+    Each is an even series in eps; with two amplitudes the error is of order (eps mu/A)^4.
     """
 
     def scaled(e: float) -> np.ndarray:
@@ -330,11 +329,11 @@ def expansion(p: Printed, epsilon: float = 1e-3) -> np.ndarray:
 
 
 class Shot(NamedTuple):
-    """Periodic solutions of many operating points: the first axis of every array."""
+    """Periodic solutions; the first axis of every array is the operating points."""
 
     mean: np.ndarray
     harmonics: np.ndarray  # c1, c2 of F/W0
-    log_multipliers: np.ndarray  # by falling real part
+    log_multipliers: np.ndarray  # by decreasing real part
     force: np.ndarray  # F/W0 at the start of each segment
 
     @property
@@ -347,9 +346,9 @@ def multiple_shooting(
 ) -> Shot:
     """Newton's method on the ends of the segments of a period, with variational equations.
 
-    Parameters of `p` that vary and `epsilon` have shape (points, 1); `force` and `log_slip`, F/W0
-    and ln(v_pl/V) at equally spaced phases, (points, segments), are where it starts. The states of
-    the law, which vary by many orders of magnitude, are carried by their logarithms.
+    Parameters of `p` that vary and `epsilon` have the shape (points, 1). The initial guess is
+    `force`, F/W0, and `log_slip`, ln(v_pl/V), at equally spaced phases, (points, segments). The
+    states of the law, which vary by many orders of magnitude, are integrated as logarithms.
     """
     segments = force.shape[1]
     W = p.W0 * (1 + epsilon * np.cos(2 * np.pi * np.arange(segments) / segments))
@@ -362,7 +361,7 @@ def multiple_shooting(
         gap = (ends - np.roll(start, -1, axis=2)) / scale
         step = _around_the_period(maps, gap)
         start = start + step * scale
-        if np.abs(step).max() < 1e-8:  # quadratic: the next one is round-off
+        if np.abs(step).max() < 1e-8:  # the next step would be round-off
             break
     else:
         raise AssertionError("the reference integration found no periodic solution")
@@ -400,11 +399,11 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
             columns.append(np.stack([rate[0], *logs]))
         jacobian = np.stack([c.imag / step / scale for c in columns], axis=1)
         turn = np.exp(-1j * p.omega * t)
-        away = (state[0] - start[0, :, :1]) * p.frequency
-        waves = away * turn, away * turn**2
+        offset = (state[0] - start[0, :, :1]) * p.frequency
+        waves = offset * turn, offset * turn**2
         moved_maps = np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(n**2, *shape)
         parts = [part for wave in waves for part in (wave.real, wave.imag)]
-        integrals = np.stack([away, *parts, np.trace(jacobian)])
+        integrals = np.stack([offset, *parts, np.trace(jacobian)])
         return (length * np.concatenate([columns[0].real, moved_maps, integrals])).ravel()
 
     first = np.zeros((count, *shape))
@@ -416,8 +415,8 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
     run = solve_ivp(rates, (0, 1), first.ravel(), "DOP853", rtol=1e-11, atol=bound)
     last = run.y[:, -1].reshape(count, *shape)
     maps = last[n : n + n**2].reshape(n, n, *shape)
-    away, real, imag, real_2, imag_2, trace = last[n + n**2 :]
-    integrals = np.stack([away, real + 1j * imag, real_2 + 1j * imag_2, trace])
+    offset, real, imag, real_2, imag_2, trace = last[n + n**2 :]
+    integrals = np.stack([offset, real + 1j * imag, real_2 + 1j * imag_2, trace])
     return start + last[:n], maps, integrals
 
 
@@ -434,8 +433,8 @@ def _around_the_period(maps: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 
 def _log_multipliers(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
-    """Logarithms; the smaller of a real pair from the determinant, which loses no digits."""
-    found, n = [], maps.shape[0]
+    """Logarithms; the smaller one of a pair follows from the determinant, to full accuracy."""
+    rows, n = [], maps.shape[0]
     for point, determinant in zip(np.moveaxis(maps, 2, 0), log_determinant, strict=True):
         total, log_scale = np.eye(n), 0.0
         for i in range(point.shape[2]):
@@ -445,22 +444,22 @@ def _log_multipliers(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarra
         values = np.linalg.eigvals(total).astype(complex)
         if n > 2:
             logs = np.log(values) + log_scale
-            found.append(logs[np.lexsort((-logs.imag, -logs.real.round(9)))])
+            rows.append(logs[np.lexsort((-logs.imag, -logs.real.round(9)))])
             continue
         log = np.log(values[np.argmax(np.abs(values))])
         if log.imag in (0, np.pi):
-            found.append([log + log_scale, determinant - log.real - log_scale + 1j * log.imag])
+            rows.append([log + log_scale, determinant - log.real - log_scale + 1j * log.imag])
         else:
-            found.append(determinant / 2 + 1j * abs(log.imag) * np.array([1, -1]))
-    return np.array(found)
+            rows.append(determinant / 2 + 1j * abs(log.imag) * np.array([1, -1]))
+    return np.array(rows)
 
 
-#: Below this modulus multipliers are promised to 1e-20 absolute.
+#: Multipliers below this modulus are promised to an absolute 1e-20.
 VANISHING = 1e-12
 
 
 def disagreement(response, shot: Shot) -> np.ndarray:
-    """Relative errors (points, 3) of mean, harmonics 1 and 2, and multipliers; the larger ones."""
+    """Relative errors of mean, harmonics and multipliers, the largest of each; (points, 3)."""
     size = np.maximum(np.abs(shot.multipliers), VANISHING)
     errors = [
         np.abs(response.mean_friction / shot.mean - 1),
@@ -471,7 +470,7 @@ def disagreement(response, shot: Shot) -> np.ndarray:
 
 
 class Reference(NamedTuple):
-    """What tests use of this file."""
+    """The names of this module that tests use."""
 
     Printed: type[Printed]
     printed: dict[str, type[Printed]]

@@ -1,4 +1,4 @@
-"""Chi-squared about a minimum, and intervals beside a bound."""
+"""The parabola of chi-squared at a minimum, and intervals near a bound."""
 
 import math
 from dataclasses import replace
@@ -14,62 +14,62 @@ from asperity.inference.fitting.intervals import bounded_interval, nowhere_negat
 from references.populations import population
 
 
-def test_what_noise_adds_is_not_negative_by_rounding():
-    """Of parameters of 1e5 and 1 standard deviations, the first two all but the same."""
+def test_a_covariance_added_by_noise_is_made_nowhere_negative():
+    """Parameters of standard deviations 1e5 and 1, of which the first two are nearly equal."""
     covariance = np.array([[1e10, 0.9999e10, 0.0], [0.9999e10, 1e10, 0.0], [0.0, 0.0, 1.0]])
     added = np.array([[-2e7, 1e7, 10.0], [1e7, 3e8, 0.0], [10.0, 0.0, 0.02]])
-    found = nowhere_negative(added, covariance)
-    scaled = found / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    rounded = nowhere_negative(added, covariance)
+    scaled = rounded / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     assert np.linalg.eigvalsh(scaled).min() > -1e-12
-    assert (np.diag(covariance + found) >= np.diag(covariance)).all()
-    np.testing.assert_allclose(found[1:, 1:], added[1:, 1:], rtol=0.02, atol=0.1)
+    assert (np.diag(covariance + rounded) >= np.diag(covariance)).all()
+    np.testing.assert_allclose(rounded[1:, 1:], added[1:, 1:], rtol=0.02, atol=0.1)
 
 
-def test_what_noise_adds_stays_where_it_is_no_rounding():
+def test_a_positive_covariance_added_by_noise_is_unchanged():
     root = np.random.default_rng(0).normal(size=(4, 4)) * [1e-3, 1.0, 1e4, 1.0]
     added = root.T @ root
     np.testing.assert_allclose(nowhere_negative(added, 20 * added), added, rtol=1e-10)
 
 
-def test_others_do_not_follow_a_delay_beyond_its_bound():
-    """Where the pieces of the drive leave a delay no room, estimates are those at its bound."""
+def test_a_bound_of_a_delay_shifts_no_other_estimate():
+    """A delay beyond its bound is estimated at the bound, and the others with it."""
     (run,) = runs_of(CASES["steps"], 1)
     objective = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1).objective
     at = objective.names.index("step_time_1")
     u, _ = objective.minimise(objective.coordinates({**TRUE, "step_time_1": 0, "step_time_2": 0}))
     free = parabola_of(objective, u, objective.chi2(u))
     unknowns = list(objective.unknowns)
-    # Three standard deviations off.
+    # The bound is three standard deviations from the estimate.
     bound = float(unknowns[at].to_value(u[at] + 3 * free.sd[at]))
     unknowns[at] = replace(unknowns[at], lower=bound, upper=1.05 * bound)
     narrow = replace(objective, unknowns=tuple(unknowns))
     u, chi2 = narrow.minimise(u)
-    held = parabola_of(narrow, u, chi2)
+    bounded = parabola_of(narrow, u, chi2)
     assert chi2 > free.chi2 + 8
     others = np.arange(u.size) != at
-    off = (held.unbounded - u)[others] / held.sd[others]
-    assert np.abs(off).max() < 0.05
+    shifts = (bounded.unbounded - u)[others] / bounded.sd[others]
+    assert np.abs(shifts).max() < 0.05
 
 
-def test_a_valley_that_is_all_but_flat_leaves_each_estimate_in_its_interval():
-    """Where a minimisation has stopped on the way along it, the parabola's minimum is far off."""
+def test_each_estimate_lies_in_its_interval_in_a_flat_valley():
+    """A minimisation may stop in the valley, far from the minimum of the parabola there."""
     (run,) = runs_of(CASES["steps"], 1)
-    term = fit(run, "nagata", ["A", "B", "D0", "c"], start={**TRUE, "c": 3.0}, starts=1)
-    objective, u = term.objective, term.objective.coordinates(term.values)
+    start = fit(run, "nagata", ["A", "B", "D0", "c"], start={**TRUE, "c": 3.0}, starts=1)
+    objective, u = start.objective, start.objective.coordinates(start.values)
     random = np.random.default_rng(7)
     for _ in range(5):
-        # Along the direction that the data know least, where c and with it A and B are larger.
+        # Along the least determined direction, towards larger c, A and B.
         values, vectors = np.linalg.eigh(np.linalg.pinv(_information(objective, u)))
         along = vectors[:, -1] * np.sign(vectors[list(objective.names).index("c"), -1])
         moved = u + random.uniform(0.5, 3.0) * np.sqrt(values[-1]) * along
         moved[list(objective.names).index("c")] = abs(moved[list(objective.names).index("c")])
-        found = described_fit(objective, [(moved, objective.chi2(moved))], profile=False)
+        result = described_fit(objective, [(moved, objective.chi2(moved))], profile=False)
         for unknown in objective.unknowns:
-            p = found.parameters[unknown.name]
+            p = result.parameters[unknown.name]
             for low, high in (p.interval_68, p.interval_95):
                 assert low <= p.value <= high
                 if not unknown.nuisance:
-                    # Ends beyond the range in which it is looked for are open.
+                    # An end outside the range of the search is open.
                     sd = p.se / abs(unknown.slope(p.value))
                     first, last = unknown.range_about(float(unknown.to_coordinate(p.value)), sd)
                     assert low in (0.0, -np.inf) or low >= unknown.to_value(first) * 0.999
@@ -82,14 +82,14 @@ def _information(objective, u):
 
 
 @pytest.mark.parametrize("seed", population(3))
-def test_exchangeable_states_are_one_minimum_in_order(seed):
+def test_minima_that_differ_in_the_order_of_two_states_are_one(seed):
     random = np.random.default_rng(seed)
     (run,) = runs_of(CASES["steps"], 1, seed=seed)
     free = ["A", "B", "D0", "B2", "D2"]
-    begin = {**TRUE, "B2": 0.1 * TRUE["B"], "D2": random.uniform(5, 15) * TRUE["D0"]}
-    objective = fit(run, "two-state", free, start=begin, starts=1).objective
+    start = {**TRUE, "B2": 0.1 * TRUE["B"], "D2": random.uniform(5, 15) * TRUE["D0"]}
+    objective = fit(run, "two-state", free, start=start, starts=1).objective
     u = objective.ordered(objective.coordinates({k.name: k.middle for k in objective.unknowns}))
-    for name, value in begin.items():
+    for name, value in start.items():
         u[list(objective.names).index(name)] = float(
             objective.unknowns[list(objective.names).index(name)].to_coordinate(value)
         )
@@ -97,16 +97,16 @@ def test_exchangeable_states_are_one_minimum_in_order(seed):
     mirrored = values | {"B": values["B2"], "D0": values["D2"]}
     mirrored |= {"B2": values["B"], "D2": values["D0"]}
     v = objective.coordinates(mirrored)
-    # The law is the same: so are the residuals.
+    # Exchanged states are the same law and have the same residuals.
     np.testing.assert_allclose(objective.residuals(v)[0], objective.residuals(u)[0], atol=1e-3)
     np.testing.assert_allclose(objective.ordered(v), u, rtol=1e-12)
-    found = described_fit(
+    result = described_fit(
         objective, [(v, objective.chi2(v)), (u, objective.chi2(u))], profile=False
     )
-    assert found.values["D0"] == pytest.approx(values["D0"])
-    assert found.values["B2"] == pytest.approx(values["B2"])
-    assert found.optima == ()
-    # A second state that weakens cannot be the first one.
+    assert result.values["D0"] == pytest.approx(values["D0"])
+    assert result.values["B2"] == pytest.approx(values["B2"])
+    assert result.optima == ()
+    # A second state of negative B2 cannot become the first one.
     negative = objective.coordinates(mirrored | {"B2": -0.001, "D2": 1e-7})
     np.testing.assert_array_equal(objective.ordered(negative), negative)
 
@@ -123,35 +123,35 @@ PUBLISHED = {
 
 
 @pytest.mark.parametrize("estimate", PUBLISHED)
-def test_published_intervals(estimate):
-    found = [bounded_interval(estimate, 1.0, c, 0.0, math.inf) for c in (0.6827, 0.9, 0.95)]
-    np.testing.assert_allclose(found, PUBLISHED[estimate], atol=0.0051)
+def test_bounded_intervals_are_the_published_ones(estimate):
+    intervals = [bounded_interval(estimate, 1.0, c, 0.0, math.inf) for c in (0.6827, 0.9, 0.95)]
+    np.testing.assert_allclose(intervals, PUBLISHED[estimate], atol=0.0051)
 
 
-def test_far_from_bounds_it_is_the_normal_interval():
+def test_far_from_bounds_the_interval_is_the_normal_one():
     low, high = bounded_interval(5.0, 0.1, 0.95, 0.0, math.inf)
     np.testing.assert_allclose([low, high], [5 - 0.1959964, 5 + 0.1959964], rtol=1e-6)
 
 
-def test_an_upper_bound_is_the_mirror_image():
+def test_the_interval_near_an_upper_bound_is_the_mirror_image():
     low, high = bounded_interval(-1.0, 1.0, 0.9, 0.0, math.inf)
-    found = bounded_interval(1.0, 1.0, 0.9, -math.inf, 0.0)
-    np.testing.assert_allclose(found, (-high, -low), atol=1e-9)
+    mirrored = bounded_interval(1.0, 1.0, 0.9, -math.inf, 0.0)
+    np.testing.assert_allclose(mirrored, (-high, -low), atol=1e-9)
 
 
 @pytest.mark.parametrize("estimate", [-3.0, 0.1, 0.5, 4.0])
-def test_where_bounds_leave_no_room_the_interval_is_the_whole_range(estimate):
+def test_between_narrow_bounds_the_interval_is_the_whole_range(estimate):
     assert bounded_interval(estimate, 1.0, 0.95, 0.0, 0.5) == (0.0, 0.5)
 
 
 @pytest.mark.parametrize("truth", population([0.3, 0.0, 1.5]))
-def test_coverage(truth):
-    # Estimates at the middles of equal probabilities: the share is exact to two of them.
+def test_bounded_intervals_contain_the_truth_as_often_as_stated(truth):
+    # Estimates at the midpoints of equal probabilities: the share is exact to two estimates.
     count = 200
     estimates = truth + norm.ppf((np.arange(count) + 0.5) / count)
     inside = [
         low <= truth <= high
         for low, high in (bounded_interval(x, 1.0, 0.9, 0.0, math.inf) for x in estimates)
     ]
-    # At the bound itself estimates beyond it are certain to be covered: never less than asked.
+    # For a truth at the bound, estimates beyond the bound always cover it: more often, not less.
     assert np.mean(inside) >= 0.9 - 2 / count

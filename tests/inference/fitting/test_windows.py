@@ -1,4 +1,4 @@
-"""Fits in several windows: a disturbance in one of them widens the interval."""
+"""Fits in several windows: their spread widens the intervals, and outlying windows are named."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from asperity.parameters import law_parameters
 pytestmark = pytest.mark.slow
 
 FREE = ["A", "B", "D0"]
-#: The whole of it, and without parts of the first or the last segment.
+#: The whole recording, and without parts of its first or last segment.
 WINDOWS = [(0.0, 140.0), (13.0, 140.0), (0.0, 120.0)]
 
 
@@ -29,45 +29,45 @@ def run():
     return next(runs_of(CASES["steps"], 1))
 
 
-def over(run, friction):
-    # Where the search begins is no question here.
+def fit_in_windows(run, friction):
+    # One start at the truth: these tests are not about the search.
     windows = WINDOWS[::2]
     return fit_windows(traced(run, friction), "rice-ruina", FREE, windows, start=TRUE, starts=1)
 
 
-def test_a_disturbance_outside_some_windows_is_their_spread(run):
-    calm = over(run, run.friction)
+def test_a_disturbance_outside_one_window_widens_the_interval(run):
+    calm = fit_in_windows(run, run.friction)
     assert [f.converged for f in calm.fits] == [True] * 2
     for name, truth in TRUE.items():
         p = calm.parameters[name]
         assert p.interval_95[0] < truth < p.interval_95[1]
         assert min(p.values) <= p.value <= max(p.values)
         assert p.se == pytest.approx(np.hypot(p.se_noise, p.se_window))
-    # A hump that no trend describes, after the end of the second window: 0.02 hardly moves B.
+    # A hump after the end of the second window; one of 0.02 would hardly change B.
     hump = 0.05 * np.clip((run.time - 121.0) / 19.0, 0, 1) ** 2
-    bent = over(run, run.friction + hump)
+    bent = fit_in_windows(run, run.friction + hump)
     share = [o.parameters["B"].se_window / o.parameters["B"].se_noise for o in (calm, bent)]
     assert share[1] > 3 * share[0]
     assert bent.record()["parameters"]["B"]["se_window"] == bent.parameters["B"].se_window
 
 
 def test_a_warning_of_the_first_window_is_not_new_in_another(run, monkeypatch):
-    one = fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
-    warned = [replace(one, warnings=w) for w in (("A s: b", "c"), ("A s: b", "d"))]
+    single = fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
+    warned = [replace(single, warnings=w) for w in (("A s: b", "c"), ("A s: b", "d"))]
     monkeypatch.setattr("asperity.inference.fitting.windows.fit", lambda *_, **__: warned.pop(0))
-    result = over(run, run.friction)
+    result = fit_in_windows(run, run.friction)
     assert result.new_warnings == ("window 0 to 120 s: d",)
     assert len(result.warnings) == 4
 
 
-def test_windows_that_are_not_several_are_refused(run):
+def test_a_single_window_is_refused(run):
     with pytest.raises(InputError, match="windows must be two or more"):
         fit_windows(traced(run, run.friction), "rice-ruina", FREE, [(0, 100)])
 
 
-def test_a_window_that_is_far_off_is_named():
+def test_a_window_with_an_outlying_value_is_named():
     values = (1e-4, 9e-8, np.nan)
-    over = WindowEstimate("D0", "m", 1e-4, 2e-5, 1e-5, 1e-5, (8e-5, 1e-4), (6e-5, 2e-4), values)
+    estimate = WindowEstimate("D0", "m", 1e-4, 2e-5, 1e-5, 1e-5, (8e-5, 1e-4), (6e-5, 2e-4), values)
     D0 = unknown_of(law_parameters(RiceRuina)["D0"], None, None, (1e-8, 1e-3))
-    (said,) = disagreeing(D0, over, WINDOWS)
-    assert said.startswith("window 13 to 140 s: D0 is 9e-08 m")
+    (sentence,) = disagreeing(D0, estimate, WINDOWS)
+    assert sentence.startswith("window 13 to 140 s: D0 is 9e-08 m")

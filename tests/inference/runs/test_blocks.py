@@ -1,4 +1,4 @@
-"""Long recordings as means over blocks, against every sample of them."""
+"""Long recordings as means over blocks, compared with fits to every sample."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def by_blocks(clean, ringing):
     return fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
 
 
-def test_short_recordings_are_compared_sample_by_sample(clean, ringing):
+def test_only_long_recordings_are_averaged_over_blocks(clean, ringing):
     run = recorded(clean + ringing)
     short = replace(run, time=run.time[:20_000], friction=run.friction[:20_000])
     assert reduced(short) is short
@@ -63,12 +63,12 @@ def test_short_recordings_are_compared_sample_by_sample(clean, ringing):
 
 
 @pytest.mark.long
-def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
-    """Noise that an autoregression at the full rate can be: both are right, and nothing is lost."""
+def test_intervals_by_blocks_agree_with_those_by_samples(by_blocks, clean, ringing):
+    """The noise is an autoregression at the full rate, for which a fit to every sample is right."""
     (term,) = by_blocks.objective.terms
     assert term.run.blocks.recorded == 24_000
     assert term.run.time.size < 6_000
-    # The mains are no part of the noise that is left of them.
+    # The line of the mains is subtracted.
     np.testing.assert_allclose(term.run.blocks.lines, [50.0], atol=0.1)
     full = fit(
         recorded(clean + ringing),
@@ -79,36 +79,35 @@ def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
         runs=RunOptions(fit_rate="full"),
     )
     for name, truth in TRUE.items():
-        one, other = by_blocks.parameters[name], full.parameters[name]
-        assert abs(one.value - truth) < 4 * one.se
-        # What one loses and the other does not is a part of the noise.
-        assert one.value == pytest.approx(other.value, abs=0.5 * other.se)
-        assert one.se == pytest.approx(other.se, rel=0.15)
+        blocked, sampled = by_blocks.parameters[name], full.parameters[name]
+        assert abs(blocked.value - truth) < 4 * blocked.se
+        # The two estimates differ by less than the noise.
+        assert blocked.value == pytest.approx(sampled.value, abs=0.5 * sampled.se)
+        assert blocked.se == pytest.approx(sampled.se, rel=0.15)
 
 
-def test_what_was_averaged_is_said_in_one_sentence(clean, ringing):
+def test_the_averaging_is_described_in_one_sentence(clean, ringing):
     run = recorded(clean + ringing + mains(np.arange(24_000) / CASE.rate))
-    said = RunTerm(cleaned(run), get_law("rice-ruina"), {}).noise["averaged"]
-    assert said.startswith("24000 samples are compared as ")
-    assert "means over blocks of" in said
-    assert "lines at 50" in said
+    sentence = RunTerm(cleaned(run), get_law("rice-ruina"), {}).noise["averaged"]
+    assert sentence.startswith("24000 samples are compared as ")
+    assert "means over blocks of" in sentence
+    assert "lines at 50" in sentence
 
 
 @pytest.mark.long
-def test_long_blocks_stay_right_with_steps_inside_them(clean):
+def test_fits_to_long_blocks_with_steps_inside_them_are_exact(clean):
     run = recorded(clean + 1e-9 * np.sin(np.arange(24_000) ** 2))
-    found = fit(run, "rice-ruina", FREE, start=TRUE, starts=1, runs=RunOptions(fit_rate="7 Hz"))
-    (term,) = found.objective.terms
-    # Blocks of 143 ms: longer than what they are fitted to.
+    result = fit(run, "rice-ruina", FREE, start=TRUE, starts=1, runs=RunOptions(fit_rate="7 Hz"))
+    (term,) = result.objective.terms
+    # Blocks of 143 ms are longer than the transients.
     assert term.run.time.size < 72
     for name, truth in TRUE.items():
-        assert found.values[name] == pytest.approx(truth, rel=1e-4)
+        assert result.values[name] == pytest.approx(truth, rel=1e-4)
 
 
-def test_motion_is_averaged_exactly(clean):
-    (run,) = (reduced(recorded(clean), 40.0),)
-    by_scipy = clean.reshape(-1, 60).mean(axis=1)
-    np.testing.assert_allclose(run.friction, by_scipy, atol=1e-12)
+def test_blocks_are_means_of_their_samples(clean):
+    means = clean.reshape(-1, 60).mean(axis=1)
+    np.testing.assert_allclose(reduced(recorded(clean), 40.0).friction, means, atol=1e-12)
 
 
 def test_blocks_over_a_gap_are_left_out(clean):
@@ -125,25 +124,25 @@ def test_blocks_over_a_gap_are_left_out(clean):
     assert (begin[1:] >= end[:-1]).all()
 
 
-def test_mains_are_taken_off_and_motion_is_not(clean):
+def test_mains_are_subtracted_and_motion_is_kept(clean):
     time = np.arange(24_000) / CASE.rate
     with_mains, without = (reduced(recorded(clean + m), 500.0) for m in (mains(time), 0 * time))
     assert without.blocks.lines == ()
-    away = with_mains.friction - without.friction
-    # Of an amplitude of 1e-3; the wandering is linear over pieces of 2 s.
-    assert np.sqrt(np.mean(away**2)) < 0.05 * 1e-3 / np.sqrt(2)
-    assert np.abs(away).max() < 1e-4
+    difference = with_mains.friction - without.friction
+    # The mains have an amplitude of 1e-3; their phase is taken as linear over 2 s.
+    assert np.sqrt(np.mean(difference**2)) < 0.05 * 1e-3 / np.sqrt(2)
+    assert np.abs(difference).max() < 1e-4
 
 
-def test_single_samples_far_off_do_not_count(clean, ringing):
+def test_spikes_are_left_out_of_the_means(clean, ringing):
     spoiled = clean + ringing
     spoiled[[3_000, 9_001, 20_202]] += [0.05, -0.1, 1.0]
-    right, run = (cleaned(recorded(x), 100.0) for x in (clean + ringing, spoiled))
+    clean_run, run = (cleaned(recorded(x), 100.0) for x in (clean + ringing, spoiled))
     assert len(run.spikes) == 3
-    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+    np.testing.assert_allclose(run.friction, clean_run.friction, atol=3 * NOISE / 24)
 
 
-def test_a_mean_that_the_motion_does_not_explain_is_wrong_and_so_is_what_holds_it(clean, ringing):
+def test_a_wrong_mean_is_left_out_of_wider_blocks_too(clean, ringing):
     run = cleaned(recorded(clean + ringing), 100.0)
     k = int(np.searchsorted(run.time, CASE.changes[0])) + 2
     friction = run.friction.copy()
@@ -156,32 +155,32 @@ def test_a_mean_that_the_motion_does_not_explain_is_wrong_and_so_is_what_holds_i
     assert wide.blocks.edges[row, 0] <= run.time[k] < wide.blocks.edges[row, 1]
 
 
-def test_large_samples_far_off_take_no_good_ones_with_them(ringing):
-    """Friction that relaxes after each step is no noise, however large the spikes are."""
+def test_large_spikes_do_not_make_relaxing_friction_spikes(ringing):
+    """Friction relaxes after each step; its samples are kept, however large the spikes are."""
     time = np.arange(24_000) / CASE.rate
     relaxing = [np.where(time > t, np.exp(-(time - t) / 0.1), 0.0) for t in CASE.changes]
     values = 0.6 + 0.02 * relaxing[0] - 0.02 * relaxing[1] + ringing
     spoiled = values.copy()
     spoiled[[3_000, 9_001, 20_202]] += [1.0, -1.0, 1.0]
-    right, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
-    assert right.spikes == ()
+    clean_run, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
+    assert clean_run.spikes == ()
     assert len(run.spikes) == 3
-    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+    np.testing.assert_allclose(run.friction, clean_run.friction, atol=3 * NOISE / 24)
 
 
 @pytest.mark.parametrize("offset", [-3, 0, 2, 12])
 @pytest.mark.parametrize("size", [0.02, -0.5])
-def test_a_sample_far_off_beside_a_step_is_left_out(clean, ringing, offset, size):
+def test_a_spike_next_to_a_step_is_left_out(clean, ringing, offset, size):
     values = clean + ringing
     spoiled = values.copy()
     spoiled[round(CASE.changes[0] * CASE.rate) + offset] += size
-    right, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
-    assert (len(right.spikes), len(run.spikes)) == (0, 1)
-    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+    clean_run, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
+    assert (len(clean_run.spikes), len(run.spikes)) == (0, 1)
+    np.testing.assert_allclose(run.friction, clean_run.friction, atol=3 * NOISE / 24)
 
 
-def test_peaks_of_one_sample_after_each_step_stay(clean, ringing):
-    """Friction that rises and relaxes between two samples is no spike of the electronics."""
+def test_peaks_of_one_sample_after_each_step_are_kept(clean, ringing):
+    """Friction may rise and relax between two samples."""
     values = clean + ringing
     for change, size in zip(CASE.changes, (0.05, -0.04), strict=True):
         values[round(change * CASE.rate) + 1] += size
@@ -189,28 +188,28 @@ def test_peaks_of_one_sample_after_each_step_stay(clean, ringing):
 
 
 @pytest.mark.parametrize("rate", [0.0, "-3 Hz", "fast", "3 N"])
-def test_a_rate_that_is_none_is_refused(rate):
+def test_a_bad_fit_rate_is_refused(rate):
     with pytest.raises(InputError, match="fit_rate must"):
         RunOptions(fit_rate=rate)
 
 
-def test_too_low_a_rate_is_refused(clean):
+def test_too_low_a_fit_rate_is_refused(clean):
     with pytest.raises(InputError, match=r"fit_rate must leave 16 means or more of run, got 0.5"):
         reduced(recorded(clean), 0.5)
 
 
-def test_blocks_of_a_recording_through_a_gauge_are_those_of_the_motion_behind_it(clean):
-    # 8 ms behind, by SciPy; the first samples are steady.
+def test_a_gauge_filters_the_motion_before_it_is_averaged(clean):
+    # A filter with a lag of 8 ms, by SciPy; the first samples are steady.
     corner = 2 * np.pi * 20.0
     time = np.arange(24_000) / CASE.rate
-    behind = clean[0] + lsim(([corner], [1.0, corner]), clean - clean[0], time)[1]
-    run = reduced(recorded(behind), 100.0)
+    filtered = clean[0] + lsim(([corner], [1.0, corner]), clean - clean[0], time)[1]
+    run = reduced(recorded(filtered), 100.0)
     known = {name: TRUTH[name] for name in ("mu0", "V0")} | TRUE
 
-    def farthest(gauge):
+    def largest(gauge):
         term = RunTerm(run, get_law("rice-ruina"), known, gauge=gauge)
-        away = term.departures({}, slopes=False)[0]
-        return np.abs(away - np.median(away)).max()
+        departures = term.departures({}, slopes=False)[0]
+        return np.abs(departures - np.median(departures)).max()
 
-    # Every mean, the last among them; those of the motion itself are others.
-    assert farthest((1, 20.0)) < 0.02 * farthest(None)
+    # All means agree with the filtered motion, and not with the motion itself.
+    assert largest((1, 20.0)) < 0.02 * largest(None)

@@ -1,4 +1,4 @@
-"""Motion through a whole recording against SciPy, values and derivatives."""
+"""Motion over a whole recording and its derivatives, compared with SciPy."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ MOTION = run_equations(get_law("linker-dieterich"), 3e-6)
 AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_state_0": -0.3}
 
 
-#: The spring relaxes within A W/K = 0.03 um of slip: the slider moves 7 to 20 times as far between
+#: The spring relaxes within A W/K = 0.03 um of slip, a seventh to a twentieth of the slip between
 #: two samples.
 STIFF = {**AT, "K": 3e5}
 
@@ -45,46 +45,48 @@ def computed(request):
     return request.param, *computed
 
 
-def test_friction_is_that_of_an_independent_integration(computed):
-    # Local errors of 1e-7 relative, of steps that each move the states by some 0.1.
+def test_friction_agrees_with_scipy(computed):
+    # The relative local error is 1e-7, in steps that change the states by some 0.1.
     np.testing.assert_allclose(computed[1], by_scipy(computed[0]), atol=2e-7)
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_derivatives_are_those_of_an_independent_integration(computed, name):
+def test_derivatives_agree_with_scipy(computed, name):
     values = computed[0]
     size = {"K": 1e-3 * values["K"], "D0": 1e-8, "shift_1": 1e-2}.get(name, 1e-4)
     more, less = ({**values, name: values[name] + sign * size} for sign in (1, -1))
     expected = (by_scipy(more) - by_scipy(less)) / (2 * size)
-    found = computed[2][:, FREE.index(name)]
-    # Differences of second order; a shift moves the step across samples.
-    near = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
+    derivative = computed[2][:, FREE.index(name)]
+    # Differences of second order; a shift of the step crosses the samples next to it.
+    away_from_step = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
     scale = np.abs(expected).max()
-    np.testing.assert_allclose(found[near], expected[near], atol=1e-3 * scale)
+    np.testing.assert_allclose(
+        derivative[away_from_step], expected[away_from_step], atol=1e-3 * scale
+    )
 
 
-def test_means_over_blocks_are_those_of_an_independent_integration():
+def test_means_over_blocks_agree_with_scipy():
     drive = Drive(EDGES, PULL, np.ones(4), LOAD_SLOPE)
-    # Blocks of 0.6 s, each change of the drive within one, and a gap.
+    # Blocks of 0.6 s with a gap; each change of the drive is inside a block.
     edges = np.linspace(0.0, 69.0, 116)
     blocks = np.stack([edges[:-1], edges[1:]], axis=1)[np.arange(115) != 60]
     means, slopes = recorded_friction(MOTION, AT, FREE, drive, reading_at(blocks))
     times = (blocks[:, :1] + 0.6 * (np.arange(50) + 0.5) / 50).ravel()
     expected = by_scipy(AT, times).reshape(-1, 50).mean(axis=1)
-    # The midpoint rule over 12 ms, where friction turns by 0.04 a second; steps of it are 0.02.
+    # Error of the midpoint rule over 12 ms where the slope jumps by 0.04 per second.
     np.testing.assert_allclose(means, expected, atol=5e-6)
-    # About the step and the beginning of the hold.
+    # Blocks around the step and the beginning of the hold.
     some = slice(31, 51)
     at = times.reshape(-1, 50)[some].ravel()
     points = recorded_friction(MOTION, AT, FREE, drive, reading_at(at))[1]
     points = points.reshape(20, 50, -1).mean(axis=1)
     for name, mean, point in zip(FREE, slopes[some].T, points.T, strict=True):
-        # That to the time of the step jumps within a fiftieth of a block.
+        # The derivative by the time of the step jumps within a fiftieth of a block.
         np.testing.assert_allclose(mean, point, atol=1e-2 * np.abs(point).max(), err_msg=name)
 
 
 def test_the_coefficients_are_of_order_5_and_damp_stiff_modes():
-    """Equations with closed solutions, by stages as the table's docstring writes them."""
+    """Equations with closed solutions, integrated in stages as written in the table's docstring."""
     table = rodas_5p()
 
     def step(f, J, by_time, t, y, h):
@@ -123,8 +125,8 @@ def test_the_coefficients_are_of_order_5_and_damp_stiff_modes():
             middle = max(middle, np.abs(half - solution(0.3 + (k + 0.5) * h)).max())
         errors.append([np.abs(y - solution(1.5)).max(), worst, middle])
     orders = np.log2(np.array(errors[:-1]) / errors[1:])[-1]
-    # The solution is of order 5; the estimate is the local error of order 4, and so is the error of
-    # the dense output, of one step each.
+    # The solution is of order 5. The estimated error and the error of the dense output are local
+    # errors, of one step, of a method of order 4.
     assert orders[0] > 4.7
     assert orders[1] > 4.7
     assert orders[2] > 4.7
@@ -139,7 +141,7 @@ def test_the_coefficients_are_of_order_5_and_damp_stiff_modes():
     assert abs(linear[0][0]) < 1e-6
 
 
-def test_a_load_of_hundreds_of_lines_has_room():
+def test_a_load_of_hundreds_of_straight_lines_is_integrated():
     """Some 8 steps follow the evolution of friction after each change of the load."""
     pieces = 300
     edges = np.linspace(0.0, 300.0, pieces + 1)
@@ -156,36 +158,36 @@ def test_a_load_of_hundreds_of_lines_has_room():
     np.testing.assert_allclose(friction, expected, atol=2e-6)
 
 
-def test_a_motion_that_runs_away_is_no_motion():
+def test_a_motion_that_runs_away_has_no_result():
     drive = Drive(EDGES, PULL, np.ones(4), np.zeros(4))
     # A twentieth of the critical stiffness (B - A)/D0.
     assert recorded_friction(MOTION, {**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
 
 
-def test_a_free_radiation_damping_counts():
-    """What it adds to steady friction is eta V/W, and the derivative is that of differences."""
+def test_a_free_radiation_damping_adds_to_the_friction():
+    """Steady friction rises by eta V/W; the derivative agrees with differences."""
     motion = run_equations(get_law("rice-ruina"), 3e-6, radiation_damping=True)
     drive, reading = Drive(EDGES, PULL, np.ones(4), np.zeros(4)), reading_at(TIMES)
-    one, more, less = (
+    middle, more, less = (
         recorded_friction(motion, {**VALUES, "eta": eta}, ("eta",), drive, reading)
         for eta in (2e3, 2.002e3, 1.998e3)
     )
-    np.testing.assert_allclose(one[0][0], VALUES["mu0"] + 2e3 * 3e-6, rtol=1e-9)
-    slope, expected = one[1][:, 0], (more[0] - less[0]) / 4.0
+    np.testing.assert_allclose(middle[0][0], VALUES["mu0"] + 2e3 * 3e-6, rtol=1e-9)
+    slope, expected = middle[1][:, 0], (more[0] - less[0]) / 4.0
     np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", population(["regularised", "linker-dieterich", "rice-ruina"]))
-def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
-    """However long it is, steps stay where the integrator is stable: F/W is mu_ss there."""
+def test_rounding_errors_of_derivatives_of_steady_sliding_do_not_grow(name):
+    """The integrator takes stable steps in steady sliding of any length, where F/W is mu_ss."""
     for seed in range(6):
         random = np.random.default_rng(seed)
         V, A = 10 ** random.uniform(-6, -5), random.uniform(0.006, 0.012)
-        # At V0 = V the states are exact, and no error of the motion limits a step.
+        # At V0 = V the states are exact, so that the error of the motion does not limit a step.
         V0 = V if seed % 2 else 1.3e-6
         values = {"mu0": 0.6, "V0": V0, "A": A, "B": 0.0105, "D0": 6.5e-6, "alpha": 0.2}
         values |= {"K": random.uniform(2e3, 2e4), "W0": 1.0}
-        # In units of A W / (K V), after which a slider on a spring has forgotten.
+        # Multiples of A W / (K V), the relaxation time of a slider on a spring.
         length = random.uniform(50, 400) * A / (values["K"] * V)
         edges = length * np.array([0.0, 1.0, 1.2])
         drive = Drive(edges, np.array([1.0, 3.0]), np.ones(2), np.zeros(2))

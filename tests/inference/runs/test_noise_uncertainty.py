@@ -1,4 +1,4 @@
-"""Noise of a recording: misfits against chance, and what estimating it adds to uncertainties."""
+"""Noise of a recording: misfits, wrong samples, and the uncertainty of estimated noise."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from asperity.recording.defects.autoregression import Autoregression, fitted
 
 
 def autocovariances(a, n):
-    """Of an AR(2) of innovations of unit variance, by its spectrum."""
+    """Autocovariances of an AR(2) process of unit innovations, from its spectrum."""
     angle = 2 * np.pi * np.arange(8192) / 8192
     transfer = 1 - a[0] * np.exp(-1j * angle) - a[1] * np.exp(-2j * angle)
     return np.fft.ifft(1 / np.abs(transfer) ** 2).real[:n]
@@ -30,7 +30,7 @@ def model_of(a):
     return Autoregression(np.array([a[0] / (1 - a[1]), a[1]]), autocovariances(a, 1)[0])
 
 
-def test_the_first_samples_are_whitened_by_a_root_of_their_inverse_covariance():
+def test_the_whitening_of_the_first_samples_inverts_their_covariance():
     a = (1.2, -0.5)
     root = model_of(a).whitening.first
     inverse = np.linalg.inv(toeplitz(autocovariances(a, 2)))
@@ -38,19 +38,19 @@ def test_the_first_samples_are_whitened_by_a_root_of_their_inverse_covariance():
 
 
 @pytest.mark.parametrize("noise", [np.resize([1.0, -1.0], 400), np.arange(400.0)])
-def test_noise_that_can_be_predicted_adds_finite_covariance(noise):
+def test_predictable_noise_adds_finite_covariance(noise):
     model, curves = fitted([noise]), np.sin(np.arange(400) / 30)[:, None]
     added, variance = added_by_noise(model, curves, np.zeros((400, 0)), np.eye(1))
     assert np.isfinite(added).all()
     assert np.isfinite(variance).all()
 
 
-def test_a_stretch_without_noise_has_innovations_of_zero():
+def test_innovations_of_zeros_are_zero():
     zeros = np.zeros(400)
     np.testing.assert_array_equal(fitted([zeros]).whiten(zeros), zeros)
 
 
-def test_the_added_covariance_is_that_of_estimates_that_follow_the_coefficients():
+def test_the_added_covariance_is_that_of_estimated_coefficients():
     a, n = np.array([1.2, -0.5]), 400
     s = np.arange(n) / n
     # A decay after a change, a slow wave; and an offset that is eliminated.
@@ -73,11 +73,11 @@ def test_the_added_covariance_is_that_of_estimates_that_follow_the_coefficients(
     basis, triangle = np.linalg.qr(white[:, 2:])
     curves = X[:, :2] - X[:, 2:] @ np.linalg.solve(triangle, basis.T @ white[:, :2])
     added, _ = added_by_noise(model, curves, basis, covariance)
-    # The ends of the stretch, some 2 of 400 samples.
+    # The ends of the stretch, 2 of 400 samples, are neglected.
     np.testing.assert_allclose(added, expected[:2, :2], rtol=0.03, atol=0.01 * expected[0, 0])
 
 
-def test_degrees_of_freedom_of_a_mean_in_closed_form():
+def test_degrees_of_freedom_of_a_mean_agree_with_their_closed_form():
     # s^2/(n (1 - a)^2), with the variances (1 - a^2)/n of a and 2/n of ln s^2.
     a, n = 0.9, 200_000
     model = Autoregression(np.array([a]), 1 / (1 - a * a))
@@ -88,7 +88,7 @@ def test_degrees_of_freedom_of_a_mean_in_closed_form():
 
 
 @pytest.mark.long
-def test_intervals_cover_where_those_under_known_noise_do_not():
+def test_intervals_with_estimated_noise_contain_the_truth_as_often_as_stated():
     n, order, sets = 120, 12, 600
     s = np.arange(n) / n
     X = np.stack([np.where(s > 0.5, np.exp(-6 * (s - 0.5)), 0), np.ones(n)], axis=1)
@@ -116,11 +116,11 @@ def test_intervals_cover_where_those_under_known_noise_do_not():
     assert (known < [0.6827, 0.95] - 3 * spread).all(), known
 
 
-def test_a_misfit_after_changes_is_told_from_chance():
+def test_the_probability_of_a_misfit_after_changes_is_not_too_small():
     random = np.random.default_rng(2)
     changes = (200, 500)
     chances = [misfit_after_changes(random.normal(size=1000), changes)[0] for _ in range(300)]
-    # Three spans, by Bonferroni: at most as often as it says.
+    # Three spans, by Bonferroni: at most as often as stated.
     assert np.mean(np.array(chances) < 0.1) < 0.1 + 3 * np.sqrt(0.09 / 300)
     spoiled = random.normal(size=1000)
     spoiled[500:520] *= 3
@@ -129,7 +129,7 @@ def test_a_misfit_after_changes_is_told_from_chance():
     assert size > 1.5
 
 
-def test_whiteness_tells_noise_from_a_line():
+def test_whiteness_is_rejected_for_a_line_and_for_correlated_noise():
     steps = np.random.default_rng(0).normal(size=2500)
     correlated = lfilter([1.0], [1.0, -1.2, 0.5], steps)[500:]
     x = np.random.default_rng(2).normal(size=2000)
@@ -139,7 +139,7 @@ def test_whiteness_tells_noise_from_a_line():
     assert whiteness([correlated], 0) < 1e-6
 
 
-def test_whiteness_rejects_as_often_as_it_says():
+def test_whiteness_is_rejected_as_often_as_stated():
     rejected = [
         whiteness([np.random.default_rng(seed).normal(size=300)], 0) < 0.1 for seed in range(300)
     ]
@@ -155,7 +155,7 @@ def decays(n):
 
 
 def noises(a, n, sets):
-    """Sets of an AR(2) of innovations of unit variance."""
+    """Samples of an AR(2) process of unit innovations; a row is a set."""
     white = np.random.default_rng(5).normal(size=(sets, n + 500))
     return lfilter([1.0], [1.0, -a[0], -a[1]], white, axis=1)[:, 500:]
 
@@ -167,7 +167,7 @@ def wrong_in(values, model, stretches, most=20):
 
 
 def departure(values, a, k, known=()):
-    """Of an impulse at k, next to `known` ones, by least squares with the inverse covariance."""
+    """Departure of an impulse at k, with impulses at `known`, by generalised least squares."""
     n = values.size
     root = np.linalg.cholesky(np.linalg.inv(toeplitz(autocovariances(a, n)))).T
     without = np.column_stack([decays(n), *np.eye(n)[list(known)]])
@@ -178,9 +178,9 @@ def departure(values, a, k, known=()):
     return np.sqrt((squares[0] - squares[1]) * (n - without.shape[1] - 1) / squares[1])
 
 
-# At the beginning, at the end, and next to the change, which the curves follow.
+# At the beginning, at the end, and next to the change of the curves.
 @pytest.mark.parametrize("k", [0, 1, 100, 199, 201, 202, 299])
-def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so(k):
+def test_wrong_samples_are_those_of_least_squares_with_an_impulse(k):
     a, n = (1.2, -0.5), 300
     (values,) = noises(a, n, 1)
     limit = largest_departure(n)
@@ -197,7 +197,7 @@ def test_a_sample_is_wrong_where_least_squares_with_an_impulse_there_says_so(k):
     assert wrong_in(below, model_of(a), [(0, n)]) == []
 
 
-def test_a_sample_next_to_a_large_wrong_one_is_judged_without_that():
+def test_a_sample_next_to_a_large_wrong_one_is_tested_without_it():
     a, n = (1.2, -0.5), 300
     (values,) = noises(a, n, 1)
     values[100] += 300.0
@@ -211,7 +211,7 @@ def test_a_sample_next_to_a_large_wrong_one_is_judged_without_that():
         assert wrong_in(spoiled, model_of(a), [(0, n)]) == expected
 
 
-def test_large_wrong_samples_hide_no_small_ones_whatever_the_scale_of_the_noise():
+def test_large_wrong_samples_hide_no_small_ones():
     a, n = (1.2, -0.5), 300
     (values,) = noises(a, n, 1)
     values += decays(n) @ [3.0, -20.0, 5.0]
@@ -221,19 +221,19 @@ def test_large_wrong_samples_hide_no_small_ones_whatever_the_scale_of_the_noise(
     for m in (model, wide):
         assert wrong_in(values, m, [(0, n)]) == [80, 81, 200, 230]
         assert wrong_in(values, m, [(0, 150), (150, n)]) == [80, 81, 200, 230]
-    # One more than there may be says that there are too many.
+    # One sample more than the maximum reports that there are too many.
     assert len(wrong_in(values, model, [(0, n)], most=2)) == 3
 
 
-def test_many_samples_in_a_row_are_a_motion_and_no_wrong_samples():
+def test_a_run_of_departing_samples_is_not_wrong():
     a, n = (0.5, 0.0), 300
     (values,) = noises(a, n, 1)
     values[[40, 41, 42, 100, 101, 102, 103]] += 20 * np.array([1, -1, 1, 1, -1, 1, -1])
     assert wrong_in(values, model_of(a), [(0, n)]) == [40, 41, 42]
 
 
-def test_noise_is_taken_for_a_wrong_sample_as_rarely_as_designed():
+def test_noise_is_taken_for_wrong_samples_as_rarely_as_designed():
     a, n, sets = (1.2, -0.5), 300, 400
-    alarms = sum(bool(wrong_in(x, model_of(a), [(0, n)])) for x in noises(a, n, sets))
-    # 0.4 expected; four and more by a chance of 1 in 1,000.
-    assert alarms <= 3
+    false_alarms = sum(bool(wrong_in(x, model_of(a), [(0, n)])) for x in noises(a, n, sets))
+    # 0.4 are expected; four or more have a probability of 1e-3.
+    assert false_alarms <= 3

@@ -1,4 +1,4 @@
-"""Stiffness from unloading and reloading: of a recording by SciPy, with noise, and refusals."""
+"""Stiffness measured by unloading and reloading, on recordings by SciPy; spans that are refused."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,11 @@ from asperity.inference import measured_stiffness
 from asperity.recording import Channel, Trace
 from references.spring_slider import spring_slider
 
-#: Sliding, 60 um back at the same velocity, forth again, and on.
+#: Sliding, 60 um back at the same velocity, and forward again.
 TIMES, VELOCITIES = (0.0, 20.0, 26.0, 40.0), (1e-5, -1e-5, 1e-5)
 #: Where the contact sticks, and where it begins to slide.
 STICKS, SLIDES = (21.5, 30.5), (26.0, 34.0)
-#: Of every test but one that looks at the law: a load in newtons.
+#: Load in newtons.
 LOAD = 50.0
 
 
@@ -46,35 +46,35 @@ def recorded(exact, seed=None, *, load=None, blur=0.0, sign=1.0):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_an_exact_slope_is_the_stiffness(exact, sign):
-    found = measured_stiffness(recorded(exact, load=LOAD, sign=sign), STICKS)
-    # Ahead of the onset the contact creeps by some 0.1 % of the way.
-    assert found.over_load == pytest.approx(STIFFNESS, rel=2e-3)
-    assert found.value == pytest.approx(STIFFNESS * LOAD, rel=2e-3)
-    assert found.unit == "N/m"
-    assert (found.prior.mean, found.prior.unit) == (found.value, "N/m")
+def test_the_slope_of_friction_without_noise_is_the_stiffness(exact, sign):
+    stiffness = measured_stiffness(recorded(exact, load=LOAD, sign=sign), STICKS)
+    # Before the onset of sliding the contact creeps by some 0.1 % of the displacement.
+    assert stiffness.over_load == pytest.approx(STIFFNESS, rel=2e-3)
+    assert stiffness.value == pytest.approx(STIFFNESS * LOAD, rel=2e-3)
+    assert stiffness.unit == "N/m"
+    assert (stiffness.prior.mean, stiffness.prior.unit) == (stiffness.value, "N/m")
 
 
-def test_the_uncertainty_is_the_scatter_under_slow_noise(exact):
-    found = [measured_stiffness(recorded(exact, seed), STICKS) for seed in range(25)]
-    values, errors = (np.array([getattr(f, n) for f in found]) for n in ("over_load", "se"))
+def test_the_uncertainty_is_the_scatter_with_correlated_noise(exact):
+    results = [measured_stiffness(recorded(exact, seed), STICKS) for seed in range(25)]
+    values, errors = (np.array([getattr(f, n) for f in results]) for n in ("over_load", "se"))
     scatter = float(np.std(values - STIFFNESS))
-    # Not narrower; wider by the bend that noise may hide.
+    # Not smaller; larger by the curvature that noise may hide.
     assert 0.9 < np.mean(errors) / scatter < 3
     assert np.mean(np.abs(values - STIFFNESS) < 1.96 * errors) > 0.9
-    assert found[0].unit == "1/m"
-    # White noise of the residual's size would say less than half of it.
+    assert results[0].unit == "1/m"
+    # White noise of the size of the residuals would give less than half of the scatter.
     time = exact[0]
-    here = (time >= STICKS[0]) & (time <= STICKS[1])
-    white = 8e-4 / (displacement(time[here]).std() * np.sqrt(here.sum()))
+    inside = (time >= STICKS[0]) & (time <= STICKS[1])
+    white = 8e-4 / (displacement(time[inside]).std() * np.sqrt(inside.sum()))
     assert white < 0.5 * scatter
 
 
 def test_noise_of_the_displacement_does_not_lower_the_slope(exact):
-    # 1.5 um beside a spread of 13 um: by 1.3 % otherwise.
-    found = measured_stiffness(recorded(exact, 3, blur=1.5e-6), STICKS)
-    assert abs(found.value - STIFFNESS) < 2 * found.se
-    assert found.se > 0.01 * STIFFNESS
+    # Noise of 1.5 um with a spread of 13 um: ordinary least squares gives 1.3 % less.
+    stiffness = measured_stiffness(recorded(exact, 3, blur=1.5e-6), STICKS)
+    assert abs(stiffness.value - STIFFNESS) < 2 * stiffness.se
+    assert stiffness.se > 0.01 * STIFFNESS
 
 
 @pytest.mark.parametrize("seed", [None, 1, 2])
@@ -84,15 +84,15 @@ def test_a_span_in_which_the_contact_slides_is_refused(exact, seed):
 
 
 @pytest.mark.parametrize(
-    ("span", "said"),
+    ("span", "message"),
     [
         ((5.0, 19.0), "must have a force that rises"),
         ((21.5, 22.5), "must hold at least 32 samples"),
         ((30.0, 21.0), "must end after it begins"),
     ],
 )
-def test_spans_that_say_nothing_are_refused(exact, span, said):
-    with pytest.raises(InputError, match=said):
+def test_spans_without_unloading_are_refused(exact, span, message):
+    with pytest.raises(InputError, match=message):
         measured_stiffness(recorded(exact, 1), span)
 
 

@@ -1,4 +1,4 @@
-"""Tables with covariances, as ``asperity measure`` writes them; readings that are far off."""
+"""Tables with covariances, tables that ``asperity measure`` writes, and outlying rows."""
 
 import json
 from functools import partial
@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import asperity as asp
-from asperity import Slider, materials, periodic_response
+from asperity import Slider, periodic_response
 from asperity.cli.measure import FileRows
 from asperity.errors import InputError
 from asperity.inference import fit, read_table, table_of
@@ -22,11 +22,6 @@ from asperity.recording.readers.from_file import read
 measure = partial(asp.measure, modulated=True)
 
 V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
-
-
-@pytest.fixture(scope="module")
-def pmma():
-    return materials.load("bureau2000")
 
 
 def correlated(covariance):
@@ -53,23 +48,23 @@ def random_covariance(rng):
 def test_the_likelihood_is_the_normal_density_with_the_covariance(pmma):
     covariance = random_covariance(np.random.default_rng(0))
     columns = correlated(covariance)
-    found = fit(table_of(columns), "elasto-plastic", ("lambda",), material=pmma)
-    law = pmma.law("elasto-plastic", lambda_=found.values["lambda"])
+    result = fit(table_of(columns), "elasto-plastic", ("lambda",), material=pmma)
+    law = pmma.law("elasto-plastic", lambda_=result.values["lambda"])
     exact = periodic_response(
         Slider(law, spring=pmma.K, load=pmma.W0), velocity=V, epsilon=EPSILON, frequency=120.0
     )
-    turned = exact.mu1 * np.exp(1j * (exact.phase1 - np.array(columns["phase1"])))
+    rotated = exact.mu1 * np.exp(1j * (exact.phase1 - np.array(columns["phase1"])))
     expected = 0.0
     for row in range(3):
         mu1 = columns["mu1"][row]
-        # Parts of the harmonic along the measured phasor and across it.
+        # Components of the harmonic parallel and perpendicular to the measured phasor.
         to_parts = np.diag([1.0, 1.0, mu1])
         expected += multivariate_normal.logpdf(
-            [exact.mean_friction[row], turned[row].real, turned[row].imag],
+            [exact.mean_friction[row], rotated[row].real, rotated[row].imag],
             [columns["mean_friction"][row], mu1, 0.0],
             to_parts @ covariance @ to_parts,
         )
-    assert found.log_likelihood == pytest.approx(expected, rel=1e-7)
+    assert result.log_likelihood == pytest.approx(expected, rel=1e-7)
 
 
 def test_impossible_covariances_are_refused():
@@ -86,7 +81,7 @@ def test_impossible_covariances_are_refused():
         table_of(columns)
 
 
-def drops(rng, *, copied):
+def mean_and_drop(rng, *, copied):
     velocity = np.repeat([1e-6, 3e-6, 1e-5], 4)
     epsilon = np.tile([0.1, 0.2, 0.3, 0.4], 3)
     drop = -0.3 * epsilon + 1e-3 * rng.normal(size=12)
@@ -98,10 +93,10 @@ def drops(rng, *, copied):
 
 
 def test_one_measurement_in_two_columns_counts_once():
-    table = table_of(drops(np.random.default_rng(1), copied=True))
+    table = table_of(mean_and_drop(np.random.default_rng(1), copied=True))
     assert table.observables == ("mean_friction",)
     assert "they are one measurement; delta_mu is left out" in table.remarks[0]
-    table = table_of(drops(np.random.default_rng(1), copied=False))
+    table = table_of(mean_and_drop(np.random.default_rng(1), copied=False))
     assert table.observables == ("mean_friction", "delta_mu")
     assert table.remarks == ()
 
@@ -124,7 +119,7 @@ def recorded(tmp_path_factory):
     return path
 
 
-def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
+def test_the_table_of_a_campaign_is_fitted_as_written(recorded, tmp_path, pmma):
     chosen = {"modulated": True, "frequency": None, "exact_frequency": False, "harmonics": 2}
     chosen |= {"window": None, "whole_periods": False, "detrend": "linear"}
     rows = FileRows(Source(), Question(**chosen))
@@ -140,13 +135,13 @@ def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
     assert "row 1" in table.remarks[0]
     np.testing.assert_allclose(table.values["mu1"], [1e-3, 2e-3], atol=1e-4)
     assert ("mean_friction", "delta_mu") in table.covariances
-    # The drop shares the noise of the mean: their correlation is near one.
+    # The drop is the mean less the steady friction: their noise is correlated.
     assert 0.3 < table.correlations()[0, 0, 1] < 1
-    found = fit(table, "elasto-plastic", ("lambda",), material=pmma)
-    assert found.converged
+    result = fit(table, "elasto-plastic", ("lambda",), material=pmma)
+    assert result.converged
 
 
-def test_units_stand_in_headings(tmp_path):
+def test_units_are_read_from_headings(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text(
         "V (um/s);epsilon [%];frequency;mu1;mu1_err;phase1 (deg);phase1_err (mrad);T (C);T (K)\n"
@@ -181,37 +176,37 @@ def residuals_of(values, jacobian):
     return Residuals(values, jacobian, np.full(n, "mu1"), np.arange(n), 0.0)
 
 
-def test_readings_beside_other_data_are_as_far_off_as_in_the_fit_of_all():
+def test_standardised_residuals_of_a_part_are_those_of_the_fit_of_all():
     random = np.random.default_rng(3)
-    # The readings see two of four coordinates, and one of these in a single reading.
-    mine = np.zeros((12, 4))
-    mine[:, 0] = random.normal(size=12)
-    mine[4, 1] = 5.0
+    # The readings depend on two of four coordinates, on one of these in a single row.
+    readings = np.zeros((12, 4))
+    readings[:, 0] = random.normal(size=12)
+    readings[4, 1] = 5.0
     others = random.normal(size=(30, 4)) * [1.0, 3.0, 1e-3, 1e3]
     values = random.normal(size=42)
     values[4] = 9.0
-    together = np.vstack([mine, others])
+    together = np.vstack([readings, others])
     left = values - together @ np.linalg.lstsq(together, values, rcond=None)[0]
     hat = together @ np.linalg.pinv(together)
     expected = (left / np.sqrt(1 - np.diag(hat)))[:12]
-    own = residuals_of(left[:12], mine)
-    np.testing.assert_allclose(standardised(own, together.T @ together), expected, rtol=1e-6)
+    residuals = residuals_of(left[:12], readings)
+    np.testing.assert_allclose(standardised(residuals, together.T @ together), expected, rtol=1e-6)
 
 
-def test_coordinates_of_other_data_do_not_count_against_the_readings():
+def test_coordinates_of_other_data_alone_change_no_outlying_rows():
     random = np.random.default_rng(4)
-    # Steep, so that the outlier hardly moves the coordinate.
-    seen = np.full((8, 1), 100.0)
+    # Steep slopes, so that the outlier hardly changes the coordinate.
+    slopes = np.full((8, 1), 100.0)
     values = random.normal(size=8)
     values[2] = 30.0
     values -= values.mean()
-    alone = outlying_rows(residuals_of(values, seen))
+    alone = outlying_rows(residuals_of(values, slopes))
     assert alone == [2]
-    beside = np.hstack([seen, np.zeros((8, 20))])
-    assert outlying_rows(residuals_of(values, beside)) == alone
+    widened = np.hstack([slopes, np.zeros((8, 20))])
+    assert outlying_rows(residuals_of(values, widened)) == alone
 
 
-def test_the_errors_of_a_measured_epsilon_are_errors_of_what_it_predicts(pmma):
+def test_errors_of_epsilon_count_as_effective_variance(pmma):
     epsilon, spread, error = np.linspace(0.1, 0.4, 6), 2e-3, 2e-4
 
     def drop(epsilon, A=pmma.A):
@@ -220,22 +215,22 @@ def test_the_errors_of_a_measured_epsilon_are_errors_of_what_it_predicts(pmma):
 
     columns = {"V": 1e-5, "epsilon": epsilon, "frequency": 120.0}
     columns |= {"delta_mu": drop(epsilon), "delta_mu_err": error}
-    ask = {"fixed": {"K": 5e5}, "material": pmma}
+    options = {"fixed": {"K": 5e5}, "material": pmma}
     tables = table_of(columns), table_of({**columns, "epsilon_err": spread})
-    found = [fit(table, "elasto-plastic", ["A"], **ask) for table in tables]
-    # Effective variance: slopes from finite differences.
+    results = [fit(table, "elasto-plastic", ["A"], **options) for table in tables]
+    # Slopes by finite differences.
     of_epsilon = (drop(epsilon + 1e-5) - drop(epsilon - 1e-5)) / 2e-5
     of_A = (drop(epsilon, pmma.A + 1e-6) - drop(epsilon, pmma.A - 1e-6)) / 2e-6
     of_epsilon = (spread * of_epsilon / error) ** 2
-    for one, more in zip(found, (0.0, of_epsilon), strict=True):
-        expected = error * np.sum(of_A**2 / (1 + more)) ** -0.5
-        assert one.parameters["A"].se == pytest.approx(expected, rel=1e-3)
+    for result, added in zip(results, (0.0, of_epsilon), strict=True):
+        expected = error * np.sum(of_A**2 / (1 + added)) ** -0.5
+        assert result.parameters["A"].se == pytest.approx(expected, rel=1e-3)
     deviance = np.sum(np.log1p(of_epsilon))
-    densities = [f.objective.log_likelihood(f.objective.coordinates(f.values)) for f in found]
+    densities = [f.objective.log_likelihood(f.objective.coordinates(f.values)) for f in results]
     assert 2 * (densities[0] - densities[1]) == pytest.approx(deviance, rel=1e-3)
 
 
-def test_a_table_without_headings_lacks_its_columns(tmp_path):
+def test_a_table_without_headings_is_refused(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("1e-6,0.1\n2e-6,0.2\n")
     with pytest.raises(InputError, match="must have the columns V, epsilon, frequency"):

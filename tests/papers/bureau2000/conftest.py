@@ -1,4 +1,4 @@
-"""What is computed of the paper, once for all tests of this room: it takes a minute and more."""
+"""Figures and experiment of the paper, computed once for this folder: more than a minute."""
 
 import pytest
 
@@ -14,7 +14,7 @@ def figures():
 
 @pytest.fixture(scope="session")
 def experiment():
-    """The virtual experiment, from the process that `asperity reproduce` has compute it."""
+    """The virtual experiment, in the background process that `asperity reproduce` uses."""
     from asperity_papers.bureau2000.recordings import experiment_in_background
 
     with experiment_in_background() as readings:

@@ -1,12 +1,9 @@
-"""The claims of the paper: complete, decided by rules, and right where checked from outside."""
+"""The claims of the paper: completeness, verdicts by rules, numbers by independent integration."""
 
-import importlib.util
 import json
 import math
 import re
-import sys
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,10 +27,11 @@ from asperity.ledger.contents import HeadlineWords
 from asperity_papers.bureau2000 import checks
 from asperity_papers.bureau2000.checks import features, perturbation
 from asperity_papers.bureau2000.machine import APPLIED, EXT, Law, Machine
+from references import snippets as pages
 
 pytestmark = pytest.mark.slow
 
-#: What is not reproduced. A verdict that turns has to be looked at, and its `why` rewritten.
+#: Claims that are not reproduced. If a verdict changes, find out why and rewrite its `why`.
 MISPRINTS = {
     "steady-position",
     "exchanged-amplitudes",
@@ -63,16 +61,10 @@ DIFFERENT_ARITHMETIC = {
     "measured-lambda",
     "small-effective-amplitude",
 }
-#: Claims whose number is what a numerical solution leaves.
+#: Claims whose number is a residual of a numerical solution.
 RESIDUALS = {"linear-system", "pressure-profile", "pressure-force", "viscous-limit"}
 TEXTS = [f.name for f in fields(Claim) if f.type == "str"]
 PAPER = find_paper("bureau2000")
-
-ROOT = Path(__file__).resolve().parents[3]
-_spec = importlib.util.spec_from_file_location("snippets", ROOT / "tests" / "docs" / "snippets.py")
-pages = importlib.util.module_from_spec(_spec)
-sys.modules["snippets"] = pages
-_spec.loader.exec_module(pages)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +98,7 @@ def test_every_entry_is_complete(claims):
 
 
 def test_every_verdict_and_every_kind_occurs(claims):
-    # This paper leaves nothing undecided.
+    # No claim of this paper is undecided.
     assert {claim.verdict for claim in claims.values()} == set(VERDICTS) - {"undecided"}
     assert {claim.kind for claim in claims.values()} == set(KINDS)
 
@@ -132,27 +124,27 @@ def test_all_sections_are_covered(claims):
         assert re.search(rf"Eqs?\. (\(\d+\), )*\({equation}\)", places), equation
 
 
-def test_what_is_not_reproduced(claims):
+def test_the_claims_that_are_not_reproduced_are_the_listed_ones(claims):
     def ids(verdict, kind):
         return {c.id for c in claims.values() if c.verdict == verdict and c.kind == kind}
 
     assert ids("misprint", "test") == MISPRINTS
     assert ids("differs", "test") == DIFFERENT_TESTS
     assert ids("differs", "arithmetic") == DIFFERENT_ARITHMETIC
-    rest = {c.id for c in claims.values() if c.verdict != "reproduced"}
-    assert rest == MISPRINTS | DIFFERENT_TESTS | DIFFERENT_ARITHMETIC
+    not_reproduced = {c.id for c in claims.values() if c.verdict != "reproduced"}
+    assert not_reproduced == MISPRINTS | DIFFERENT_TESTS | DIFFERENT_ARITHMETIC
 
 
-def test_entries_go_into_json(claims):
+def test_claims_are_written_as_json(claims):
     text = json.dumps([claim.as_dict() for claim in claims.values()], allow_nan=False)
     assert len(json.loads(text)) == len(claims)
     broken = replace(claims["mu1-order"], numbers={"1 um/s": math.nan})
     assert broken.as_dict()["numbers"] == {"1 um/s": None}
 
 
-def test_the_page_on_claims_runs_as_it_says(claims, monkeypatch, capsys):
+def test_the_code_of_the_page_on_claims_prints_what_it_shows(claims, monkeypatch, capsys):
     monkeypatch.setattr(Paper, "ledger", lambda _: list(claims.values()))
-    (snippet,) = pages.snippets(ROOT / "docs" / "claims.md")
+    (snippet,) = pages.snippets(pages.ROOT / "docs" / "claims.md")
     capsys.readouterr()
     exec(compile(snippet.text, f"docs/claims.md:{snippet.line}", "exec"), {"__name__": "page"})
     assert snippet.prints
@@ -163,7 +155,7 @@ def test_counts_of_the_readme_are_those_of_the_ledger(claims):
     tests = [claim for claim in claims.values() if claim.is_test]
     verdicts = [v for v in VERDICTS if v != "undecided"]
     counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in verdicts)]
-    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join((pages.ROOT / "README.md").read_text(encoding="utf-8").split())
     stated = re.search(
         r"(\d+) statements of the paper: (\d+) of them are tests, which the models could have "
         r"contradicted; of these (\d+) are reproduced, (\d+) are misprints, (\d+) differ",
@@ -199,7 +191,7 @@ def test_the_curves_reach_the_amplitude_of_the_saturation_claim():
     assert p.transmission * APPLIED[-1] == pytest.approx(p.no_saturation_below)
 
 
-def test_features_are_judged_as_their_claims_are(claims, model):
+def test_features_have_the_verdicts_of_their_claims(claims, model):
     lacking = features.missed(model, Law(EXT))
     for name, key in features.CLAIMS.items():
         assert (name in lacking) == (claims[key].verdict != "reproduced"), name
@@ -217,15 +209,15 @@ def varied():
     }  # fmt: skip
     entries = [e for e in PAPER.contents.claim if e.id in wanted]
     assert all(set(wanted[e.id]) <= set(e.depends_on) for e in entries)
-    own = [e.model_copy(update={"depends_on": wanted[e.id]}) for e in entries]
-    contents = PAPER.contents.model_copy(update={"claim": tuple(own), "headline": ()})
+    chosen = [e.model_copy(update={"depends_on": wanted[e.id]}) for e in entries]
+    contents = PAPER.contents.model_copy(update={"claim": tuple(chosen), "headline": ()})
     functions = {name: f for name, f in find_checks(checks).items() if name in wanted}
-    found = judge_claims(contents, functions, PAPER.numbers, Machine, sensitivity=True)
-    return {claim.id: {s.quantity: s for s in claim.sensitivity} for claim in found}
+    judged = judge_claims(contents, functions, PAPER.numbers, Machine, sensitivity=True)
+    return {claim.id: {s.quantity: s for s in claim.sensitivity} for claim in judged}
 
 
-def test_the_drop_within_the_uncertainty_of_A(varied):
-    """<exp((f/w - mu)/A)> = 1 at the ends of A; elasticity adds 1 to 2 %."""
+def test_the_drop_at_the_ends_of_A_agrees_with_its_limit(varied):
+    """Solution of <exp((f/w - mu)/A)> = 1 at the ends of A; elasticity adds 1 to 2 %."""
     ends = varied["relative-drop"]["A"]
     for A, drop in zip((0.008, 0.018), ends.numbers["1 um/s"], strict=True):
         assert drop == pytest.approx(_averaged_drop(0.24, A), rel=0.03)
@@ -233,34 +225,34 @@ def test_the_drop_within_the_uncertainty_of_A(varied):
     assert ends.verdicts == ("differs", "differs")
 
 
-def test_the_stiffness_ratio_within_the_uncertainty_of_B(varied):
+def test_the_stiffness_ratio_at_the_ends_of_B_agrees_with_its_formula(varied):
     ends = varied["stiffness-ratio"]["B"]
     expected = [K * D0 / ((b - A) * W0) for b in (0.016, 0.036)]
     assert ends.numbers["K/Kc"] == pytest.approx(expected, rel=1e-12)
     assert ends.verdicts == ("reproduced", "differs")
 
 
-def test_a_formula_that_is_right_at_one_point_only(varied):
+def test_a_formula_right_only_at_the_central_A_is_a_misprint(varied):
     assert varied["age-over-velocity"]["A"].verdicts == ("misprint", "misprint")
     assert varied["age-over-velocity"]["D0"].verdicts == ("reproduced", "reproduced")
 
 
-def test_inertia_depends_on_lambda(varied):
+def test_the_effect_of_inertia_depends_on_lambda(varied):
     low, high = varied["inertia-negligible-elastic"]["lambda"].numbers["mu2, 10 um/s"]
     assert (low, high) == (pytest.approx(-0.11, abs=0.01), pytest.approx(0.17, abs=0.01))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("uncertainty", PAPER.contents.uncertainty, ids=lambda u: u.quantity)
-def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncertainty):
-    """Differences of formulas from an integration and identities rest on it in name only."""
-    there = altered(PAPER.numbers, uncertainty.low)
-    moved, functions = Machine(there), find_checks(checks)
+def test_every_number_that_depends_on_an_uncertain_quantity_lists_it(claims, uncertainty):
+    """Residuals and identities are left out: they stay zero for any value of the quantity."""
+    at_low = altered(PAPER.numbers, uncertainty.low)
+    machine, functions = Machine(at_low), find_checks(checks)
     for entry in PAPER.contents.claim:
         claim = claims[entry.id]
         if claim.kind == "identity" or max(map(abs, claim.numbers.values())) < 1e-3:
             continue
-        numbers = computed_numbers(entry, functions, moved, there)
+        numbers = computed_numbers(entry, functions, machine, at_low)
         scale = 1e-3 * max(map(abs, claim.numbers.values()))
         change = max(
             abs(numbers[name] - value) / max(abs(value), scale)
@@ -272,11 +264,11 @@ def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncert
 
 def test_headlines_follow_from_verdicts(claims):
     def standing(*names, sensitivity=()):
-        own = [replace(claims[n], depends_on=(), sensitivity=sensitivity) for n in names]
+        judged = [replace(claims[n], depends_on=(), sensitivity=sensitivity) for n in names]
         words = HeadlineWords(statement="x", result="{mu1-order}", claims=names)
-        (found,) = headlines([words], [*own, claims["mu1-order"]])
-        assert found.result == claims["mu1-order"].computed
-        return found.standing
+        (headline,) = headlines([words], [*judged, claims["mu1-order"]])
+        assert headline.result == claims["mu1-order"].computed
+        return headline.standing
 
     reproduced, failed = "rice-ruina-mu1-linear-in-V", "inertia-negligible-elastic"
     assert standing(reproduced) == "holds"
@@ -292,24 +284,24 @@ def _sensitivity(*verdicts):
     return Sensitivity("A", ("A = 1", "A = 2"), {}, verdicts)
 
 
-# --- Verdicts can turn --------------------------------------------------------------------------
+# --- Verdicts can change ------------------------------------------------------------------------
 
 
 def _one(name, model):
-    (own,) = [e for e in PAPER.contents.claim if e.id == name]
+    (entry,) = [e for e in PAPER.contents.claim if e.id == name]
     functions = {n: f for n, f in find_checks(checks).items() if n == name}
-    contents = PAPER.contents.model_copy(update={"claim": (own,)})
+    contents = PAPER.contents.model_copy(update={"claim": (entry,)})
     (claim,) = judge_claims(contents, functions, model.numbers, lambda _: model)
     return claim
 
 
-def test_a_printed_formula_that_was_right_would_be_reproduced(model, monkeypatch):
-    right = perturbation.cf.second_harmonic
-    monkeypatch.setattr(perturbation.cf, "second_harmonic", lambda p, e, form: right(p, e))
+def test_a_correctly_printed_formula_would_be_reproduced(model, monkeypatch):
+    derived = perturbation.cf.second_harmonic
+    monkeypatch.setattr(perturbation.cf, "second_harmonic", lambda p, e, form: derived(p, e))
     assert _one("second-harmonic", model).verdict == "reproduced"
 
 
-def test_a_derivation_that_was_wrong_would_be_no_misprint(model, monkeypatch):
+def test_a_wrong_derivation_would_not_be_a_misprint(model, monkeypatch):
     formula = perturbation.cf.second_harmonic
     monkeypatch.setattr(
         perturbation.cf, "second_harmonic", lambda p, e, form: formula(p, e, "as_printed")
@@ -317,10 +309,10 @@ def test_a_derivation_that_was_wrong_would_be_no_misprint(model, monkeypatch):
     assert _one("second-harmonic", model).verdict == "differs"
 
 
-def test_a_wrong_model_would_turn_the_verdicts_on_the_measurements(model):
-    changed, right = Machine(model.numbers), model.terms["mu1"]
-    # The first harmonic at 1 um/s is 30 times smaller.
-    changed.terms["mu1"] = lambda law, speed, *eps: right(law, speed, *eps) / (1 if speed else 30)
+def test_a_wrong_model_would_change_the_verdicts_on_the_measurements(model):
+    changed, mu1 = Machine(model.numbers), model.terms["mu1"]
+    # A first harmonic that is 30 times smaller at 1 um/s.
+    changed.terms["mu1"] = lambda law, speed, *eps: mu1(law, speed, *eps) / (1 if speed else 30)
     for name in ("mu1-order", "drop-over-mu1"):
         assert _one(name, changed).verdict == "differs"
     strongest = Law(EXT, strongest=True)
@@ -329,7 +321,7 @@ def test_a_wrong_model_would_turn_the_verdicts_on_the_measurements(model):
     assert features.missed(model, strongest) == []
 
 
-def test_inertia_that_was_negligible_would_be_reproduced(model):
+def test_negligible_inertia_would_be_reproduced(model):
     changed = Machine(model.numbers)
     changed.terms["EXT_inertia"] = Law(EXT)
     assert _one("inertia-negligible-elastic", changed).verdict == "reproduced"
@@ -402,7 +394,7 @@ def _elastic_response(V, epsilon, inertia):
     return np.array([mean * K / W0 - mu, first * K / W0, second * K / W0])
 
 
-def test_the_inertia_of_the_slider_from_outside(claims):
+def test_the_effect_of_inertia_agrees_with_shooting_by_scipy(claims):
     light, heavy = (_elastic_response(1e-6, 0.24, inertia) for inertia in (False, True))
     changes = claims["inertia-negligible-elastic"].numbers
     names = ["drop, 1 um/s", "mu1, 1 um/s", "mu2, 1 um/s"]
@@ -423,13 +415,13 @@ def _averaged_drop(epsilon, rate):
     return 1 - brentq(excess, 0.3, MU0) / MU0
 
 
-def test_the_drop_of_the_mean_from_outside(claims):
+def test_the_drop_of_the_mean_agrees_with_its_high_frequency_limit(claims):
     drop = claims["rice-ruina-mean"].numbers["1 um/s"]
     assert drop == pytest.approx(_averaged_drop(0.24, A), rel=1e-4)
 
 
-def test_the_second_harmonic_from_outside(claims):
-    """f and the age frozen, the spring integrates v/V = exp((f/w - mu)/A)."""
+def test_the_second_harmonic_agrees_with_its_high_frequency_limit(claims):
+    """With constant f and age, the spring integrates v/V = exp((f/w - mu)/A)."""
     epsilon, t = 1e-3, 2 * np.pi * np.arange(64) / 64
     velocity = np.exp(MU0 * (1 / (1 + epsilon * np.cos(t)) - 1) / A)
     second = 2 * abs(np.fft.fft(velocity)[2]) / 64 / velocity.mean()
@@ -438,7 +430,7 @@ def test_the_second_harmonic_from_outside(claims):
     assert abs(numbers["printed"] / numbers["independent"] - 1) > 2
 
 
-def test_the_determinant_from_outside(claims):
+def test_the_determinant_agrees_with_its_matrix(claims):
     V = 1e-5
     mechanical = K - M * OMEGA**2 + 1j * W0 * OMEGA * A / V
     matrix = np.array([[mechanical, W0 * B * V / D0], [1j * OMEGA / V, 1j * OMEGA + V / D0]])
@@ -446,7 +438,7 @@ def test_the_determinant_from_outside(claims):
     assert claims["determinant"].numbers["derived"] == pytest.approx(expected, rel=1e-10)
 
 
-def test_the_threshold_of_stick_slip_from_outside(claims):
+def test_the_threshold_of_stick_slip_agrees_with_eigenvalues(claims):
     """Eigenvalues of steady sliding in (F/W0, ln Phi), Rice-Ruina."""
     V = 1e-5
 
@@ -461,7 +453,7 @@ def test_the_threshold_of_stick_slip_from_outside(claims):
     assert growth(K) > 0
 
 
-def test_the_borne_fraction_from_outside(claims):
+def test_the_borne_fraction_agrees_with_bessel_functions(claims):
     P0, h0, eta, R, lambda_z = 1e5, 6.5e-6, 1e-5, 3.9e-2, 4e-7
     z = (1 - 1j) / np.sqrt(2) * np.sqrt(12 * eta * OMEGA / (P0 * h0**2)) * R
     air = np.pi * R**2 * P0 / W0 * lambda_z / h0 * jv(2, z) / jv(0, z)
@@ -469,7 +461,7 @@ def test_the_borne_fraction_from_outside(claims):
     assert claims["borne-fraction-120"].numbers["120 Hz"] == pytest.approx(fraction, rel=1e-12)
 
 
-def test_air_and_vacuum_agree_on_one_patch_from_outside(claims):
+def test_one_disc_explains_the_transmission_in_air_and_vacuum(claims):
     """The disc that gives 0.48 at 120 Hz gives the 0.4 of air over vacuum at 200 Hz."""
     P0, h0, eta, lambda_z = 1e5, 6.5e-6, 1e-5, 4e-7
 

@@ -1,4 +1,4 @@
-"""The numbers behind the figures have the properties that the paper states of them."""
+"""The computed curves have the properties that the paper states of its figures."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_every_point_is_solved(figures):
     assert {name: figure.failed for name, figure in figures.items() if figure.failed} == {}
 
 
-def test_every_figure_with_curves_is_there(figures):
+def test_every_figure_with_curves_is_computed_and_described(figures):
     numbers = (2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14, 15, 16)
     assert sorted(figures) == [f"figure-{n:02}" for n in numbers]
     for figure in figures.values():
@@ -37,52 +37,51 @@ def test_every_figure_with_curves_is_there(figures):
 
 
 def over_amplitude(figures):
-    """Figures whose curves begin at unmodulated sliding."""
+    """Figures whose curves begin at an amplitude of zero."""
     return [f for name, f in figures.items() if name not in ("figure-13", "figure-15")]
 
 
 def test_curves_start_from_steady_sliding(figures):
     for figure in over_amplitude(figures):
         name = figure.name
-        still = figure.data[figure.data["epsilon_eff"] == 0]
-        assert len(still) >= 1, name
-        assert (still[["delta_mu", "mu1", "mu2"]] == 0).all().all()
+        unmodulated = figure.data[figure.data["epsilon_eff"] == 0]
+        assert len(unmodulated) >= 1, name
+        assert (unmodulated[["delta_mu", "mu1", "mu2"]] == 0).all().all()
 
 
-def test_steady_sliding_joins_the_smallest_modulation(figures):
-    """The closed form at eps = 0 and the solver next to it agree to second order in eps."""
+def test_curves_are_continuous_at_an_amplitude_of_zero(figures):
+    """The closed form at eps = 0 agrees with an extrapolation of solved points, even in eps."""
     for figure in over_amplitude(figures):
         for curve in figure.data["curve"].unique():
             rows = figure.curve(curve)
             if rows["epsilon_eff"].nunique() < 3:
                 continue
             e, m = rows["epsilon_eff"].to_numpy()[:3], np.log(rows["floquet_max"].to_numpy()[:3])
-            # An even function of eps: the value at 0 from the next two points.
             even = (m[1] * e[2] ** 2 - m[2] * e[1] ** 2) / (e[2] ** 2 - e[1] ** 2)
             assert even == pytest.approx(m[0], abs=0.02 * abs(m[0])), curve
 
 
-def test_the_share_of_all_figures_at_120_hz_is_the_fitted_one(figures):
+def test_all_figures_at_120_hz_have_the_fitted_eps_eff(figures):
     for name in ("figure-02", "figure-03", "figure-04"):
         rows = figures[name].data
         rows = rows[rows["curve"] != "air layer"]
         np.testing.assert_allclose(rows["epsilon_eff"], 0.48 * rows["epsilon_applied"], atol=1e-15)
 
 
-def test_the_drop_is_the_stated_one_and_hardly_depends_on_velocity(figures):
-    read = figures["figure-02"].scalars
-    assert read["relative_drop_slow"] == pytest.approx(0.2, abs=0.01)
-    assert read["relative_drop_fast"] == pytest.approx(read["relative_drop_slow"], rel=0.02)
-    assert read["drop_fast"] == pytest.approx(read["drop_slow"], rel=0.1)
+def test_the_drop_is_as_stated_and_hardly_depends_on_velocity(figures):
+    scalars = figures["figure-02"].scalars
+    assert scalars["relative_drop_slow"] == pytest.approx(0.2, abs=0.01)
+    assert scalars["relative_drop_fast"] == pytest.approx(scalars["relative_drop_slow"], rel=0.02)
+    assert scalars["drop_fast"] == pytest.approx(scalars["drop_slow"], rel=0.1)
 
 
-def test_the_drop_is_quasi_linear_and_misses_the_origin(figures):
-    read = figures["figure-02"].scalars
-    assert read["departure_from_line"] < 0.06 * abs(read["drop_slow"])
-    assert read["intercept"] > 2 * read["departure_from_line"]
+def test_the_drop_is_nearly_linear_with_a_positive_intercept(figures):
+    scalars = figures["figure-02"].scalars
+    assert scalars["departure_from_line"] < 0.06 * abs(scalars["drop_slow"])
+    assert scalars["intercept"] > 2 * scalars["departure_from_line"]
 
 
-def test_mean_falls_with_velocity_at_every_amplitude(figures):
+def test_the_mean_decreases_with_velocity_at_every_amplitude(figures):
     figure = figures["figure-03"]
     assert figure.scalars["slope_0"] == pytest.approx(-0.013, rel=1e-12)
     for curve in figure.data["curve"].unique():
@@ -90,16 +89,16 @@ def test_mean_falls_with_velocity_at_every_amplitude(figures):
     assert -0.013 < figure.scalars["slope_0.5"] < -0.009
 
 
-def test_harmonics_of_the_measured_figure(figures):
-    read = figures["figure-04"].scalars
-    assert 10**-3.5 < read["mu1_slow"] < 10**-2.5
-    assert read["mu1_fast"] == pytest.approx(read["mu1_slow"], rel=0.02)
-    assert 0.1 < read["ratio_slow"] < read["ratio_fast"] < 0.2
+def test_harmonics_of_figure_4_are_in_the_stated_ranges(figures):
+    scalars = figures["figure-04"].scalars
+    assert 10**-3.5 < scalars["mu1_slow"] < 10**-2.5
+    assert scalars["mu1_fast"] == pytest.approx(scalars["mu1_slow"], rel=0.02)
+    assert 0.1 < scalars["ratio_slow"] < scalars["ratio_fast"] < 0.2
 
 
-def test_air_in_figure_5(figures):
+def test_drops_in_air_and_vacuum_of_figure_5_collapse(figures):
     figure = figures["figure-05"]
-    # The appendix: 1/|1 - (200/530)^2| = 1.17; 0.23 under the full disc.
+    # By the appendix 1/|1 - (200/530)^2| = 1.17 in vacuum, and 0.23 with air under the full disc.
     vacuum = 1 / (1 - (2 * np.pi * 200) ** 2 * 1.6 * 0.4e-6 / 7)
     assert figure.scalars["transmission_vacuum"] == pytest.approx(vacuum, rel=1e-12)
     assert figure.scalars["transmission_air"] == pytest.approx(0.23, abs=0.005)
@@ -114,21 +113,21 @@ def test_air_in_figure_5(figures):
     collapsed = np.interp(
         air["epsilon_applied"] / 2.5, vacuum["epsilon_applied"], vacuum["delta_mu"]
     )
-    # What is left is the error of interpolating between 101 points.
+    # The difference is the error of interpolation between 101 points.
     np.testing.assert_allclose(collapsed, air["delta_mu"], atol=5e-5)
 
 
 def test_rice_ruina_overestimates_the_drop_until_rescaled(figures):
     assert figures["figure-06"].scalars["relative_drop_slow"] > 0.4
-    read = figures["figure-07"].scalars
-    assert read["drop_at_scaled"] == pytest.approx(-0.1, rel=0.03)
-    assert read["share_needed"] == pytest.approx(0.48, abs=0.01)
+    scalars = figures["figure-07"].scalars
+    assert scalars["drop_at_scaled"] == pytest.approx(-0.1, rel=0.03)
+    assert scalars["share_needed"] == pytest.approx(0.48, abs=0.01)
 
 
 def test_rice_ruina_harmonics_are_proportional_to_velocity_and_saturate(figures):
     figure, p = figures["figure-08"], Machine().numbers
-    # The spring gains V K/omega per radian; slip in one short pulse a period makes the force a
-    # sawtooth, whose harmonics n are 2 V K/(n omega W0).
+    # The force of the spring rises by V K/omega per radian. With slip in one short pulse a period
+    # it is a sawtooth, whose n-th harmonic is 2 V K/(n omega W0).
     limit = {V: 2 * V * p.K / (2 * np.pi * p.frequency * p.W0) for V in (1e-6, 1e-5)}
     assert figure.scalars["growth_mu1"] == pytest.approx(10, rel=0.005)
     assert figure.scalars["growth_mu2"] == pytest.approx(10, rel=0.02)
@@ -139,7 +138,7 @@ def test_rice_ruina_harmonics_are_proportional_to_velocity_and_saturate(figures)
         assert end(figure, curve, "mu2") < limit[V] / 2
 
 
-def test_the_three_laws_on_common_axes_are_those_of_their_own_figures(figures):
+def test_curves_on_common_axes_are_those_of_the_figures_of_each_law(figures):
     figure = figures["figure-16"]
     read = figure.scalars
     for curve, name, column in (
@@ -148,27 +147,27 @@ def test_the_three_laws_on_common_axes_are_those_of_their_own_figures(figures):
         ("EXT", "figure-11", "delta_mu"),
     ):
         for speed in (SLOW, FAST):
-            own = f"alpha = 0.2, {speed}" if curve == "LD" else speed
+            label = f"alpha = 0.2, {speed}" if curve == "LD" else speed
             np.testing.assert_allclose(
                 figure.curve(f"{curve}, {speed}")[column],
-                figures[name].curve(own)[column],
+                figures[name].curve(label)[column],
                 rtol=1e-8,
             )
-    # Harmonics of rigid asperities are proportional to V, those of elastic ones are not.
+    # Harmonics are proportional to V with rigid asperities, and not with elastic ones.
     assert read["growth_mu1 RR"] == pytest.approx(10, rel=0.01)
     assert read["growth_mu1 LD"] == pytest.approx(10, rel=0.02)
     assert read["growth_mu1 EXT"] == pytest.approx(1, abs=0.05)
     assert read["relative_drop LD"] < 0.6 * read["relative_drop EXT"]
 
 
-def test_linker_dieterich(figures):
-    read = figures["figure-09"].scalars
-    assert read["share_of_drop"] < 0.5
-    assert abs(read["low_alpha_delta_mu"]) < 0.05
-    assert abs(read["low_alpha_mu1"]) < 0.005
-    assert abs(read["low_alpha_mu2"]) < 0.01
+def test_linker_dieterich_harmonics_and_drop_are_too_small(figures):
+    scalars = figures["figure-09"].scalars
+    assert scalars["share_of_drop"] < 0.5
+    assert abs(scalars["low_alpha_delta_mu"]) < 0.05
+    assert abs(scalars["low_alpha_mu1"]) < 0.005
+    assert abs(scalars["low_alpha_mu2"]) < 0.01
     # The caption of Fig. 9 does not hold for panel (a).
-    assert read["low_over_high"] > 1.9
+    assert scalars["low_over_high"] > 1.9
 
 
 def test_elasto_plastic_hardly_depends_on_velocity_and_does_not_saturate(figures):
@@ -182,14 +181,14 @@ def test_elasto_plastic_hardly_depends_on_velocity_and_does_not_saturate(figures
     assert figure.curve(f"{SLOW}, lambda high")["lambda"].iloc[0] == pytest.approx(0.77e-6)
 
 
-def test_uncertainties_move_the_drop_as_computed_elsewhere(figures):
-    """A = 0.008 to 0.018 at fixed B - A: 21.2 to 19.0 %, by a shooting method of its own."""
-    read = figures["figure-02"].scalars
-    assert -200 * read["drop A low"] == pytest.approx(21.2, abs=0.05)
-    assert -200 * read["drop A high"] == pytest.approx(19.0, abs=0.05)
+def test_the_drop_at_the_ends_of_A_agrees_with_shooting(figures):
+    """A = 0.008 to 0.018 at fixed B - A: 21.2 to 19.0 %, by an independent shooting method."""
+    scalars = figures["figure-02"].scalars
+    assert -200 * scalars["drop A low"] == pytest.approx(21.2, abs=0.05)
+    assert -200 * scalars["drop A high"] == pytest.approx(19.0, abs=0.05)
 
 
-def test_bands_are_of_the_curves_at_the_ends_of_the_uncertainties():
+def test_bands_consist_of_the_curves_at_the_ends_of_the_uncertainties():
     ends = variations(Machine())
     for name, groups in {
         "figure-02": [("A", "B", "lambda")],
@@ -210,25 +209,27 @@ def test_a_band_is_drawn_from_the_lowest_to_the_highest_curve(figures):
     assert (low, high) == (0, pytest.approx(1e3 * highest["mu1"].max(), rel=1e-12))
 
 
-# At 10 um/s and eps_eff = 0.24, in percent: by a SciPy shooting of the equations with the mass.
+# At 10 um/s and eps_eff = 0.24, in percent, by shooting with SciPy on the equations with the mass.
 @pytest.mark.parametrize(
     ("length", "drop", "mu2"), [(0.47, 1, -11), (0.62, 13, 51), (0.7, 16, 54), (0.77, 7, 17)]
 )
-def test_inertia_by_elastic_length(figures, length, drop, mu2):
-    read = figures["figure-15"].scalars
-    assert 100 * read[f"change of delta_mu at lambda {length:g} um"] == pytest.approx(drop, abs=0.6)
-    assert 100 * read[f"change of mu2 at lambda {length:g} um"] == pytest.approx(mu2, abs=0.8)
+def test_the_effect_of_inertia_at_each_lambda_agrees_with_shooting(figures, length, drop, mu2):
+    scalars = figures["figure-15"].scalars
+    assert 100 * scalars[f"change of delta_mu at lambda {length:g} um"] == pytest.approx(
+        drop, abs=0.6
+    )
+    assert 100 * scalars[f"change of mu2 at lambda {length:g} um"] == pytest.approx(mu2, abs=0.8)
 
 
-def test_inertia_at_200_hz(figures):
-    """The same integration: the drop goes from 19.8 to 43.8 %, mu2 rises 13-fold."""
-    read = figures["figure-15"].scalars
-    assert read["relative_drop_200Hz"] == pytest.approx(0.198, abs=5e-4)
-    assert read["relative_drop_200Hz_inertia"] == pytest.approx(0.438, abs=5e-4)
-    assert read["mu2_ratio_200Hz"] == pytest.approx(13, abs=0.5)
+def test_the_effect_of_inertia_at_200_hz_agrees_with_shooting(figures):
+    """By the same integration the drop rises from 19.8 to 43.8 % and mu2 13-fold."""
+    scalars = figures["figure-15"].scalars
+    assert scalars["relative_drop_200Hz"] == pytest.approx(0.198, abs=5e-4)
+    assert scalars["relative_drop_200Hz_inertia"] == pytest.approx(0.438, abs=5e-4)
+    assert scalars["mu2_ratio_200Hz"] == pytest.approx(13, abs=0.5)
 
 
-def test_damping_lowers_the_resonance(figures):
+def test_damping_lowers_the_peak_of_the_resonance(figures):
     figure = figures["figure-15"]
     sharp, damped = (figure.curve(f"frequency, {name}") for name in ("inertia", "inertia, damped"))
     assert damped["mu1"].max() < 0.8 * sharp["mu1"].max()
@@ -239,14 +240,14 @@ def test_damping_lowers_the_resonance(figures):
     )
 
 
-def test_one_period_of_the_motion(figures):
+def test_velocities_over_one_period_have_their_range_and_mean(figures):
     figure = figures["figure-13"]
     assert figure.scalars["velocity_min"] == pytest.approx(-55, abs=1)
     assert figure.scalars["velocity_max"] == pytest.approx(56, abs=1)
     assert figure.scalars["plastic_age_smaller_by"] == pytest.approx(0.035, abs=5e-4)
     for name in figure.data["curve"].unique():
         rows = figure.curve(name)
-        # Over a period the slider and its joint advance as the drive does.
+        # Over a period the slider and its contacts move as far as the drive.
         assert rows["velocity"].mean() == pytest.approx(1, rel=1e-9)
         assert rows["plastic_velocity"].mean() == pytest.approx(1, rel=1e-6)
 
@@ -268,11 +269,11 @@ def test_the_age_over_a_period_obeys_its_law(figures):
         np.testing.assert_allclose(rate, expected, atol=1e-3 * np.abs(expected).max())
 
 
-def test_phases_of_small_modulation(figures):
+def test_phases_of_a_small_modulation_are_as_stated(figures):
     """Rice-Ruina slip lags the load by a quarter of a period; elastic asperities follow it."""
-    read = figures["figure-14"].scalars
-    assert read["phase1 RR, 1 um/s"] == pytest.approx(-90, abs=1)
-    assert abs(read["phase1 EXT, 1 um/s"]) < 5
+    scalars = figures["figure-14"].scalars
+    assert scalars["phase1 RR, 1 um/s"] == pytest.approx(-90, abs=1)
+    assert abs(scalars["phase1 EXT, 1 um/s"]) < 5
 
 
 def test_elasto_plastic_mean_is_that_of_rice_ruina(figures):
@@ -280,14 +281,14 @@ def test_elasto_plastic_mean_is_that_of_rice_ruina(figures):
     assert elastic == pytest.approx(rigid["drop_at_scaled"], rel=0.02)
 
 
-def test_what_the_text_states():
-    seen = Machine().stated()
+def test_the_stated_ranges_are_those_of_the_text():
+    stated = Machine().stated()
     assert Machine().strongest == pytest.approx(0.24)
     # 20 % of 0.5 at V0 = 1 um/s, and of 0.5 - 0.013 ln 10 at 10 um/s.
-    assert seen["drop"] == pytest.approx((-0.1, -0.2 * (0.5 - 0.013 * np.log(10))))
-    assert seen["mu1"][0] < 1e-3 < seen["mu1"][1]
-    assert seen["ratio"] == (0.1, 0.2)
-    assert seen["mu2"] == pytest.approx((10**-4.5, 2 * 10**-3.5))
+    assert stated["drop"] == pytest.approx((-0.1, -0.2 * (0.5 - 0.013 * np.log(10))))
+    assert stated["mu1"][0] < 1e-3 < stated["mu1"][1]
+    assert stated["ratio"] == (0.1, 0.2)
+    assert stated["mu2"] == pytest.approx((10**-4.5, 2 * 10**-3.5))
 
 
 def test_a_point_that_fails_is_counted(figures):

@@ -1,4 +1,4 @@
-"""The report's page in a browser: widths, headings, filters and links, on screens and on paper."""
+"""The page of the report in a browser: widths, headings, filters, links, and a print of it."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ WIDTHS = (390, 800, 1400)
 
 
 def claims(paper):
-    """The paper's own words, with verdicts in turn: what is computed takes a minute."""
+    """The claims of the paper with invented verdicts and numbers: the true ones take a minute."""
     verdicts = ("reproduced", "reproduced", "differs", "misprint")
     return [
         Claim(
@@ -37,22 +37,22 @@ def address(tmp_path_factory):
     with style():
         for name in SCHEMATICS:
             save_picture(schematics.draw(name), folder / "figures" / name)
-    found = claims(paper)
+    judged = claims(paper)
     sections = [(Section("figures", "Figures", ()), shown)]
-    # The head shows the figures that need no computation.
+    # The summary shows schematics, which need no computation.
     first, *others = paper.contents.summary
     summary = (first.model_copy(update={"figures": SCHEMATICS}), *others)
     with pytest.MonkeyPatch.context() as patch:
         contents = paper.contents.model_copy(update={"summary": summary})
         patch.setitem(vars(paper), "contents", contents)
-        text = build_page(paper, folder, sections, found, paper.headlines(found))
+        text = build_page(paper, folder, sections, judged, paper.headlines(judged))
     (folder / "index.html").write_text(text, encoding="utf-8")
     return (folder / "index.html").as_uri()
 
 
 @pytest.fixture
 def visit(chromium, address):
-    """A function that opens the page, and refuses anything that it fetches from elsewhere."""
+    """A function that opens the page; fails if the page fetches anything from a network."""
     opened, fetched = [], []
 
     def open_page(width=1400, fragment="", **options):
@@ -78,7 +78,7 @@ def test_nothing_is_wider_than_the_screen(visit):
             assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_what_is_linked_to_is_there_and_not_hidden_under_the_navigation(visit):
+def test_targets_of_links_exist_and_are_not_hidden_by_the_navigation(visit):
     page = visit(390)
     assert page.eval_on_selector_all("details", "all => all.some(d => d.open)") is False
     missing = page.eval_on_selector_all(
@@ -100,7 +100,7 @@ def test_what_is_linked_to_is_there_and_not_hidden_under_the_navigation(visit):
 
 
 def shown(page):
-    """Classes of the claims that are on the screen."""
+    """Classes of the visible claims."""
     return page.eval_on_selector_all(
         ".claim", "all => all.filter(c => c.getClientRects().length).map(c => c.className)"
     )
@@ -123,8 +123,8 @@ def test_tiles_show_the_claims_that_they_count(visit, width):
     assert shown(page) == everything
 
 
-def test_a_phone_does_not_scroll_for_ever_and_a_link_shows_a_reproduced_claim(visit, address):
-    """The head, two figures, 25 claims and the parameters."""
+def test_on_a_phone_the_page_is_short_and_a_link_opens_a_hidden_claim(visit, address):
+    """The page shows the summary, two figures, 25 claims and the parameters."""
     page = visit(390)
     assert page.evaluate("document.documentElement.scrollHeight") < 30 * 844
     name = page.eval_on_selector_all(".claim.reproduced", "all => all[0].id")
@@ -132,7 +132,7 @@ def test_a_phone_does_not_scroll_for_ever_and_a_link_shows_a_reproduced_claim(vi
     assert page.is_visible(f"[id='{name}'] summary")
 
 
-def test_all_claims_are_printed_with_what_was_computed(visit, tmp_path):
+def test_a_print_has_all_claims_and_no_navigation(visit, tmp_path):
     page = visit()
     page.emulate_media(media="print")
     assert len(shown(page)) == len(find_paper("bureau2000").contents.claim)

@@ -1,4 +1,4 @@
-"""Measured points on the figures: their file, their verdict, and a verdict that can be negative."""
+"""Measured points on the figures: their file, their drawing, and their verdicts."""
 
 from pathlib import Path
 
@@ -40,77 +40,77 @@ HEADING = (*TEXTS, *NUMBERS)
 
 @pytest.fixture(scope="module")
 def figures(figures):
-    """Those that the artificial points are of."""
+    """The figures for which there are artificial points."""
     return {name: figures[name] for name in ("figure-02", "figure-03", "figure-04")}
 
 
 def compared(points, figures):
     tables = [
-        with_curves(points[points["figure"] == name], own.data, OBSERVABLES[name], "p.csv")
-        for name, own in figures.items()
+        with_curves(points[points["figure"] == name], figure.data, OBSERVABLES[name], "p.csv")
+        for name, figure in figures.items()
     ]
     return pd.concat([table for table in tables if len(table)], ignore_index=True)
 
 
-def moved(path, folder, factor=1.0, wider=1.0):
-    """The artificial points with y times a factor, and their errors wider."""
+def scaled(path, folder, factor=1.0, wider=1.0):
+    """The artificial points with y times `factor` and errors times `wider`."""
     table = pd.read_csv(path, comment="#", dtype=str)
     table["y"] = table["y"].astype(float) * factor
     table["y_err"] = table["y_err"].astype(float) * wider
-    target = folder / "moved.csv"
+    target = folder / "scaled.csv"
     table.to_csv(target, index=False)
     return read_points(target)
 
 
 def test_points_of_the_model_with_known_noise_agree(figures):
     rows = compared(read_points(ARTIFICIAL), figures)
-    found = comparisons(rows)
+    results = comparisons(rows)
     assert len(rows) == 33
-    assert {one.verdict for one in found} == {"agrees"}
-    (together,) = (one for one in found if not one.figure)
-    assert together.points == 33
-    assert together.chi_squared == pytest.approx((rows["residual"] ** 2).sum(), rel=1e-12)
-    assert together.p_value == pytest.approx(1 - chi2.cdf(together.chi_squared, 33), rel=1e-9)
+    assert {result.verdict for result in results} == {"agrees"}
+    (overall,) = (result for result in results if not result.figure)
+    assert overall.points == 33
+    assert overall.chi_squared == pytest.approx((rows["residual"] ** 2).sum(), rel=1e-12)
+    assert overall.p_value == pytest.approx(1 - chi2.cdf(overall.chi_squared, 33), rel=1e-9)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.2])
 def test_points_that_are_20_percent_off_disagree(figures, tmp_path, factor):
-    found = comparisons(compared(moved(ARTIFICIAL, tmp_path, factor), figures))
-    assert {one.verdict for one in found} == {"disagrees"}
-    assert max(one.p_value for one in found) < 1e-3
+    results = comparisons(compared(scaled(ARTIFICIAL, tmp_path, factor), figures))
+    assert {result.verdict for result in results} == {"disagrees"}
+    assert max(result.p_value for result in results) < 1e-3
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.2])
-def test_errors_too_wide_to_decide(figures, tmp_path, factor):
-    found = comparisons(compared(moved(ARTIFICIAL, tmp_path, factor, wider=60), figures))
-    assert {one.verdict for one in found} == {"undecided"}
+def test_points_with_very_large_errors_are_undecided(figures, tmp_path, factor):
+    results = comparisons(compared(scaled(ARTIFICIAL, tmp_path, factor, wider=60), figures))
+    assert {result.verdict for result in results} == {"undecided"}
 
 
-def test_the_test_fails_true_points_as_often_as_it_says(figures):
-    """Many draws of noise on one curve: 5 % are beyond the quantile."""
+def test_true_points_disagree_as_rarely_as_stated(figures):
+    """Of many draws of noise on one curve 5 % lie beyond the quantile."""
     curve = figures["figure-02"].curve("1 um/s").iloc[20::8]
     rng, draws = np.random.default_rng(1), 2000
     n = len(curve)
-    # Each draw is a figure of its own: all are judged in one call.
+    # Each draw is given as a figure, so that one call tests all of them.
     rows = pd.DataFrame({"figure": np.repeat(np.arange(draws), n), "observable": "delta_mu",
                          "law": "elasto-plastic", "model": np.tile(curve["delta_mu"], draws),
                          "y_err": 0.002, "residual": rng.standard_normal(n * draws)})  # fmt: skip
-    found = comparisons(rows)[:draws]
-    assert all(one.points == n for one in found)
-    beyond = sum(one.verdict == "disagrees" for one in found)
+    results = comparisons(rows)[:draws]
+    assert all(result.points == n for result in results)
+    beyond = sum(result.verdict == "disagrees" for result in results)
     assert beyond / draws == pytest.approx(0.05, abs=0.02)
 
 
-def test_points_are_drawn_where_their_axes_have_them(figures):
+def test_points_are_drawn_in_the_units_of_their_axes(figures):
     rows = compared(read_points(ARTIFICIAL), figures)
-    for name, own in figures.items():
+    for name, numbers in figures.items():
         with style():
-            figure = draw(own)
-            shown = rows[rows["figure"] == name]
-            draw_points(figure, shown, OBSERVABLES[name])
+            figure = draw(numbers)
+            points = rows[rows["figure"] == name]
+            draw_points(figure, points, OBSERVABLES[name])
         drawn = sum(len(bars[0].get_xdata()) for axis in figure.axes for bars in axis.containers)
-        assert drawn == len(shown)
-    # 0.3 to 30 um/s, in um/s.
+        assert drawn == len(points)
+    # The axis of velocities is in um/s.
     with style():
         figure = draw(figures["figure-03"])
         draw_points(figure, rows[rows["figure"] == "figure-03"], OBSERVABLES["figure-03"])
@@ -139,7 +139,7 @@ def write(folder, **changes):
         ({"source": ""}, "points.csv, row 1: source must say where the point comes from"),
     ],
 )
-def test_cells_that_break_a_rule(tmp_path, changes, sentence):
+def test_bad_cells_are_refused(tmp_path, changes, sentence):
     with pytest.raises(InputError, match=sentence) as refused:
         read_points(write(tmp_path, **changes))
     assert "\n" not in str(refused.value)
@@ -152,7 +152,7 @@ def test_cells_that_break_a_rule(tmp_path, changes, sentence):
         ({"observable": "mu3"}, "row 1: observable must be one of delta_mu, got 'mu3'"),
     ],
 )
-def test_names_that_no_figure_has(tmp_path, changes, sentence):
+def test_unknown_figures_and_observables_are_refused(tmp_path, changes, sentence):
     points = read_points(write(tmp_path, **changes))
     with pytest.raises(InputError, match=sentence):
         check_names(points, OBSERVABLES, "points.csv")
@@ -168,7 +168,7 @@ def test_names_that_no_figure_has(tmp_path, changes, sentence):
          "row 1: x must .*unit"),
     ],
 )  # fmt: skip
-def test_points_that_no_curve_has(figures, tmp_path, changes, sentence):
+def test_points_off_the_curves_are_refused(figures, tmp_path, changes, sentence):
     points = read_points(write(tmp_path, **changes))
     name = points["figure"].iloc[0]
     with pytest.raises(InputError, match=sentence):
@@ -183,14 +183,14 @@ def test_points_that_no_curve_has(figures, tmp_path, changes, sentence):
         ("figure,x,y\n1,2,3\n", "points.csv must have the columns .* none for y_err, observable"),
     ],
 )
-def test_files_that_are_no_points(tmp_path, text, sentence):
+def test_files_without_points_are_refused(tmp_path, text, sentence):
     path = tmp_path / "points.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
         read_points(path)
 
 
-def test_a_file_that_cannot_be_read(tmp_path):
+def test_an_unreadable_file_is_refused(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\xd8")
     for path in (tmp_path, tmp_path / "missing.csv", tmp_path / "binary.csv"):
         with pytest.raises(InputError, match="data must be a CSV that can be read"):

@@ -1,4 +1,4 @@
-"""The paper's own procedure recovers the numbers that synthetic measurements were made with."""
+"""The procedure of the paper recovers the true values of synthetic measurements."""
 
 import json
 
@@ -10,10 +10,10 @@ from asperity.errors import InputError
 from asperity.inference import table_of
 from asperity_papers.bureau2000.recipe import Thresholds, paper_procedure, read_thresholds
 
-#: Not the paper's central values, so that nothing is recovered by starting there.
+#: Not the central values of the paper, from which the procedure may start.
 TRUTH = {"mu0": 0.52, "A": 0.015, "B": 0.027, "D0": 0.45e-6, "lambda": 0.6e-6, "eps_ratio": 0.55}
 MACHINE = {"K": "0.2 N/um", "W0": "7 N"}
-#: Relative uncertainties of K/W0, the critical frequency and mu1; of the means absolute.
+#: Relative uncertainties of K/W0, the critical frequency and mu1; absolute ones of the means.
 STIFFNESS, FREQUENCY, FIRST, MEAN, DROP = 0.03, 0.1, 0.05, 1e-3, 2e-3
 
 
@@ -30,7 +30,7 @@ def exact():
         epsilon=TRUTH["eps_ratio"] * epsilon,
         frequency=120.0,
     )
-    # The drop is that of the law that the paper reads it with: step 3 is exact then.
+    # The drop is that of the Rice-Ruina law, which step 3 of the paper assumes.
     rigid = periodic_response(
         Slider(
             laws.RiceRuina(**{n: TRUTH[n] for n in ("mu0", "A", "B", "D0")}, V0=1e-6),
@@ -77,7 +77,7 @@ def recovered(exact):
     )
 
 
-def test_exact_measurements_give_the_truth(recovered):
+def test_measurements_without_noise_give_the_true_values(recovered):
     for name, value in TRUTH.items():
         assert recovered.numbers[name].value == pytest.approx(value, rel=1e-5)
     assert recovered.numbers["alpha"].value == pytest.approx(0, abs=1e-5)
@@ -98,25 +98,25 @@ def test_errors_of_the_first_steps_are_those_of_error_propagation(recovered):
     )
 
 
-def test_later_steps_carry_the_errors_of_the_earlier_ones(exact, recovered):
+def test_errors_of_later_steps_include_those_of_the_earlier_ones(exact, recovered):
     columns, bifurcations = exact
     names = ("eps_ratio", "lambda")
     for name in names:
         assert recovered.numbers[name].se > 1.02 * recovered.numbers[name].se_own
-    # What an error of one standard deviation of the critical frequency does, by doing it.
+    # The critical frequency is shifted by one standard deviation.
     moved = bifurcations | {"frequency": bifurcations["frequency"] * (1 + FREQUENCY / np.sqrt(2))}
-    other = paper_procedure(table_of(columns), Thresholds("moved", **moved), fixed=MACHINE)
+    changed = paper_procedure(table_of(columns), Thresholds("moved", **moved), fixed=MACHINE)
     for name in names:
         number = recovered.numbers[name]
-        shift = abs(other.numbers[name].value - number.value)
-        # To first order: 7 % of the frequency is 14 % of A.
+        shift = abs(changed.numbers[name].value - number.value)
+        # Errors are to first order, and the shift of 7 % is one of 14 % in A.
         assert shift <= 1.2 * np.sqrt(number.se**2 - number.se_own**2)
-    shifted = abs(other.numbers["eps_ratio"].value - recovered.numbers["eps_ratio"].value)
-    rest = recovered.numbers["eps_ratio"]
-    assert shifted == pytest.approx(np.sqrt(rest.se**2 - rest.se_own**2), rel=0.3)
+    shift = abs(changed.numbers["eps_ratio"].value - recovered.numbers["eps_ratio"].value)
+    number = recovered.numbers["eps_ratio"]
+    assert shift == pytest.approx(np.sqrt(number.se**2 - number.se_own**2), rel=0.3)
 
 
-def test_the_reference_velocity_moves_mu0_alone(exact, recovered):
+def test_the_reference_velocity_changes_only_mu0(exact, recovered):
     columns, bifurcations = exact
     thresholds = Thresholds("bifurcations", **bifurcations)
     moved = paper_procedure(table_of(columns), thresholds, fixed=MACHINE | {"V0": "10 um/s"})
@@ -128,13 +128,13 @@ def test_the_reference_velocity_moves_mu0_alone(exact, recovered):
         assert moved.numbers[name].value == pytest.approx(recovered.numbers[name].value, rel=1e-5)
 
 
-def test_the_bound_on_alpha_is_weaker_without_that_share(recovered):
+def test_the_bound_on_alpha_is_weaker_with_a_free_eps_ratio(recovered):
     numbers = recovered.numbers
     assert 0 < numbers["alpha"].upper_limit_95 < 0.05
     assert numbers["alpha, eps_ratio free"].upper_limit_95 > 3 * numbers["alpha"].upper_limit_95
 
 
-def test_each_number_stands_beside_that_of_the_paper(recovered):
+def test_the_record_has_the_published_values_and_deviations(recovered):
     record = json.loads(json.dumps(recovered.record()))["numbers"]
     for name, published in {
         "A": 0.013,
@@ -145,8 +145,8 @@ def test_each_number_stands_beside_that_of_the_paper(recovered):
         "alpha": 0.02,
     }.items():
         assert record[name]["published"] == pytest.approx(published)
-    own = record["A"]["se"]
-    assert record["A"]["deviation"] == pytest.approx(0.002 / np.hypot(own, 0.005), rel=1e-3)
+    se = record["A"]["se"]
+    assert record["A"]["deviation"] == pytest.approx(0.002 / np.hypot(se, 0.005), rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_steps_without_rows_are_left_out(exact, absent, left, warning):
 def test_bifurcations_beyond_doubles_are_refused(exact, seed):
     columns, bifurcations = exact
     draw = np.random.default_rng(seed)
-    # From one to all columns, of which no slider is made.
+    # One to five columns are so large or small that no slider follows from them.
     names = draw.permutation(["K_over_W0", "V", "K_over_W0_err", "frequency", "frequency_err"])
     sizes = 10.0 ** (draw.choice([-1, 1], 5) * draw.uniform(150, 308, 5))
     huge = {
@@ -217,18 +217,12 @@ HEADING = "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n"
     ("text", "message"),
     [
         ("V,K_over_W0\n1e-6,3e4\n", "got none for K_over_W0_err"),
-        (
-            "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n",
-            "must have a heading and a bifurcation a row",
-        ),
-        (
-            "V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,x,1,1,1\n",
-            "row 1 must have a number in column K_over_W0, got 'x'",
-        ),
-        ("V,K_over_W0,K_over_W0_err,frequency,frequency_err\n1e-6,3e4,0,1,1\n", "must be positive"),
+        (HEADING, "must have a heading and a bifurcation a row"),
+        (f"{HEADING}1e-6,x,1,1,1\n", "row 1 must have a number in column K_over_W0, got 'x'"),
+        (f"{HEADING}1e-6,3e4,0,1,1\n", "must be positive"),
     ],
 )
-def test_a_wrong_table_of_bifurcations_is_one_sentence(tmp_path, text, message):
+def test_a_wrong_table_of_bifurcations_is_refused(tmp_path, text, message):
     path = tmp_path / "bifurcation.csv"
     path.write_text(text)
     with pytest.raises(InputError) as raised:
@@ -238,7 +232,7 @@ def test_a_wrong_table_of_bifurcations_is_one_sentence(tmp_path, text, message):
         read_thresholds(tmp_path / "absent.csv")
 
 
-def test_bifurcations_in_units_are_those_in_si(tmp_path):
+def test_bifurcations_in_other_units_are_converted(tmp_path):
     path = tmp_path / "bifurcation.csv"
     path.write_text(
         "V (um/s),K_over_W0 (1/um),K_over_W0_err (1/um),frequency (mHz),frequency_err (mHz)\n"

@@ -1,4 +1,4 @@
-"""What ``asperity reproduce`` writes: complete, self-contained, readable, or nothing at all."""
+"""The folder that ``asperity reproduce`` writes: complete and self-contained, or not written."""
 
 import csv
 import json
@@ -54,7 +54,7 @@ def claim(key, verdict, **fields):
 VARIED = Sensitivity(
     "A", ("A = 0.008", "A = 0.018"), {"value": (0.1, 0.3)}, ("differs", "reproduced")
 )
-#: Figure of the three laws, which the head of the page shows above the answer.
+#: Figure of the three laws, above the answer on the page.
 LAWS = ("figure-16",)
 WORDS = (
     SummaryWords(
@@ -89,18 +89,18 @@ def points_file(folder):
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory, figures, experiment):
-    """A report with a short ledger, of numbers that are there: both have their own tests."""
+    """A report with a short ledger and computed numbers, each of which has other tests."""
     out = tmp_path_factory.mktemp("reproduced") / "report"
     steps = []
 
     @contextmanager
-    def beside():
+    def no_background():
         yield lambda: experiment
 
     with pytest.MonkeyPatch.context() as patch:
         computed = {name: lambda _, numbers=numbers: numbers for name, numbers in figures.items()}
         patch.setattr(report_sections, "NUMBERS", computed)
-        patch.setattr(report_sections, "experiment_in_background", beside)
+        patch.setattr(report_sections, "experiment_in_background", no_background)
         patch.setattr(Paper, "ledger", lambda *_, **__: CLAIMS)
         patch.setattr(Paper, "headlines", lambda *_: HEADLINES)
         paper = find_paper("bureau2000")
@@ -113,7 +113,7 @@ def report(tmp_path_factory, figures, experiment):
 
 
 class Page(HTMLParser):
-    """Elements of a page, and whether every one is closed in order."""
+    """Elements of a page; closing tags must match."""
 
     VOID = frozenset({"meta", "img", "input", "br"})
 
@@ -142,7 +142,7 @@ def page(report):
     return Page((report[0] / "index.html").read_text(encoding="utf-8"))
 
 
-def test_all_files_are_there_and_no_others(report):
+def test_the_folder_has_all_files_and_no_others(report):
     out, _, _ = report
     written = sorted(str(p.relative_to(out)) for p in out.rglob("*") if p.is_file())
     pictures = [f"figures/{n}.{kind}" for n in FIGURES + VIRTUAL for kind in ("pdf", "png")]
@@ -153,14 +153,14 @@ def test_all_files_are_there_and_no_others(report):
     assert sorted(p.name for p in out.parent.iterdir()) == ["artificial.csv", "report"]
 
 
-def test_files_can_be_read_by_others(report):
+def test_files_have_the_permissions_of_the_umask(report):
     umask = os.umask(0)
     os.umask(umask)
     for file in (p for p in report[0].rglob("*") if p.is_file()):
         assert file.stat().st_mode & 0o777 == 0o666 & ~umask, file
 
 
-def test_pictures_are_pictures(report):
+def test_pictures_are_png_and_undated_pdf(report):
     for name in FIGURES + VIRTUAL:
         assert (report[0] / "figures" / f"{name}.png").read_bytes()[1:4] == b"PNG"
         pdf = (report[0] / "figures" / f"{name}.pdf").read_bytes()
@@ -169,7 +169,7 @@ def test_pictures_are_pictures(report):
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_a_table_says_where_its_numbers_come_from(report, name):
+def test_the_head_of_a_table_has_parameters_and_columns(report, name):
     path = report[0] / "data" / f"{name}.csv"
     head = [x for x in path.read_text(encoding="utf-8").splitlines() if x.startswith("#")]
     assert any("asperity" in line for line in head)
@@ -183,7 +183,7 @@ def test_a_table_says_where_its_numbers_come_from(report, name):
 
 
 @pytest.mark.parametrize("name", VIRTUAL)
-def test_tables_of_the_virtual_experiment_say_that_it_is_simulated(report, name):
+def test_the_head_of_a_virtual_table_says_that_it_is_simulated(report, name):
     for part, columns in (("", FIGURE_WORDS.point_column), ("-model", COLUMNS)):
         path = report[0] / "data" / f"{name}{part}.csv"
         text = path.read_text(encoding="utf-8")
@@ -199,7 +199,7 @@ def test_tables_of_the_virtual_experiment_say_that_it_is_simulated(report, name)
         assert all(any(line.startswith(f"#   {c}: ") for line in head) for c in columns)
 
 
-def test_the_virtual_experiment_on_the_page(page, report):
+def test_the_page_says_that_the_virtual_experiment_is_simulated(page, report):
     text = "".join(page.text)
     section = text[text.index("A virtual experiment", text.index("Figures")) :]
     assert "Simulated." in section
@@ -211,7 +211,7 @@ def test_the_virtual_experiment_on_the_page(page, report):
         assert name in [a.get("id") for _, a in page.elements]
 
 
-def test_claims_as_json_and_csv(report):
+def test_claims_are_written_as_json_and_csv(report):
     record = json.loads((report[0] / "claims.json").read_text(encoding="utf-8"))
     assert record["counts"]["test"] == {"reproduced": 1, "misprint": 1, "differs": 1}
     assert record["counts"]["arithmetic"] == {"reproduced": 1, "misprint": 0, "differs": 0}
@@ -227,7 +227,7 @@ def test_claims_as_json_and_csv(report):
     assert rows[0]["why"] == 'so "it" is'
 
 
-def test_summary(report):
+def test_the_summary_counts_figures_points_and_claims(report):
     out, summary, _ = report
     assert (summary.folder, summary.page) == (out, out / "index.html")
     assert (summary.figures, summary.failed) == (20, 0)
@@ -237,7 +237,7 @@ def test_summary(report):
     assert text.count("The mean falls") == 2
 
 
-def test_progress_counts_up_to_the_end(report):
+def test_progress_counts_up_to_its_total(report):
     _, _, steps = report
     done = [step for step, _, _ in steps]
     total = steps[0][1]
@@ -246,7 +246,7 @@ def test_progress_counts_up_to_the_end(report):
     assert {t for _, t, _ in steps} == {total}
 
 
-def test_the_page_is_sound(page):
+def test_the_page_is_valid_html(page):
     assert page.open == []
     names = [a["id"] for _, a in page.elements if "id" in a]
     assert len(names) == len(set(names))
@@ -255,7 +255,7 @@ def test_the_page_is_sound(page):
     assert [name for name in FIGURES + VIRTUAL if name not in names] == []
 
 
-def test_the_page_needs_nothing_else(page, report):
+def test_the_page_is_self_contained(page, report):
     assert page.all("script") == page.all("link") == page.all("iframe") == []
     assert all(image["src"].startswith("data:image/png;base64,") for image in page.all("img"))
     assert len(page.all("img")) == 20 + len(LAWS)
@@ -276,11 +276,10 @@ def test_every_picture_has_an_alternative_text(page):
     assert all(image["alt"].strip() for image in page.all("img"))
 
 
-def test_claims_on_the_page(page):
+def test_the_page_has_every_claim_once_and_misprints_in_the_summary(page):
     text = "".join(page.text)
     statement = "The mean falls by <20 %> & more at εeff = 0.24."
     statement = statement.replace(" %", "\u00a0%").replace("eff = ", "eff\u00a0=\u00a0")
-    # Each entry once, and the misprint in the summary.
     assert text.count(statement) == 5
     entries = [a for a in page.all("details") if "claim" in a["class"]]
     assert [a["id"] for a in entries] == ["a-1", "b-2", "c-3", "d-4"]
@@ -294,7 +293,7 @@ def test_claims_on_the_page(page):
     assert "differs at A" in text
 
 
-def test_the_summary_leads_and_links_to_its_claims(page):
+def test_the_summary_comes_first_and_links_to_its_claims(page):
     text = "".join(page.text)
     titles = ["The answer in five sentences", "What is wrong in print", "What inertia does",
               "What stays open", "The paper’s conclusions"]  # fmt: skip
@@ -302,18 +301,18 @@ def test_the_summary_leads_and_links_to_its_claims(page):
     assert places == sorted(places)
     assert places[-1] < text.index("The set-up")
     linked = [a["href"] for a in page.all("a")]
-    at = [linked.index(f"#{name}") for name in LAWS]
-    assert at == [*range(at[0], at[0] + len(LAWS))]
+    figures = [linked.index(f"#{name}") for name in LAWS]
+    assert figures == [*range(figures[0], figures[0] + len(LAWS))]
     assert places[0] < text.index("The three laws on common axes") < places[1]
     assert linked.count("#b-2") >= 2
     assert {"#show-reproduced", "#show-misprint", "#show-differs"} <= set(linked)
 
 
-def test_conclusions_on_the_page(page):
+def test_the_page_has_every_conclusion(page):
     text = "".join(page.text)
-    for own in HEADLINES:
-        assert own.claim in text
-        assert own.standing in text
+    for headline in HEADLINES:
+        assert headline.claim in text
+        assert headline.standing in text
 
 
 @pytest.mark.parametrize(
@@ -329,11 +328,11 @@ def test_conclusions_on_the_page(page):
         ("<script>", "&lt;script&gt;"),
     ],
 )
-def test_plain_text_as_a_printer_sets_it(plain, shown):
+def test_plain_text_is_typeset(plain, shown):
     assert rich(plain).replace("<sup>−", "<sup>-") == shown
 
 
-def test_a_second_report_has_the_same_bytes(tmp_path):
+def test_pictures_drawn_twice_have_the_same_bytes(tmp_path):
     contents = []
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
@@ -343,7 +342,7 @@ def test_a_second_report_has_the_same_bytes(tmp_path):
     assert contents[0] == contents[1]
 
 
-def test_a_file_where_the_folder_should_be(tmp_path):
+def test_a_file_in_place_of_the_folder_is_refused_and_kept(tmp_path):
     (tmp_path / "taken").write_text("mine")
     for out in (tmp_path / "taken", tmp_path / "taken" / "report"):
         with pytest.raises(InputError, match="out must be a folder that can be written") as refused:
@@ -359,7 +358,7 @@ def write_and_be_interrupted(folder):
         raise KeyboardInterrupt
 
 
-def test_nothing_is_half_written(tmp_path):
+def test_an_interrupted_report_leaves_the_old_folder(tmp_path):
     old = tmp_path / "old"
     old.mkdir()
     (old / "index.html").write_text("before")
@@ -371,7 +370,7 @@ def test_nothing_is_half_written(tmp_path):
     assert (old / "index.html").read_text() == "before"
 
 
-def test_other_files_in_the_folder_stay(tmp_path):
+def test_other_files_in_the_folder_are_kept(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "index.html").write_text("before")
     with written_folder(tmp_path) as staging:
@@ -390,7 +389,7 @@ def _luminance(colour):
 
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
-def test_colours_of_text_can_be_read(theme):
+def test_colours_of_text_have_enough_contrast(theme):
     css = files("asperity.outputs").joinpath("page.css").read_text(encoding="utf-8")
     block = re.findall(r":root \{(.*?)\}", css, re.S)[theme]
     colour = dict(re.findall(r"--([\w-]+): (#\w{6})", block))
@@ -414,7 +413,7 @@ with written_folder(Path(sys.argv[1])) as staging:
 
 @pytest.fixture
 def holder(tmp_path):
-    """A process that is writing a folder; hidden temporary folders are where it writes."""
+    """A process that is writing a folder, through a hidden temporary folder."""
     with subprocess.Popen(
         [sys.executable, "-c", _HOLD, str(tmp_path)], stdout=subprocess.PIPE, text=True
     ) as process:
@@ -424,14 +423,14 @@ def holder(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no locks on folders")
-def test_what_a_killed_run_has_left_is_removed_by_the_next(tmp_path, holder):
-    (left,) = tmp_path.glob(".asperity-*")
+def test_the_next_run_removes_the_temporary_folder_of_a_killed_one(tmp_path, holder):
+    (temporary,) = tmp_path.glob(".asperity-*")
     with written_folder(tmp_path) as staging:
-        # The other process is running: its folder stays.
-        assert {p.name for p in tmp_path.glob(".asperity-*")} == {left.name, staging.name}
+        # The folder of the running process is kept.
+        assert {p.name for p in tmp_path.glob(".asperity-*")} == {temporary.name, staging.name}
     holder.kill()
     holder.wait()
-    assert (left / "half").exists()
+    assert (temporary / "half").exists()
     with written_folder(tmp_path) as staging:
         assert [p.name for p in tmp_path.glob(".asperity-*")] == [staging.name]
     assert list(tmp_path.iterdir()) == []

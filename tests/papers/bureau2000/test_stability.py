@@ -1,4 +1,4 @@
-"""Thresholds of stability against a variational integration that shares nothing with the package.
+"""Thresholds of stability, compared with an independent variational integration.
 
 The equations are the paper's, written in f = F/W0, phi = ln(V Phi/D0); the orbit is closed by
 Newton's method on the end of one period, with the monodromy matrix of the variational equations.
@@ -59,7 +59,7 @@ class Equations:
         return run.y[:2, -1], run.y[2:, -1].reshape(2, 2)
 
     def averaged(self):
-        """Start: f constant, phi = c - (alpha/B) ln w, both averaged equations fulfilled."""
+        """Initial guess: constant f and phi = c - (alpha/B) ln w of the averaged equations."""
         w = 1 + self.epsilon * np.cos(np.linspace(0, 2 * np.pi, 400, endpoint=False))
         c = np.log(np.mean(w ** (self.alpha / B)))
         age = B * c - self.alpha * np.log(w)
@@ -82,7 +82,7 @@ class Equations:
 
 
 def steady_multiplier(slider, V, frequency):
-    """Of unmodulated sliding, over one period."""
+    """Floquet multiplier of unmodulated sliding over one period."""
     return float(periodic_response(slider, velocity=V, epsilon=0, frequency=frequency).floquet_max)
 
 
@@ -91,7 +91,7 @@ def figure(figures):
     return figures["figure-12"]
 
 
-def test_rice_ruina_is_stabilised_between_10_and_15_percent(figure):
+def test_rice_ruina_is_stabilised_at_10_to_15_percent(figure):
     for speed in ("1 um/s", "10 um/s"):
         assert 0.10 < figure.scalars[f"threshold RR, {speed}"] < 0.15
 
@@ -105,7 +105,7 @@ def test_rice_ruina_is_stabilised_between_10_and_15_percent(figure):
         ("EXT", {"lambda_": 7e-7}),
     ],
 )
-# The slope of |m| in eps is 0.012 and 0.12: these moduli stand for thresholds right to 1e-6.
+# The slope of |m| in eps is 0.012 and 0.12: these errors of |m| are 1e-6 in the threshold.
 @pytest.mark.parametrize(
     ("speed", "V", "modulus"), [("1 um/s", 1e-6, 1e-8), ("10 um/s", 1e-5, 1e-7)]
 )
@@ -114,10 +114,10 @@ def test_the_multiplier_is_one_at_the_threshold(figure, variant, parameters, spe
     assert Equations(V, epsilon, **parameters).multiplier() == pytest.approx(1, abs=modulus)
 
 
-def test_stable_above_and_unstable_below(figure):
+def test_curves_are_stable_above_the_threshold_and_unstable_below(figure):
     for curve in figure.data["curve"].unique():
-        rows, at = figure.curve(curve), figure.scalars[f"threshold {curve}"]
-        assert (rows["stable"] == (rows["epsilon_eff"] > at)).all()
+        rows, threshold = figure.curve(curve), figure.scalars[f"threshold {curve}"]
+        assert (rows["stable"] == (rows["epsilon_eff"] > threshold)).all()
 
 
 def test_unmodulated_sliding_is_unstable_at_the_central_values(figure):
@@ -127,22 +127,22 @@ def test_unmodulated_sliding_is_unstable_at_the_central_values(figure):
 
 @pytest.mark.parametrize(("law", "lambda_"), [(RR, 0.0), (EXT, 7e-7)])
 @pytest.mark.parametrize("V", [1e-6, 1e-5])
-def test_closed_form_of_steady_sliding(law, lambda_, V):
+def test_the_multiplier_of_steady_sliding_agrees_with_its_closed_form(law, lambda_, V):
     steady = Equations(V, 0.0, lambda_=lambda_)
     assert steady_multiplier(Machine().slider(law), V, 120.0) == pytest.approx(
         steady.multiplier(), rel=1e-10
     )
 
 
-def test_growth_rate_vanishes_at_the_critical_stiffness():
-    chosen = Machine().slider(RR)
+def test_the_growth_rate_vanishes_at_the_critical_stiffness():
+    slider = Machine().slider(RR)
     stiffness = (B - A) * W0 / D0
-    critical = Slider(chosen.law, spring=stiffness, load=float(chosen.W0))
+    critical = Slider(slider.law, spring=stiffness, load=float(slider.W0))
     assert abs(steady_multiplier(critical, 1e-6, 1.0) - 1) < 1e-10
-    assert steady_multiplier(chosen, 1e-6, 1.0) > 1
+    assert steady_multiplier(slider, 1e-6, 1.0) > 1
 
 
-def test_a_threshold_outside_its_bracket_is_not_invented():
+def test_a_threshold_outside_its_bracket_is_nan():
     V = np.array([1e-6])
-    found = stability.thresholds(Machine(), "RR", V, (np.array([0.02]), np.array([0.05])))
-    assert np.isnan(found).all()
+    epsilon = stability.thresholds(Machine(), "RR", V, (np.array([0.02]), np.array([0.05])))
+    assert np.isnan(epsilon).all()

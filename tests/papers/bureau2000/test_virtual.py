@@ -1,4 +1,4 @@
-"""The virtual experiment: readings of simulated recordings against orbits they know nothing of."""
+"""The virtual experiment: measurements of simulated recordings, compared with computed orbits."""
 
 import numpy as np
 import pandas as pd
@@ -21,7 +21,7 @@ from asperity_papers.bureau2000.virtual import (
 
 PMMA = asp.materials.load("bureau2000")
 SLOW, FAST = "1 um/s", "10 um/s"
-#: B of the machine: 0.6 of its stated 0.01 below the stated 0.026.
+#: B of the machine: 0.6 of the stated uncertainty, 0.01, below the stated 0.026.
 B = 0.020
 SLIDER = asp.Slider(PMMA.law("elasto-plastic", B=B), spring=PMMA.K, load=PMMA.W0, mass=PMMA.M)
 
@@ -33,13 +33,13 @@ def simulated(experiment):
 
 
 def borne(frequency, vacuum=False):
-    """eps_eff/eps with the appendix' layer under the patch that gives 0.48 at 120 Hz, 2.51 cm."""
+    """eps_eff/eps with the air layer of the appendix under a disc of 2.51 cm: 0.48 at 120 Hz."""
     layer = None if vacuum else AirLayer(P0=1e5, h0=6.5e-6, eta=1e-5, R=2.5140636870386906e-2)
     return float(effective_modulation(frequency, W0=7.0, M=1.6, lambda_z=0.4e-6, layer=layer))
 
 
 def test_the_machine_slides_steadily_without_modulation():
-    """K > (B - A (1 + lambda K/W0)) W0/D0; at the central B it is not so."""
+    """K > (B - A (1 + lambda K/W0)) W0/D0, which is not true for the central B."""
 
     def critical(B):
         return (B - 0.013 * (1 + 0.7e-6 * 0.2e6 / 7)) * 7 / 0.4e-6
@@ -65,38 +65,38 @@ def test_the_series_are_those_of_the_paper(experiment):
     assert len(set(seeds)) == len(seeds)
 
 
-def test_the_machine_has_the_share_of_all_figures():
+def test_the_machine_has_the_eps_eff_of_all_figures():
     assert abs(all_series()[0].transfer) == pytest.approx(0.48, rel=1e-9)
 
 
-def test_the_load_is_read_as_commanded(experiment):
+def test_the_measured_amplitude_of_the_load_is_the_commanded_one(experiment):
     for rows in experiment.values():
         np.testing.assert_allclose(rows["epsilon"], rows["epsilon_set"], rtol=1e-3)
 
 
-def test_bars_hold_the_orbits(experiment, simulated):
-    """The orbits are solved without a recording; no bar is wide enough to hold anything."""
+def test_error_bars_contain_the_orbits(experiment, simulated):
+    """The orbits are solved without a recording; error bars are small compared with the values."""
     points = pd.concat([figure.numbers.points for figure in simulated.values()])
     points = points[points["epsilon_set"] > 0].drop_duplicates(["series", "epsilon_set"])
     assert len(points) == sum(map(len, experiment.values()))
     for name in QUANTITIES:
         error = np.abs(points[name] - points[f"{name}_model"])
         hits = error < NORMAL * points[f"{name}_uncertainty"]
-        # At least what 95 % intervals hold, within what so many can tell at 1e-3.
+        # At least 95 %, less what chance explains with a probability of 1e-3.
         assert hits.sum() >= binom.ppf(1e-3, len(hits), 0.95), name
     for rows in experiment.values():
         strongest = rows.iloc[-1]
         # In vacuum the force recovers from the strongest modulation for longer than the pause:
-        # F(0) is that before, and the drift until then counts as uncertainty.
+        # F(0) is measured before it, and the drift since then counts as uncertainty.
         for name, share in (("mean_friction", 0.01), ("delta_mu", 0.1), ("mu1", 0.02)):
             assert strongest[f"{name}_uncertainty"] < share * abs(strongest[name]), name
 
 
-def test_runs_scatter_as_their_noise_asks(experiment):
-    """The gauge's noise alone: sqrt(2/N) of its rms, filtered, on an amplitude."""
+def test_stated_uncertainties_follow_from_the_noise_of_the_gauge(experiment):
+    """The noise of the gauge alone gives an amplitude sqrt(2/N) of its filtered rms."""
     rows = experiment[FAST]
     samples = rows["window"] * 120 * 35 / 6
-    # White up to the recorder's low-pass at 300 Hz of a first-order spectrum of 1 kHz.
+    # A first-order spectrum of 1 kHz is white up to the low-pass of the recorder at 300 Hz.
     spectral = 2 * 10e-9**2 / (np.pi * 1000)  # m^2/Hz one-sided, at frequencies far below 1 kHz
     expected = PMMA.K / PMMA.W0 * np.sqrt(spectral / rows["window"])
     assert (samples > 300).all()
@@ -105,7 +105,7 @@ def test_runs_scatter_as_their_noise_asks(experiment):
     assert (stated < 1.6).all()
 
 
-def test_the_table_of_points(simulated):
+def test_points_and_captions_say_that_they_are_simulated(simulated):
     for figure in simulated.values():
         assert list(figure.numbers.points.columns) == list(WORDS.point_column)
         words = WORDS.figures[figure.numbers.name]
@@ -121,7 +121,7 @@ def test_the_table_of_points(simulated):
         )
 
 
-def test_the_model_beside_a_point_is_that_of_its_operating_point(simulated):
+def test_the_model_of_a_point_is_the_orbit_at_its_operating_point(simulated):
     for figure in simulated.values():
         for _, row in figure.numbers.points.iterrows():
             if row["epsilon_set"] == 0:
@@ -137,24 +137,26 @@ def test_the_model_beside_a_point_is_that_of_its_operating_point(simulated):
         assert row[f"{name}_model"] == pytest.approx(float(getattr(orbit, name)), rel=1e-7)
 
 
-def test_a_point_without_a_line_is_an_error(simulated):
+def test_a_point_without_a_model_is_an_error(simulated):
     figure = simulated["virtual-02"]
-    off = figure.numbers.points.assign(V=2e-6)
+    points = figure.numbers.points.assign(V=2e-6)
     with pytest.raises(KeyError, match="no operating point at 2e-06 m/s"):
-        with_model(off, figure.numbers.data)
+        with_model(points, figure.numbers.data)
 
 
-def test_what_the_recordings_say_is_what_the_machine_has(simulated):
+def test_the_quantities_of_the_machine_are_recovered(simulated):
     recovered = [quantity for figure in simulated.values() for quantity in figure.recovered]
     assert len(recovered) == 13
-    # Of thirteen 95 % intervals one may miss; none by far.
+    # Of thirteen 95 % intervals two may miss, but none by four standard uncertainties.
     assert sum(not quantity.agrees for quantity in recovered) <= 2
     assert all(abs(f.value - f.true_value) < 4 * f.uncertainty for f in recovered)
 
 
-def test_the_statements_of_the_paper_on_the_simulated_points(simulated):
-    share = {f.what: f.value for f in simulated["virtual-02"].recovered}
-    assert share[f"Share of the mean that ε = 0.5 takes, {SLOW}"] == pytest.approx(0.2, abs=0.01)
+def test_the_simulated_points_agree_with_the_statements_of_the_paper(simulated):
+    recovered = {quantity.what: quantity.value for quantity in simulated["virtual-02"].recovered}
+    assert recovered[f"Share of the mean that ε = 0.5 takes, {SLOW}"] == pytest.approx(
+        0.2, abs=0.01
+    )
     slopes = simulated["virtual-03"].numbers.scalars
     assert slopes["slope_0"] == pytest.approx(0.013 - B, rel=0.02)
     points = simulated["virtual-04"].numbers.points
@@ -164,7 +166,7 @@ def test_the_statements_of_the_paper_on_the_simulated_points(simulated):
     assert all(0.1 < b / a < 0.2 for a, b in zip(first, second, strict=True))
 
 
-def test_the_factor_between_air_and_vacuum(simulated):
+def test_the_factor_between_air_and_vacuum_is_recovered(simulated):
     (quantity,) = simulated["virtual-05"].recovered
     assert quantity.true_value == pytest.approx(borne(200.0) / borne(200.0, vacuum=True), rel=1e-9)
     assert quantity.uncertainty < 0.01 * quantity.value
@@ -172,7 +174,7 @@ def test_the_factor_between_air_and_vacuum(simulated):
 
 
 def drops(factor, epsilons):
-    """Points of any smooth curve, at epsilons that the contacts feel `factor`-fold."""
+    """Points of a smooth curve at eps_eff of `factor` times epsilon."""
     u = factor * np.array(epsilons)
     drop = -0.07 * (np.sqrt(1 + (14 * u) ** 2) - 1) - 0.05 * u**2
     return pd.DataFrame(
@@ -180,25 +182,25 @@ def drops(factor, epsilons):
     )
 
 
-def test_collapse_finds_a_factor_that_is_known():
+def test_collapse_finds_a_known_factor():
     vacuum, air = drops(1.0, [0.05, 0.1, 0.2, 0.35, 0.5]), drops(0.37, [0.1, 0.2, 0.35, 0.5])
     factor, sigma = collapse(vacuum, air)
     assert factor == pytest.approx(0.37, rel=1e-6)
     assert 0 < sigma < 0.01
 
 
-def test_a_wrong_share_is_not_agreed_to(simulated):
-    """As if the full disc of the appendix lay under the slider: 0.20 instead of 0.40."""
+def test_a_wrong_factor_does_not_agree(simulated):
+    """The full disc of the appendix would give 0.20 instead of 0.40."""
     (quantity,) = simulated["virtual-05"].recovered
     assert not RecoveredQuantity("", quantity.value, quantity.uncertainty, 0.20, "").agrees
 
 
-def test_a_quotient_and_its_uncertainty():
+def test_a_quotient_has_its_propagated_uncertainty():
     value, sigma, model = Read(-2.0, 0.02, -2.1) / Read(4.0, 0.04, 4.2)
     assert (value, model) == (-0.5, -0.5)
     assert sigma == pytest.approx(0.5 * np.hypot(0.01, 0.01), rel=1e-12)
 
 
-def test_a_difference_and_its_uncertainty():
+def test_a_difference_has_its_propagated_uncertainty():
     difference = -(Read(2.0, 0.03, 2.5) - Read(1.0, 0.04, 1.0)) / 2
     assert difference == pytest.approx((-0.5, 0.025, -0.75), rel=1e-12)

@@ -1,4 +1,4 @@
-"""The second paper: its ledger of 70 claims, against SciPy, and what its folder may hold."""
+"""Marone (1998): its ledger of 70 claims compared with SciPy, and the contents of its folder."""
 
 import re
 from collections import Counter
@@ -19,7 +19,7 @@ A, B, D0 = 0.008, 0.009, 3e-6
 SOFT, STIFF = (2e3, 1e-6), (7.4e4, 0.3162e-6)
 LETTERS = {"rice-ruina": "D", "ruina-slip": "R", "perrin-rice-zheng": "PRZ"}
 
-#: Entries whose rule needs readings that nobody took, or fits no statement.
+#: Claims whose rule needs readings that nobody took, or for which there is no rule.
 UNDECIDED = {
     *("figure-2-ageing", "figure-2-slip", "figure-2-prz", "ageing-soft", "decade-of-velocity"),
     *("seismic-healing", "memory-length-against-strain", "distance-to-weakening"),
@@ -47,14 +47,14 @@ def computed(claims):
 
 
 def healing(name, spring, time, **changes):
-    """By SciPy at a relative 1e-12, from the printed equations."""
+    """Rise of friction after a hold, by SciPy at a relative tolerance of 1e-12."""
     k, V = spring
     numbers = {"A": A, "B": B, "D0": D0} | changes
     level, _, high, *_ = Interface(name, k=k, **numbers).hold(V, time)
     return high - level
 
 
-def test_the_verdicts_on_the_seventy_claims(claims):
+def test_the_seventy_claims_have_the_listed_verdicts(claims):
     assert len(claims) == 70
     by_verdict = {v: {n for n, c in claims.items() if c.verdict == v} for v in
                   ("undecided", "misprint", "differs")}  # fmt: skip
@@ -64,21 +64,21 @@ def test_the_verdicts_on_the_seventy_claims(claims):
     assert set(kinds) == {"test", "fit", "arithmetic", "identity"}
 
 
-def test_healing_of_figure_3_is_that_of_scipy(computed):
-    read = {
+def test_healing_of_figure_3_agrees_with_scipy(computed):
+    digitised = {
         "ageing-stiff": ("rice-ruina", {1e5: 0.0823}),
         "slip-curves": ("ruina-slip", {1e3: 0.0078, 1e5: 0.0172}),
         "prz-curves": ("perrin-rice-zheng", {100: 0.0152, 1e3: 0.0312, 1e5: 0.0596}),
     }
-    for claim, (name, readings) in read.items():
-        for time, value in readings.items():
-            off = healing(name, STIFF, time) - value
-            assert computed[claim][f"off at {time:g} s"] == pytest.approx(off, abs=1e-9)
+    for claim, (name, values) in digitised.items():
+        for time, value in values.items():
+            difference = healing(name, STIFF, time) - value
+            assert computed[claim][f"off at {time:g} s"] == pytest.approx(difference, abs=1e-9)
     legend = healing("rice-ruina", (STIFF[0], 0.3e-6), 1e5) - 0.0823
     assert computed["legend-velocity"]["off"] == pytest.approx(legend, abs=1e-9)
 
 
-def test_changes_between_the_springs_are_those_of_scipy(computed):
+def test_differences_between_the_springs_agree_with_scipy(computed):
     for time in (1e3, 1e5):
         change = healing("rice-ruina", STIFF, time) / healing("rice-ruina", SOFT, time) - 1
         assert computed["ageing-same-values"][f"{time:g} s"] == pytest.approx(change, abs=1e-7)
@@ -93,8 +93,8 @@ def test_changes_between_the_springs_are_those_of_scipy(computed):
     assert computed["not-the-direct-effect"]["R"] == pytest.approx(more / base - 1, abs=1e-7)
 
 
-def test_the_misfit_of_the_points_is_that_of_scipy(claims):
-    """What the actual velocities do: they double the misfit."""
+def test_the_misfit_of_the_points_agrees_with_scipy(claims):
+    """The actual velocities double the misfit."""
     points = np.array([(2.5, 0.0037), (10, 0.0068), (20, 0.0167), (100, 0.0244), (400, 0.0372),
                        (1e3, 0.0501), (3e3, 0.0577), (1e4, 0.0705), (3e4, 0.0835),
                        (1e5, 0.0911)])  # fmt: skip
@@ -110,7 +110,7 @@ def test_the_misfit_of_the_points_is_that_of_scipy(claims):
     )
 
 
-def test_steps_of_figure_2_are_those_of_scipy(computed):
+def test_steps_of_figure_2_agree_with_scipy(computed):
     for name, letter in LETTERS.items():
         interface = Interface(name, 0.01, 0.015, 20e-6, 1e4)
         before, peak, after = interface.step(1e-6, 1e-5)
@@ -120,7 +120,7 @@ def test_steps_of_figure_2_are_those_of_scipy(computed):
         assert computed["end-level"][letter] == pytest.approx(before - at_7, abs=1e-8)
 
 
-def test_velocities_in_the_hold_are_those_of_scipy(computed):
+def test_velocities_in_the_hold_agree_with_scipy(computed):
     interface = Interface("rice-ruina", A, B, D0, STIFF[0])
     ends = []
     for V in (1e-6, 1e-5):
@@ -133,7 +133,7 @@ def test_velocities_in_the_hold_are_those_of_scipy(computed):
     )
 
 
-def test_the_closed_form_of_the_slip_to_steady_state(computed):
+def test_the_slip_to_steady_state_agrees_with_its_closed_form(computed):
     """ln(1 + (r - 1) exp(-u/Dc)) = 0.05 ln r solved for u by hand."""
     slip = {r: np.log((r - 1) / (r**0.05 - 1)) for r in (2.0, 10.0)}
     assert computed["slip-scales-with-velocity"]["2 to 10"] == pytest.approx(
@@ -141,7 +141,7 @@ def test_the_closed_form_of_the_slip_to_steady_state(computed):
     )
 
 
-def test_the_afterslip_rate_is_the_root(claims):
+def test_the_afterslip_of_two_weeks_agrees_with_scipy(claims):
     done = solve_ivp(lambda t, u: [1 / (1 + 1.72 * t)], (0, 365), [0.0], rtol=1e-10, atol=1e-12,
                      t_eval=[14, 365])  # fmt: skip
     assert claims["half-of-the-year"].numbers["share"] == pytest.approx(
@@ -149,7 +149,7 @@ def test_the_afterslip_rate_is_the_root(claims):
     )
 
 
-def test_the_material_has_the_sets_of_the_text():
+def test_the_material_has_the_numbers_of_the_text():
     numbers = materials.load("marone1998")
     assert pytest.approx((A, B, D0)) == (numbers.A, numbers.B, numbers.D0)
     assert numbers.k_stiff == pytest.approx(STIFF[0])
@@ -172,7 +172,7 @@ def test_figures_are_computed_with_their_points():
 
 
 def test_no_text_of_the_paper_is_in_its_folder():
-    """Facts and numbers: nothing longer than a few words is quoted."""
+    """The folder has facts and numbers; quotations have at most six words."""
     files = [*FOLDER.rglob("*.toml"), *FOLDER.rglob("*.py")]
     assert len(files) > 8
     for file in files:
@@ -180,14 +180,14 @@ def test_no_text_of_the_paper_is_in_its_folder():
         assert all(len(text.split()) <= 6 for text in quoted), file.name
 
 
-def test_a_figure_moves_with_its_numbers(capsys):
-    """The Paper tab: lines for other numbers, and code that prints the same."""
+def test_a_figure_follows_changed_numbers(capsys):
+    """The Paper tab draws lines for changed numbers, and its code runs."""
     figure = PAPER.tab["figure-05"]
     assert set(PAPER.tab) < set(PAPER.words.figures)
-    moved = {"B_5": 0.006}
-    lines = figure.lines(altered(PAPER.numbers, moved))
+    changes = {"B_5": 0.006}
+    lines = figure.lines(altered(PAPER.numbers, changes))
     static = next(line for line in lines if line["name"] == "static")["values"]
     slope = np.diff(static["friction"]) / np.diff(np.log(static["over"]))
     np.testing.assert_allclose(slope, -0.006, rtol=1e-9)
-    exec(compile(figure.python(moved), "figure-05", "exec"), {})
+    exec(compile(figure.python(changes), "figure-05", "exec"), {})
     assert "static" in capsys.readouterr().out

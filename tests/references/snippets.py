@@ -1,14 +1,13 @@
-"""The runnable parts of a page, and how an output is held against the one that the page prints.
+"""The runnable parts of a page, and the comparison of outputs with those that the page shows.
 
 In a page,
 
 - a ``python`` block runs, in the namespace of the page;
-- a ``text`` block right behind it is what it prints;
-- a ``console`` block holds commands after ``$ ``, each with its exit code as ``# exit 2`` where
-  that is not 0, and followed by what it prints;
+- a ``text`` block directly after a ``python`` block is the output of that block;
+- a ``console`` block has commands after ``$ ``, each followed by its output; an exit code that
+  is not 0 is written as ``# exit 2``;
 - a ``code-block`` with a file's name as caption is that file;
-- ``...`` stands for whatever comes: as a line for any number of lines, at a line's end for the
-  rest of it.
+- ``...`` matches anything: as a line any number of lines, at the end of a line the rest of it.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 PAGES = [page for page in PAGES if "_build" not in page.parts]
 
-#: Agreement of printed numbers beyond their last digit: what a platform may change.
+#: Relative difference of printed numbers that platforms may cause.
 RELATIVE = 1e-7
 
 _BLOCK = re.compile(
@@ -45,7 +44,7 @@ class Snippet:
 
 @dataclass(frozen=True)
 class Command:
-    """A line of a console block, with what it prints and its exit code."""
+    """A line of a console block, with its output and its exit code."""
 
     arguments: list[str]
     prints: str
@@ -53,9 +52,9 @@ class Command:
 
 
 def snippets(page: Path) -> list[Snippet]:
-    """Runnable parts of a page, in its order."""
+    """Runnable parts of a page, in their order."""
     source = page.read_text(encoding="utf-8")
-    found: list[Snippet] = []
+    parts: list[Snippet] = []
     end = 0
     for block in _BLOCK.finditer(source):
         info, body = block["info"].strip(), block["body"]
@@ -63,30 +62,30 @@ def snippets(page: Path) -> list[Snippet]:
         follows = not source[end : block.start()].strip()
         end = block.end()
         if info in ("python", "console"):
-            found.append(Snippet(info, body, line))
-        elif info == "text" and follows and found and found[-1].kind == "python":
-            last = found[-1]
-            found[-1] = Snippet(last.kind, last.text, last.line, prints=body)
+            parts.append(Snippet(info, body, line))
+        elif info == "text" and follows and parts and parts[-1].kind == "python":
+            last = parts[-1]
+            parts[-1] = Snippet(last.kind, last.text, last.line, prints=body)
         elif info.startswith("{code-block}") and (caption := _CAPTION.match(body)):
-            found.append(Snippet("file", body[caption.end() :], line, name=caption["name"]))
+            parts.append(Snippet("file", body[caption.end() :], line, name=caption["name"]))
         elif info.startswith("{literalinclude}"):
-            found.append(Snippet("include", "", line, name=info.split()[1]))
-    return found
+            parts.append(Snippet("include", "", line, name=info.split()[1]))
+    return parts
 
 
 def commands(text: str) -> list[Command]:
     """The commands of a console block."""
-    found = []
+    listed = []
     for part in re.split(r"^\$ ", text, flags=re.M)[1:]:
         line, _, prints = re.sub(r"\\\n\s*", "", part).partition("\n")
         code = re.search(r"# exit (\d+)\s*$", line)
         arguments = shlex.split(line, comments=True)
-        found.append(Command(arguments, prints, int(code[1]) if code else 0))
-    return found
+        listed.append(Command(arguments, prints, int(code[1]) if code else 0))
+    return listed
 
 
 def difference(shown: str, printed: str) -> str:
-    """Where an output is not what the page shows; empty if it is."""
+    """The first difference of an output from what the page shows; empty if there is none."""
     wanted, got = _lines(shown), _lines(printed)
     i = 0
     for k, line in enumerate(wanted):
@@ -127,6 +126,6 @@ def _close(shown: str, printed: str) -> bool:
     digits = mantissa.partition(".")[2]
     if not digits and not exponent:
         return a == b  # a count, or a whole percentage
-    # What is printed is rounded: its last digit may go either way.
+    # Printed numbers are rounded: their last digits may differ by one.
     unit = 10.0 ** (int(exponent or 0) - len(digits))
     return abs(a - b) <= max(RELATIVE * abs(a), 1.01 * unit)
