@@ -147,7 +147,7 @@ def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
         limits = 0.999999, 6.0
         return jax.jit(
             lambda h: steps.run_steps(
-                system, zero, Y, h, jnp.ones(()), jnp.ones(()), attempt, zero, limits
+                system, jnp.ones(()), zero, Y, h, jnp.ones(()), attempt, zero, limits
             )
         )
 

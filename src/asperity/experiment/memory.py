@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.arrays import Bool, Float
+from asperity.arrays import Bool, Float, batches
 from asperity.errors import InputError, require
 from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.laws import Law
@@ -37,7 +37,7 @@ from asperity.transients.hold_and_step import (
 _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 #: Longest hold (s); the square of a longer time might overflow.
 _LONGEST = 1e20
-#: Numbers of points in a call of the compiled program; a call uses the smallest sufficient one.
+#: Numbers of points in a call of the compiled program.
 _SHAPES = (64, 1024)
 _WITHIN = f"to within {100 * SETTLED:g} % of steady sliding"
 #: Step of the finite difference in ln(hold time); its error is that of an integration step.
@@ -328,12 +328,9 @@ def _settled(slider: Slider, V: jax.Array, extremum: Any) -> SettlingDistance:
 def _in_shapes(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
     """Run many points in calls of a few fixed shapes, padded by repetition."""
     require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
-    size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
     parts = []
-    for i in range(0, max(len(V), 1), size):
-        at = np.minimum(np.arange(i, i + size), len(V) - 1)
-        arguments = jax.tree.map(lambda a, at=at: jnp.asarray(a[at]), (slider, V, *other))
-        kept = min(len(V) - i, size)
+    for index, kept in batches(len(V), _SHAPES):
+        arguments = jax.tree.map(lambda a, at=index: jnp.asarray(a[at]), (slider, V, *other))
         parts.append(jax.tree.map(lambda a, n=kept: np.asarray(a)[:n], run(*arguments)))
     return jax.tree.map(lambda *a: np.concatenate(a), *parts)
 
