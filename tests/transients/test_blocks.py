@@ -81,6 +81,24 @@ def test_an_interrupted_run_is_resumed_from_its_checkpoint(slider) -> None:
     assert reported == sorted(reported)
 
 
+def test_a_segment_becomes_steady_once_however_often_it_is_resumed(slider) -> None:
+    steps = Slide("0.1 s"), Modulate("8 s", 0.05, "40 Hz")
+    programme = Programme(*steps, load="7 N", velocity="1 um/s")
+    whole = transient(slider, programme, sampling="200 Hz").event_times("steady")
+    times: list[float] = []
+    checkpoint = None
+    while True:
+        blocks = integrate_blocks(slider, programme, sampling="200 Hz", rows=400, resume=checkpoint)
+        block = next(blocks, None)
+        if block is None:
+            break
+        checkpoint = block.checkpoint
+        times += block.event_times("steady").tolist()
+    assert len(times) == len(whole) == 2
+    # A modulated segment is compared once a period, here 25 ms, and anew after a resumption.
+    np.testing.assert_allclose(times, whole, atol=0.06)
+
+
 def test_a_long_run_starts_at_once_and_holds_one_block(slider) -> None:
     """Ten minutes at 10 kHz are six million rows: only the requested rows are computed."""
     programme = Programme(
