@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import asperity as asp
 from asperity.loads import Modulate, Programme, RampLoad, Slide, StepLoad
 from asperity.transients import transient
 
@@ -143,3 +144,18 @@ def test_a_load_step_starts_a_slip_at_the_break_point(physical) -> None:
     assert found.event_times("slip start")[0] == 1.0
     (end,) = found.event_times("slip end")
     assert 1 < end < 1.1
+
+
+def test_a_termination_within_the_spacing_of_doubles_has_a_time() -> None:
+    """Where the slip stops, steps of 1e-14 s after half an hour leave the time as it is."""
+    numbers = {"mu0": 0.5234064758672259, "A": 0.012765437614392503, "B": 0.029093959364609512}
+    law = asp.laws.RuinaSlip(**numbers, D0=1.2248716169534373e-06, V0=1e-6)
+    slider = asp.Slider(
+        law, spring=228485.93356503046, load=110.44730884517166, mass=3.0388421937153685
+    )
+    programme = Programme(Slide("1 h"), load=110.44730884517166, velocity=1.2762571719160836e-08)
+    initial = np.array([0.70741249, -6.90775528, 11.26899375])
+    motion = transient(slider, programme, inertia=True, initial=initial)
+    assert motion.termination is not None
+    assert finite(motion)
+    assert 1000 < motion.time[-1] <= motion.termination.time < 2000

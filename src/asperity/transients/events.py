@@ -232,11 +232,7 @@ class EventDetector:
         return [Event(t, "steady") for t in down]
 
     def _crossings(
-        self,
-        name: str,
-        times: np.ndarray,
-        samples: MotionSamples,
-        dense_output: DenseOutput,
+        self, name: str, times: np.ndarray, samples: MotionSamples, dense_output: DenseOutput
     ) -> list[tuple[float, bool]]:
         """Times (s) at which a distance changes its sign, and whether it rises."""
         distance = self._distances[name]
@@ -257,7 +253,10 @@ class EventDetector:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     return distance(motion_samples(self._system, t, dense_output.evaluate(t)))
 
-            roots = find_root(between, (times[change], times[change + 1]), tolerances=_ROOT).x
+            ends = times[change], times[change + 1]
+            roots = find_root(between, ends, tolerances=_ROOT).x
+            # Within a step shorter than the spacing of doubles there is one time only.
+            roots = np.where(np.isnan(roots), ends[1], roots)
             crossings += [
                 (self._start + float(t), bool(values[i] < 0))
                 for t, i in zip(roots, change, strict=True)
