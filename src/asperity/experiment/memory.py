@@ -115,7 +115,7 @@ class Holds(_Memory):
         Whether steady sliding is stable: K above the critical stiffness.
     has_maximum : bool array
     result : str array
-        What happens after the maximum.
+        Sentence on the motion after the maximum.
     slider : Slider
     """
 
@@ -155,7 +155,7 @@ class VelocityStepResponse(_Memory):
         Displacement of the drive and of the slider from the step to the extremum (m).
     settling_distance, settling_slip : array
         The same to where the force stays within 5 % of `evolution` from its steady value; NaN where
-        it does not come there.
+        the force does not reach that value.
     states_at_extremum : array, shape (..., size)
     stable, has_extremum : bool array
     result : str array
