@@ -125,7 +125,8 @@ def stick_slip_response(
     require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
     if spring is not None:
-        slider = Slider(law, spring=spring, load=slider.W0, mass=slider.M)
+        stiffness: Any = spring
+        slider = Slider(law, spring=stiffness, load=slider.W0, mass=slider.M)
     eta = None
     if radiation_damping is not None:
         eta = number(radiation_damping, MACHINE["eta"].label, "damping", "positive")

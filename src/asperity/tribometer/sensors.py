@@ -204,8 +204,8 @@ class Sensor:
             value = number(stated, name, "dimensionless" if field.name == "drift" else kind, rule)
             object.__setattr__(self, field.name, value)
         for name in ("damping", "impulses"):
-            value, field = getattr(self, name), f"{type(self).__name__}.{name}"
-            require(value < 1, field, "be below 1", f"{value:g}", "correct the value")
+            value, label = getattr(self, name), f"{type(self).__name__}.{name}"
+            require(value < 1, label, "be below 1", f"{value:g}", "correct the value")
 
     def read(self, values: Float, rate: float, random: np.random.Generator) -> Float:
         """The sensor's output at the samples of a quantity; the recorder's clock adds the delay.
