@@ -231,7 +231,7 @@ def hold_response(
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
         return response, after, np.log(10) * slope
 
-    response, after, rate = _in_shapes(run, flat, V, time)
+    response, after, rate = _in_batches(run, flat, V, time)
     assert isinstance(response, HoldResponse)
     crossing = response.end == End.CROSSING
     names = ("level", "minimum", "maximum", "hold_slip", "states", "states_at_maximum")
@@ -288,7 +288,7 @@ def step_response(
         response, extremum = step(slider, first, V)
         return response, _settled(slider, V, extremum) if settling else None
 
-    response, after = _in_shapes(run, flat, V, first)
+    response, after = _in_batches(run, flat, V, first)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
     columns = {
@@ -325,8 +325,8 @@ def _settled(slider: Slider, V: jax.Array, extremum: Any) -> SettlingDistance:
     return settle(slider, V, extremum, runaway)
 
 
-def _in_shapes(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
-    """Run many points in calls of a few fixed shapes, padded by repetition."""
+def _in_batches(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
+    """Run many points in calls of a few fixed sizes, so that few programs are compiled."""
     require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
     parts = []
     for index, kept in batches(len(V), _SHAPES):
@@ -340,7 +340,7 @@ def _common(
 ) -> dict[str, Any]:
     """Columns of both tests: the way to the extremum, stability, and what follows."""
     run = lambda slider, V: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
-    stable = np.asarray(_in_shapes(run, slider, V) < 0)
+    stable = np.asarray(_in_batches(run, slider, V) < 0)
     none = np.full(len(V), np.nan)
     crossing = response.end == End.CROSSING
     ends = response.end if after is None else after.end

@@ -218,10 +218,11 @@ class EventDetector:
         if self.steady:
             return []
         t = self._periodic.detect(dense_output)
-        if t is None and not self._system.segment.constant:
-            return []
-        if samples.unsteadiness[0] < self._tolerance and dense_output.begin[0] == 0:
-            t = 0.0
+        if t is None:
+            if not self._system.segment.constant:
+                return []
+            if samples.unsteadiness[0] < self._tolerance and dense_output.begin[0] == 0:
+                t = 0.0
         if t is not None:
             self.steady = True
             return [Event(self._start + t, "steady")]
