@@ -89,6 +89,7 @@ def test_a_line_that_repeats() -> None:
         ("repeat 2 times: hodl 1 s", "step 1.1 must be a step"),
         ("repeat 2 times:", "step 1.1 must be a step"),
         ("repeat 1000000 times: hold 1 s", "at most 100000 steps"),
+        (f"repeat {10**30} times: hodl 1 s", "step 1.1 must be a step"),
     ],
 )
 def test_a_repetition_that_is_none(text, message) -> None:

@@ -304,7 +304,8 @@ def _planned(step: Any, place: str, folder: Path) -> tuple[list[PlannedStep], li
     if times * len(block) > MOST:
         rule, got = f"come to at most {MOST} steps", f"{shown(times)} times {len(block)}"
         return [], [*mistakes, InputError(place, rule, got, "repeat it less often")]
-    return block * times, mistakes
+    # Without a right step inside, times may be too large for a list.
+    return block * min(times, MOST), mistakes
 
 
 def _repetition(line: str, place: str) -> tuple[int, list[str]]:
