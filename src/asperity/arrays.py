@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,3 +26,14 @@ def spaced(low: float, high: float, count: int, *, log: bool = False) -> Float:
     """
     values = between(low, high, np.linspace(0.0, 1.0, count), log=log)
     return np.array([float(f"{value:.15g}") for value in values])
+
+
+def batches(count: int, sizes: Sequence[int]) -> Iterator[tuple[Index, int]]:
+    """Indices of `count` points for calls of a compiled program, and the points of each call.
+
+    All calls have the smallest of the `sizes` that holds all points, or the largest; the last call
+    is filled up with the last point. Of 0 points there is one call, of index -1.
+    """
+    size = next((n for n in sizes if count <= n), sizes[-1])
+    for start in range(0, max(count, 1), size):
+        yield np.minimum(np.arange(start, start + size), count - 1), min(count - start, size)

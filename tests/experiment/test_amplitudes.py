@@ -36,30 +36,30 @@ def series():
 
 
 def test_the_readings_are_the_response_to_what_the_contacts_bear(series) -> None:
-    found = series.to_dataset()
+    dataset = series.to_dataset()
     truth = asp.periodic_response(
         SLIDER, velocity=V, epsilon=abs(TRANSFER) * np.array(EPSILONS), frequency=F
     )
-    np.testing.assert_allclose(found.measured_epsilon, EPSILONS, rtol=1e-3)
+    np.testing.assert_allclose(dataset.measured_epsilon, EPSILONS, rtol=1e-3)
     for name in ("mean_friction", "delta_mu", "mu1", "mu2"):
-        error = np.abs(found[name].values - getattr(truth, name))
+        error = np.abs(dataset[name].values - getattr(truth, name))
         # The sensors' corner at 20 kHz and the filter's at 2 kHz leave harmonics to 1e-4.
-        doubt = 5 * found[f"{name}_uncertainty"].values + 1e-4 * np.abs(getattr(truth, name))
+        doubt = 5 * dataset[f"{name}_uncertainty"].values + 1e-4 * np.abs(getattr(truth, name))
         assert np.all(error < doubt), name
-        assert np.all(found[f"{name}_uncertainty"] < 0.02 * np.abs(getattr(truth, name)))
+        assert np.all(dataset[f"{name}_uncertainty"] < 0.02 * np.abs(getattr(truth, name)))
 
 
 def test_another_transfer_is_seen(series) -> None:
-    found = series.to_dataset()
+    dataset = series.to_dataset()
     other = asp.periodic_response(
         SLIDER, velocity=V, epsilon=1.05 * abs(TRANSFER) * np.array(EPSILONS), frequency=F
     )
-    error = np.abs(found.mu1.values - other.mu1)
-    assert np.all(error > 5 * found.mu1_uncertainty.values + 1e-4 * other.mu1)
+    error = np.abs(dataset.mu1.values - other.mu1)
+    assert np.all(error > 5 * dataset.mu1_uncertainty.values + 1e-4 * other.mu1)
 
 
 def test_phases_are_against_the_applied_load(series) -> None:
-    found = series.to_dataset()
+    dataset = series.to_dataset()
     truth = asp.periodic_response(
         SLIDER, velocity=V, epsilon=abs(TRANSFER) * np.array(EPSILONS), frequency=F
     )
@@ -67,8 +67,8 @@ def test_phases_are_against_the_applied_load(series) -> None:
         # Sensors of both channels shift alike; harmonic n of the force by that at n f, less n
         # times that of the load: third order in f over the corner, less than 1e-4 rad.
         expected = getattr(truth, f"phase{n}") + n * np.angle(TRANSFER)
-        error = np.angle(np.exp(1j * (found[f"phase{n}"].values - expected)))
-        doubt = found[f"phase{n}_uncertainty"].values
+        error = np.angle(np.exp(1j * (dataset[f"phase{n}"].values - expected)))
+        doubt = dataset[f"phase{n}_uncertainty"].values
         assert np.all(np.abs(error) < 5 * doubt + 2e-3)
 
 

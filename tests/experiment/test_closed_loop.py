@@ -73,11 +73,11 @@ class Motion:
         for i, epsilon in enumerate(self.epsilons):
             begin = i * (self.sliding + self.modulated)
             end = begin + 2 * self.sliding + self.modulated
-            found = measure(
+            measurement = measure(
                 trace.slice(begin, end), load=LOAD, force=FORCE, frequency=self.exciter.frequency,
                 harmonics=self.harmonics,
             )  # fmt: skip
-            points.append(AmplitudePoint(epsilon, begin, end, found))
+            points.append(AmplitudePoint(epsilon, begin, end, measurement))
         return AmplitudeSeries(
             trace, tuple(points), self.velocity, self.exciter.frequency, self.exciter.transfer
         )
@@ -168,14 +168,14 @@ def truth(law, velocity, known_gain=True):
 def errors_and_half_widths(series, rows):
     """Name to error and half a 95 % interval, for each amplitude."""
     for point, true in zip(series.points, rows, strict=True):
-        found = point.measurement
+        measurement = point.measurement
         for name in NAMES:
-            value = _value(found.reading, name)
+            value = _value(measurement.reading, name)
             error = value - true[name]
             if name.startswith("phase"):
                 error = np.angle(np.exp(1j * error))
-            yield name, error, found.reading.half_width(name)
-        yield "delta_mu", found.delta_mu - true["delta_mu"], found.delta_mu_interval_95
+            yield name, error, measurement.reading.half_width(name)
+        yield "delta_mu", measurement.delta_mu - true["delta_mu"], measurement.delta_mu_interval_95
 
 
 def _value(reading, name):
@@ -283,8 +283,8 @@ def test_white_noise_is_not_what_the_gauge_has(tables, monkeypatch, tmp_path) ->
     local = lock_in.local_noise
 
     def white(*given):
-        found = local(*given)
-        return replace(found, spectra=np.broadcast_to(variances, found.spectra.shape))
+        local_noise = local(*given)
+        return replace(local_noise, spectra=np.broadcast_to(variances, local_noise.spectra.shape))
 
     # Of all laws, since it costs nothing: 216 intervals, 88 % at 1e-5.
     own = [hits([t for t in tables[name] if t[0] == 1e-5], name) for name in LAWS]
@@ -361,10 +361,10 @@ def test_air_and_vacuum_tell_what_of_the_load_is_borne(tmp_path) -> None:
             motions[p].table(2 * seed + (p == 1e5), tmp_path / "pair.tdms").to_dataset()
             for p in (1e5, 1e2)
         )
-        for name, found in errors.items():
+        for name, deviations in errors.items():
             factor, doubt = collapse(air, vacuum, name)
             assert doubt < 0.02 * expected, name
-            found.append((factor - expected) / doubt)
+            deviations.append((factor - expected) / doubt)
     # The scatter is what is stated, within what so many seeds tell at 1e-3 on either side.
     total = np.sum(np.square(errors["mu1"]))
     assert chi2.ppf(1e-3, PAIRS) < total < chi2.ppf(1 - 1e-3, PAIRS)

@@ -37,24 +37,24 @@ def recordings():
 @pytest.mark.parametrize("channel", ["displacement", "drive position"])
 def test_lambda_is_recovered_within_its_uncertainty(recordings, channel) -> None:
     spring = None if channel == "displacement" else SLIDER.K
-    found = [elastic_length(r, displacement=channel, spring=spring) for r in recordings]
+    lengths = [elastic_length(r, displacement=channel, spring=spring) for r in recordings]
     # Six cycles: Student's t with five degrees of freedom, whose 99.9 % are 6.9.
-    errors = np.array([(f.lambda_ - LAMBDA) / f.uncertainty for f in found])
+    errors = np.array([(f.lambda_ - LAMBDA) / f.uncertainty for f in lengths])
     assert np.all(np.abs(errors) < 6.9)
     # No bias beyond what the scatter of twelve tests leaves.
-    mean = np.mean([f.lambda_ for f in found])
-    doubt = np.std([f.lambda_ for f in found], ddof=1) / np.sqrt(len(found))
+    mean = np.mean([f.lambda_ for f in lengths])
+    doubt = np.std([f.lambda_ for f in lengths], ddof=1) / np.sqrt(len(lengths))
     assert abs(mean - LAMBDA) < 5 * doubt
-    stated = np.sqrt(np.mean([f.uncertainty**2 for f in found]))
+    stated = np.sqrt(np.mean([f.uncertainty**2 for f in lengths]))
     # 99.8 % of chi squared with eleven degrees of freedom.
-    assert np.sqrt(1.83 / 11) < doubt * np.sqrt(len(found)) / stated < np.sqrt(31.3 / 11)
+    assert np.sqrt(1.83 / 11) < doubt * np.sqrt(len(lengths)) / stated < np.sqrt(31.3 / 11)
     assert stated < 0.02 * LAMBDA
 
 
 def test_the_slope_is_the_stiffness_of_the_asperities(recordings) -> None:
-    found = elastic_length(recordings[0])
-    assert found.stiffness == pytest.approx(7.0 / LAMBDA, rel=0.01)
-    assert found.cycles.size == 6
+    measured = elastic_length(recordings[0])
+    assert measured.stiffness == pytest.approx(7.0 / LAMBDA, rel=0.01)
+    assert measured.cycles.size == 6
     series = elastic_length(recordings[0], displacement="drive position", spring=SLIDER.K)
     in_series = 1 / (1 / float(SLIDER.K) + LAMBDA / 7.0)
     assert series.stiffness == pytest.approx(in_series, rel=1e-3)
@@ -76,9 +76,9 @@ def test_a_planted_slope_is_read_in_the_presence_of_drift() -> None:
         "normal force": Channel(np.full(time.size, 7.0), "force", "N"),
         "displacement": Channel(x, "length", "m"),
     }
-    found = elastic_length(Trace(time, channels))
-    assert found.lambda_ == pytest.approx(0.8e-6, rel=1e-9)
-    assert found.cycles.size == 5
+    measured = elastic_length(Trace(time, channels))
+    assert measured.lambda_ == pytest.approx(0.8e-6, rel=1e-9)
+    assert measured.cycles.size == 5
 
 
 @pytest.mark.parametrize(

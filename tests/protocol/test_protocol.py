@@ -282,8 +282,8 @@ def test_the_rate_of_growth_is_that_of_the_linearised_equations() -> None:
     k = 0.1 * (B - A)
     rate = max((-b + s) / (2 * A) for b in [k + A - B] for s in [(b**2 - 4 * A * k) ** 0.5])
     said = stability_statement(protocol(0.1, "regularised"))
-    found = float(said.split("doubles in ")[1].split(" s")[0])
-    assert found == pytest.approx(np.log(2) * D0 / (V * rate), rel=0.01)
+    seconds = float(said.split("doubles in ")[1].split(" s")[0])
+    assert seconds == pytest.approx(np.log(2) * D0 / (V * rate), rel=0.01)
 
 
 def test_inertia_raises_the_critical_stiffness() -> None:

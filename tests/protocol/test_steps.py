@@ -49,6 +49,7 @@ def test_every_example_is_valid(form) -> None:
     ("text", "message"),
     [
         ("hodl 10 s", ["step 4 must be a step", "'hodl 10 s'", "'hold 10 s'"]),
+        ("repaet 3 times: hold 1 s", ["'repeat 3 times: hold 10 s; slide for 60 s'"]),
         ("modulat 5 % at 8 Hz for 1 s", ["'modulate 24 % at 120 Hz for 20 s'"]),
         ("ramp 5 N", ["'ramp load to 9 N in 5 s' or 'ramp velocity to 100 um/s in 5 s'"]),
         ("step velocity to 1 um/s", ["'step load to 9 N'"]),
@@ -88,6 +89,7 @@ def test_a_line_that_repeats() -> None:
         ("repeat 2 times: hodl 1 s", "step 1.1 must be a step"),
         ("repeat 2 times:", "step 1.1 must be a step"),
         ("repeat 1000000 times: hold 1 s", "at most 100000 steps"),
+        (f"repeat {10**30} times: hodl 1 s", "step 1.1 must be a step"),
     ],
 )
 def test_a_repetition_that_is_none(text, message) -> None:

@@ -89,9 +89,9 @@ def here(tmp_path: Path):
 
 def test_mixed_laws_equal_direct_calls_in_the_order_of_the_rows(here) -> None:
     rows = points(14)
-    found, summary = here(rows, block=5)
+    answers, summary = here(rows, block=5)
     assert (summary.rows, summary.failed) == (14, 0)
-    for row, answer in zip(rows, found, strict=True):
+    for row, answer in zip(rows, answers, strict=True):
         assert {k: answer[k] for k in COLUMNS} == {k: str(row[k]) for k in COLUMNS}
         expected = direct(row)
         for name in NUMBERS:
@@ -136,11 +136,11 @@ BAD = [
 def test_a_bad_row_gets_its_reason_and_costs_no_other(here) -> None:
     good = POINT | {"law": "rice-ruina"}
     rows = [good, *(row for change, _ in BAD for row in (good | change, good))]
-    found, summary = here(rows)
+    answers, summary = here(rows)
     assert summary.failed == len(BAD)
-    reference = found[0]
+    reference = answers[0]
     for i, (change, reason) in enumerate(BAD):
-        bad, after = found[1 + 2 * i], found[2 + 2 * i]
+        bad, after = answers[1 + 2 * i], answers[2 + 2 * i]
         assert reason in bad["result"], change
         assert [bad[name] for name in NUMBERS] == [""] * len(NUMBERS)
         assert (bad["stable"], bad["converged"]) == ("False", "False")
@@ -149,18 +149,18 @@ def test_a_bad_row_gets_its_reason_and_costs_no_other(here) -> None:
 
 def test_numbers_that_a_law_does_not_have_are_not_looked_at(here) -> None:
     row = POINT | {"law": "rice-ruina"}
-    found, summary = here([row, row | {"alpha": "n/a", "lambda": -1}])
+    answers, summary = here([row, row | {"alpha": "n/a", "lambda": -1}])
     assert summary.failed == 0
-    assert [found[0][n] for n in NUMBERS] == [found[1][n] for n in NUMBERS]
+    assert [answers[0][n] for n in NUMBERS] == [answers[1][n] for n in NUMBERS]
 
 
 def test_a_row_without_orbit_says_so_and_gives_no_number(here) -> None:
     rows = [POINT | {"law": "rice-ruina", "V": 1e300}, POINT | {"law": "rice-ruina"}]
-    found, summary = here(rows)
+    answers, summary = here(rows)
     assert summary.failed == 1
-    assert found[0]["result"] not in ("", "converged")
-    assert (found[0]["mean_friction"], found[0]["converged"]) == ("", "False")
-    assert found[1]["converged"] == "True"
+    assert answers[0]["result"] not in ("", "converged")
+    assert (answers[0]["mean_friction"], answers[0]["converged"]) == ("", "False")
+    assert answers[1]["converged"] == "True"
 
 
 def test_missing_columns_and_empty_cells_are_filled(here) -> None:
@@ -170,20 +170,20 @@ def test_missing_columns_and_empty_cells_are_filled(here) -> None:
         {"V": 1e-6, "epsilon": 0.24, "A": 0.02},
         {"V": 1e-6, "epsilon": 0.24, "law": "linker-dieterich"},
     ]
-    found, summary = here(rows, ["law", "A", "V", "epsilon"], law="rice-ruina", filled=filled)
+    answers, summary = here(rows, ["law", "A", "V", "epsilon"], law="rice-ruina", filled=filled)
     assert summary.failed == 0
     full = [POINT | {"law": "rice-ruina"} | row for row in rows]
-    for row, answer in zip(full, found, strict=True):
+    for row, answer in zip(full, answers, strict=True):
         assert float(answer["mu1"]) == pytest.approx(float(direct(row).mu1), rel=1e-9)
-    assert found[0]["A"] == ""
-    assert found[0]["law"] == ""
+    assert answers[0]["A"] == ""
+    assert answers[0]["law"] == ""
 
 
 def test_the_mass_may_be_absent(here) -> None:
     rows = [POINT | {"law": "rice-ruina", "M": ""}, POINT | {"law": "rice-ruina"}]
-    found, summary = here(rows)
+    answers, summary = here(rows)
     assert summary.failed == 0
-    assert found[0]["mu1"] == found[1]["mu1"]
+    assert answers[0]["mu1"] == answers[1]["mu1"]
 
 
 def test_cells_are_kept_as_they_were_written(tmp_path: Path) -> None:
@@ -218,18 +218,18 @@ def test_a_row_of_another_width_is_a_bad_row(tmp_path: Path) -> None:
     rows.append("rice-ruina,1e-6,0.2,120,,")
     source.write_text("\n".join(["law,V,epsilon,frequency", *rows]), encoding="utf-8")
     summary = run_table(source, tmp_path / "out.csv", filled=POINT)
-    found = read(summary.out)
-    assert [r["converged"] for r in found] == ["True", "False", "False", "True"]
-    assert "got 3 instead of 4" in found[1]["result"]
-    assert "got 5 instead of 4" in found[2]["result"]
+    answers = read(summary.out)
+    assert [r["converged"] for r in answers] == ["True", "False", "False", "True"]
+    assert "got 3 instead of 4" in answers[1]["result"]
+    assert "got 5 instead of 4" in answers[2]["result"]
 
 
 def test_a_column_that_only_some_laws_lack_concerns_only_their_rows(here) -> None:
     columns = [c for c in COLUMNS if c != "lambda"]
     rows = [{k: v for k, v in row.items() if k in columns} for row in points(6)]
-    found, summary = here(rows, columns)
+    answers, summary = here(rows, columns)
     assert summary.failed == 2
-    for row in found:
+    for row in answers:
         assert (row["converged"] == "True") == ("plastic" not in row["law"])
         if "plastic" in row["law"]:
             assert "must have lambda" in row["result"]
@@ -237,8 +237,8 @@ def test_a_column_that_only_some_laws_lack_concerns_only_their_rows(here) -> Non
 
 def test_columns_of_the_users_own_are_kept(here) -> None:
     mine = dict.fromkeys(("note", "sample", "operator", "temperature", "run", "mean"), "mine")
-    found, _ = here([POINT | {"law": "amontons"} | mine], [*COLUMNS, *mine])
-    assert {name: found[0][name] for name in mine} == mine
+    answers, _ = here([POINT | {"law": "amontons"} | mine], [*COLUMNS, *mine])
+    assert {name: answers[0][name] for name in mine} == mine
 
 
 @pytest.mark.parametrize(
@@ -260,9 +260,9 @@ def test_units_stand_in_headings(here) -> None:
     (plain,), _ = here([row])
     other = {n: v for n, v in row.items() if n not in ("V", "epsilon")}
     other |= {"V (um/s)": 2, "epsilon [%]": 24, "note (a)": 1, "note (b)": 2}
-    (found,), _ = here([other], list(other))
+    (answers,), _ = here([other], list(other))
     for name in NUMBERS:
-        assert float(found[name]) == pytest.approx(float(plain[name]), rel=1e-12)
+        assert float(answers[name]) == pytest.approx(float(plain[name]), rel=1e-12)
 
 
 class Stop:
@@ -376,24 +376,24 @@ def test_other_modulations_are_those_of_the_library_and_cost_no_other_row(here) 
     rows = [own, *(own | columns for columns, _ in OTHER.values())]
     rows += [own | {"epsilon": 0.7, "epsilon2": 0.4, "epsilon2_phase": math.pi}]
     rows += [own | {"tilt": 1.6}, own | {"pull": "much"}]
-    found, summary = here(rows, [*COLUMNS, *MODULATION])
+    answers, summary = here(rows, [*COLUMNS, *MODULATION])
     assert summary.failed == 3
     wanted = [direct(own), *(direct(own, load) for _, load in OTHER.values())]
-    for answer, expected in zip(found[:3], wanted, strict=True):
+    for answer, expected in zip(answers[:3], wanted, strict=True):
         assert answer["result"] == "converged"
         for name in NUMBERS:
             assert float(answer[name]) == pytest.approx(
                 float(getattr(expected, name)), rel=2e-9, abs=1e-13
             ), name
-    drops = [float(answer["delta_mu"]) for answer in found[:3]]
+    drops = [float(answer["delta_mu"]) for answer in answers[:3]]
     assert min(np.diff(np.sort(drops))) > 1e-4  # three different loads
-    lost, steep, text = (answer["result"] for answer in found[3:])
+    lost, steep, text = (answer["result"] for answer in answers[3:])
     # w = 1 + 0.7 cos t - 0.4 cos 2t is lowest at t = pi.
     assert lost.startswith("load must stay positive over the period")
     assert "lowest W/W0 of -0.1;" in lost
     assert steep.startswith("tilt must be less than a right angle")
     assert text.startswith("pull must be a finite number, got 'much'")
-    assert {answer["mu1"] for answer in found[3:]} == {""}
+    assert {answer["mu1"] for answer in answers[3:]} == {""}
 
 
 def test_a_material_does_not_say_how_the_drive_is_modulated(tmp_path: Path) -> None:

@@ -83,10 +83,10 @@ def periodic(rates, start, period: float) -> np.ndarray:
 def test_twice_the_natural_frequency_doubles_the_period() -> None:
     """An integration of the printed equations, in the variables f and phi = ln(V Phi/D0)."""
     V, eps, f = 1e-6, 0.2, 1.0
-    found = stiffness_threshold(SLIDERS["rice-ruina"], velocity=1e-6, epsilon=eps, frequency=f)
-    assert found.kind[()] == "period doubling"
-    assert float(found.ratio) > 2
-    K, W0, D0, A, B = float(found.ratio) * KC, PMMA.W0, PMMA.D0, PMMA.A, PMMA.B
+    result = stiffness_threshold(SLIDERS["rice-ruina"], velocity=1e-6, epsilon=eps, frequency=f)
+    assert result.kind[()] == "period doubling"
+    assert float(result.ratio) > 2
+    K, W0, D0, A, B = float(result.ratio) * KC, PMMA.W0, PMMA.D0, PMMA.A, PMMA.B
 
     def rates(t, y):
         force, phi = y
@@ -103,11 +103,11 @@ def test_twice_the_natural_frequency_doubles_the_period() -> None:
 
 
 def test_far_above_stick_slip_the_threshold_knows_no_frequency() -> None:
-    found = stiffness_threshold(
+    result = stiffness_threshold(
         SLIDERS["rice-ruina"], velocity=1e-6, epsilon=0.2, frequency=np.array([20.0, 120.0, 700.0])
     )
-    np.testing.assert_allclose(found.ratio, found.ratio[1], rtol=1e-3)
-    assert (found.ratio < 0.85).all()
+    np.testing.assert_allclose(result.ratio, result.ratio[1], rtol=1e-3)
+    assert (result.ratio < 0.85).all()
 
 
 def test_a_planted_mistake_in_the_scale_is_seen(monkeypatch) -> None:
@@ -125,9 +125,9 @@ def test_twice_the_resonance_of_the_asperities_doubles_the_period() -> None:
     numbers = {n: PMMA[n].si for n in ("mu0", "A", "B", "D0", "V0", "lambda", "W0", "M")}
     numbers |= {"K": K, "V": V, "inertia": 1.0}
     axes = {"x": Axis("frequency", 700.0, f, 2), "y": Axis("epsilon", 0.02, eps, 2)}
-    found = asp.map("elasto-plastic", numbers, **axes)
-    assert found["stable"].values.tolist() == [[True, True], [True, False]]
-    assert found["mode"].values[1, 1] == "period doubling"
+    dataset = asp.map("elasto-plastic", numbers, **axes)
+    assert dataset["stable"].values.tolist() == [[True, True], [True, False]]
+    assert dataset["mode"].values[1, 1] == "period doubling"
     W0, D0, A, B, M, lam = PMMA.W0, PMMA.D0, PMMA.A, PMMA.B, PMMA.M, PMMA.lambda_
     omega = 2 * np.pi * f
 
@@ -143,12 +143,12 @@ def test_twice_the_resonance_of_the_asperities_doubles_the_period() -> None:
             V / D0 * np.exp(-phi) - v / D0,
         ]) / omega  # fmt: skip
 
-    mean = float(found["mean_friction"].values[1, 1])
+    mean = float(dataset["mean_friction"].values[1, 1])
     start = np.array([mean, 1.0, mean, 0.0])
     start = periodic(rates, start, 2 * np.pi)
     multipliers = np.linalg.eigvals(monodromy(rates, start, 2 * np.pi))
     leading = multipliers[np.argmax(np.abs(multipliers))]
     assert leading.real < -1
     assert np.log(abs(leading)) == pytest.approx(
-        float(found["log_multiplier"].values[1, 1]), rel=1e-4
+        float(dataset["log_multiplier"].values[1, 1]), rel=1e-4
     )

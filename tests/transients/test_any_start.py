@@ -45,22 +45,22 @@ def starts(size, count, seed, steady):
 def assert_ended(slider, programme, **options):
     refused = None
     try:
-        found = asp.transient(slider, programme, **options)
+        motion = asp.transient(slider, programme, **options)
     except asp.InputError as error:
         refused = str(error)
     if refused is not None:
         assert refused.startswith("initial must ")
         assert "; " in refused
         return
-    assert len(found.time) > 0
-    assert found.time[0] == 0
-    if found.termination is None:
-        assert found.time[-1] == programme.duration
+    assert len(motion.time) > 0
+    assert motion.time[0] == 0
+    if motion.termination is None:
+        assert motion.time[-1] == programme.duration
     else:
-        assert found.termination.kind in _SENTENCES
-        assert found.events[-1].kind == found.termination.kind
-    assert "Trajectory" in repr(found)
-    assert found.to_dataset().sizes["time"] == len(found.time)
+        assert motion.termination.kind in _SENTENCES
+        assert motion.events[-1].kind == motion.termination.kind
+    assert "Trajectory" in repr(motion)
+    assert motion.to_dataset().sizes["time"] == len(motion.time)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_far_from_steady_sliding_the_motion_is_that_of_scipy(seed):
     force = mu0 + B * log_age + A * draw.choice([draw.uniform(-30, 0), draw.uniform(0, 3)])
     force = max(force, 0.0)
     programme = Programme(Slide("0.05 s", "1 um/s"), load=W0, velocity="1 um/s")
-    found = asp.transient(
+    motion = asp.transient(
         slider, programme, initial=[force, log_age], sampling=np.linspace(0, 0.05, 6)
     )
 
@@ -124,11 +124,11 @@ def test_far_from_steady_sliding_the_motion_is_that_of_scipy(seed):
         return [K / W0 * (1e-6 - v), (V0 * np.exp(-y[1]) - v) / D0]
 
     exact = solve_ivp(
-        rates, (0, 0.05), [force, log_age], "Radau", found.time, rtol=1e-10, atol=1e-12
+        rates, (0, 0.05), [force, log_age], "Radau", motion.time, rtol=1e-10, atol=1e-12
     )
-    assert found.stopped is None
-    assert found.force / W0 == pytest.approx(exact.y[0], rel=1e-7)
-    assert found.states[:, 1] == pytest.approx(exact.y[1], rel=1e-6, abs=1e-7)
+    assert motion.stopped is None
+    assert motion.force / W0 == pytest.approx(exact.y[0], rel=1e-7)
+    assert motion.states[:, 1] == pytest.approx(exact.y[1], rel=1e-6, abs=1e-7)
 
 
 def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
@@ -147,7 +147,7 @@ def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
         limits = 0.999999, 6.0
         return jax.jit(
             lambda h: steps.run_steps(
-                system, zero, Y, h, jnp.ones(()), jnp.ones(()), attempt, zero, limits
+                system, jnp.ones(()), zero, Y, h, jnp.ones(()), attempt, zero, limits
             )
         )
 
@@ -168,5 +168,5 @@ def test_contact_that_is_lost_in_a_rise_of_any_length_is_reported(
 ):
     modulate = Modulate(duration, epsilon, frequency, rise=rise)
     programme = Programme(modulate, load=7.0, velocity="1 um/s")
-    found = asp.transient(slider_of("rice-ruina"), programme, most_steps=1e4)
-    assert found.termination.kind in ("loss of contact", "too many steps", "runaway")
+    motion = asp.transient(slider_of("rice-ruina"), programme, most_steps=1e4)
+    assert motion.termination.kind in ("loss of contact", "too many steps", "runaway")

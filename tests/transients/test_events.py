@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import asperity as asp
 from asperity.loads import Modulate, Programme, RampLoad, Slide, StepLoad
 from asperity.transients import transient
 
@@ -11,8 +12,8 @@ START = {"load": "7 N", "velocity": "1 um/s"}
 LAMBDA = 6.2e-7
 
 
-def finite(found) -> bool:
-    columns = (found.force, found.velocity, found.displacement, found.states)
+def finite(motion) -> bool:
+    columns = (motion.force, motion.velocity, motion.displacement, motion.states)
     return all(np.isfinite(c).all() for c in columns)
 
 
@@ -32,18 +33,18 @@ def test_stick_slip_with_inertia_agrees_with_scipy(physical) -> None:
             events=crossing, args=(phase.load, phase.pull),
         )  # fmt: skip
     programme = Programme(Slide("14 s", V), load="7 N", velocity="10 um/s")
-    found = transient(p.slider, programme, inertia=True, slip_velocity=1e-4)
-    starts, ends = found.event_times("slip start"), found.event_times("slip end")
+    motion = transient(p.slider, programme, inertia=True, slip_velocity=1e-4)
+    starts, ends = motion.event_times("slip start"), motion.event_times("slip end")
     expected = true.t_events[0]
     assert len(expected) >= 6
     np.testing.assert_allclose(np.diff(starts)[2:], np.diff(expected)[2:], rtol=1e-6)
     assert len(starts) - len(ends) in (0, 1)
     assert np.all(ends > starts[: len(ends)])
-    np.testing.assert_allclose(np.interp(starts, found.time, found.velocity), 1e-4, rtol=1e-2)
-    late_true, late = true.t > 6, found.time > 6
+    np.testing.assert_allclose(np.interp(starts, motion.time, motion.velocity), 1e-4, rtol=1e-2)
+    late_true, late = true.t > 6, motion.time > 6
     force = p.K * true.y[0][late_true]
-    assert found.force[late].max() == pytest.approx(force.max(), rel=1e-5)
-    assert found.force[late].min() == pytest.approx(force.min(), rel=1e-5)
+    assert motion.force[late].max() == pytest.approx(force.max(), rel=1e-5)
+    assert motion.force[late].min() == pytest.approx(force.min(), rel=1e-5)
 
 
 def test_a_hundred_cycles_with_radiation_damping_repeat_themselves(physical) -> None:
@@ -62,11 +63,11 @@ def test_a_hundred_cycles_with_radiation_damping_repeat_themselves(physical) -> 
 def test_a_runaway_without_inertia_is_named(physical) -> None:
     p = physical.Experiment(K=1e5, lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), Slide("60 s", "1.1 um/s"), **START)
-    found = transient(p.slider, programme, sampling="1 kHz")
-    assert found.termination.kind == "runaway"
-    assert "switch inertia on" in found.stopped
-    assert finite(found)
-    assert found.time[-1] <= found.termination.time == found.events[-1].time
+    motion = transient(p.slider, programme, sampling="1 kHz")
+    assert motion.termination.kind == "runaway"
+    assert "switch inertia on" in motion.stopped
+    assert finite(motion)
+    assert motion.time[-1] <= motion.termination.time == motion.events[-1].time
 
     def fast(t, y, *_):  # a slip of a millionth of a second before the singularity
         soft = p.lambda_ * p.K / 7.0
@@ -79,8 +80,8 @@ def test_a_runaway_without_inertia_is_named(physical) -> None:
         p.rates, (0, 60), p.steady(1e-6, 7.0), "DOP853", rtol=1e-11, atol=1e-18, events=fast,
         args=(phase.load, phase.pull),
     )  # fmt: skip
-    assert found.termination.time - 1 == pytest.approx(true.t_events[0][0], rel=1e-6)
-    assert found.force.min() > p.K * true.y[0, -1] - 1e-3
+    assert motion.termination.time - 1 == pytest.approx(true.t_events[0][0], rel=1e-6)
+    assert motion.force.min() > p.K * true.y[0, -1] - 1e-3
 
 
 @pytest.mark.parametrize(
@@ -93,53 +94,68 @@ def test_a_runaway_without_inertia_is_named(physical) -> None:
 )
 def test_loss_of_contact_is_named(physical, step, time) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
-    found = transient(p.slider, Programme(Slide("1 s"), step, Slide("1 s"), **START))
-    assert found.termination.kind == "loss of contact"
-    assert found.termination.time == pytest.approx(time, rel=1e-9)
-    assert "contact was lost" in found.stopped
-    assert finite(found)
-    assert np.all(found.load > 0)
-    assert found.load[-1] < 1e-4
+    motion = transient(p.slider, Programme(Slide("1 s"), step, Slide("1 s"), **START))
+    assert motion.termination.kind == "loss of contact"
+    assert motion.termination.time == pytest.approx(time, rel=1e-9)
+    assert "contact was lost" in motion.stopped
+    assert finite(motion)
+    assert np.all(motion.load > 0)
+    assert motion.load[-1] < 1e-4
 
 
 def test_a_step_to_no_load_loses_contact_at_once(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), StepLoad("1 uN"), Slide("1 s"), **START)
-    found = transient(p.slider, programme)
-    assert (found.termination.kind, found.termination.time) == ("loss of contact", 1.0)
-    assert np.all(found.load > 0)
+    motion = transient(p.slider, programme)
+    assert (motion.termination.kind, motion.termination.time) == ("loss of contact", 1.0)
+    assert np.all(motion.load > 0)
 
 
 def test_reversal_is_named_where_the_law_has_none(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
-    found = transient(p.slider, programme)
-    assert found.termination.kind == "reversal"
-    assert "regularised" in found.stopped
+    motion = transient(p.slider, programme)
+    assert motion.termination.kind == "reversal"
+    assert "regularised" in motion.stopped
     # Stuck by then, the spring and the asperities are two springs in series.
     series = 1 / (1 / p.K + LAMBDA / 7.0)
-    assert found.termination.time > 1 + 3.5 / series / 1e-5 - 0.1
-    assert abs(found.force[-1]) < 1e-6
-    assert finite(found)
+    assert motion.termination.time > 1 + 3.5 / series / 1e-5 - 0.1
+    assert abs(motion.force[-1]) < 1e-6
+    assert finite(motion)
 
 
 def test_steady_sliding_is_an_event(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("2 s"), Slide("30 s", "3 um/s"), **START)
-    found = transient(p.slider, programme, steady_tolerance=1e-4, sampling="100 Hz")
-    first, second = found.event_times("steady")
+    motion = transient(p.slider, programme, steady_tolerance=1e-4, sampling="100 Hz")
+    first, second = motion.event_times("steady")
     assert first == 0
     assert 2.1 < second < 30
-    after = found.time > second
-    np.testing.assert_allclose(found.velocity[after], 3e-6, rtol=1.1e-4)
-    shortly_before = (found.time > 2) & (found.time < second - 0.5)
-    assert np.abs(found.velocity[shortly_before] / 3e-6 - 1).max() > 1e-3
+    after = motion.time > second
+    np.testing.assert_allclose(motion.velocity[after], 3e-6, rtol=1.1e-4)
+    shortly_before = (motion.time > 2) & (motion.time < second - 0.5)
+    assert np.abs(motion.velocity[shortly_before] / 3e-6 - 1).max() > 1e-3
 
 
 def test_a_load_step_starts_a_slip_at_the_break_point(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Slide("1 s"), StepLoad("6 N"), Slide("1 s"), **START)
-    found = transient(p.slider, programme, slip_velocity="10 um/s")
-    assert found.event_times("slip start")[0] == 1.0
-    (end,) = found.event_times("slip end")
+    motion = transient(p.slider, programme, slip_velocity="10 um/s")
+    assert motion.event_times("slip start")[0] == 1.0
+    (end,) = motion.event_times("slip end")
     assert 1 < end < 1.1
+
+
+def test_a_termination_within_the_spacing_of_doubles_has_a_time() -> None:
+    """Where the slip stops, steps of 1e-14 s after half an hour leave the time as it is."""
+    numbers = {"mu0": 0.5234064758672259, "A": 0.012765437614392503, "B": 0.029093959364609512}
+    law = asp.laws.RuinaSlip(**numbers, D0=1.2248716169534373e-06, V0=1e-6)
+    slider = asp.Slider(
+        law, spring=228485.93356503046, load=110.44730884517166, mass=3.0388421937153685
+    )
+    programme = Programme(Slide("1 h"), load=110.44730884517166, velocity=1.2762571719160836e-08)
+    initial = np.array([0.70741249, -6.90775528, 11.26899375])
+    motion = transient(slider, programme, inertia=True, initial=initial)
+    assert motion.termination is not None
+    assert finite(motion)
+    assert 1000 < motion.time[-1] <= motion.termination.time < 2000

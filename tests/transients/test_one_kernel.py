@@ -25,8 +25,8 @@ class Sorting(asp.laws.RiceRuina):
     name = "sorting"
 
     def log_velocity(self, friction: Any, state: tuple, w: Any) -> jnp.ndarray:
-        found = super().log_velocity(friction, state, w)
-        return jnp.sort(jnp.stack([found, found]), axis=0)[0]
+        log_velocity = super().log_velocity(friction, state, w)
+        return jnp.sort(jnp.stack([log_velocity, log_velocity]), axis=0)[0]
 
 
 def compiles_to_one(law: asp.laws.Law, programme: Programme, **options: Any) -> bool:

@@ -46,11 +46,11 @@ def scipy_force(mu0: float, phases: list[tuple], eta: float = 0.0) -> tuple[np.n
 def test_a_hold_at_rest_agrees_with_scipy() -> None:
     times, force = scipy_force(0.5, [(0.2, W, V), (2.0, W, 0.0), (0.5, W, V)])
     programme = Programme(Slide(0.2, V), Hold(2.0), Slide(0.5, V), **START)
-    found = transient(slider(0.5), programme, sampling=times, inertia=True)
-    assert found.termination is None
-    np.testing.assert_allclose(found.force, force, rtol=0, atol=1e-8 * W)
+    motion = transient(slider(0.5), programme, sampling=times, inertia=True)
+    assert motion.termination is None
+    np.testing.assert_allclose(motion.force, force, rtol=0, atol=1e-8 * W)
     held = (times > 1.0) & (times < 2.2)
-    assert np.all(np.abs(found.velocity[held]) < 2e-2 * V)
+    assert np.all(np.abs(motion.velocity[held]) < 2e-2 * V)
 
 
 @pytest.mark.parametrize("eta", [None, 2e3])
@@ -61,43 +61,45 @@ def test_reversals_and_a_step_of_the_load_agree_with_scipy(eta: float | None) ->
     programme = Programme(
         Slide(0.1, V), Slide(0.6, -V), StepLoad(9.0), Slide(0.3, -V), Slide(0.6, V), **START
     )
-    found = transient(
+    motion = transient(
         slider(0.1), programme, sampling=times, inertia=True, radiation_damping=eta
     )  # fmt: skip
-    assert found.termination is None
-    np.testing.assert_allclose(found.force, force, rtol=0, atol=1e-7 * W)
-    assert len(found.event_times("reversal")) == 2
+    assert motion.termination is None
+    np.testing.assert_allclose(motion.force, force, rtol=0, atol=1e-7 * W)
+    assert len(motion.event_times("reversal")) == 2
 
 
 def test_friction_of_the_paper_reversed_is_friction_mirrored() -> None:
     # SciPy cannot follow v ~ 1e-22 m/s; steady sliding backwards has a closed form.
     programme = Programme(Slide(0.5, V), Slide(4.0, -V), **START)
-    found = transient(slider(0.5), programme, inertia=True)
+    motion = transient(slider(0.5), programme, inertia=True)
     steady = W * A * np.arcsinh(V / (2 * V0) * np.exp((0.5 - B * np.log(V / V0)) / A))
-    assert found.termination is None
-    assert found.force[0] == pytest.approx(steady, rel=1e-9)
-    assert found.force[-1] == pytest.approx(-steady, rel=1e-6)
-    assert found.velocity[-1] == pytest.approx(-V, rel=1e-4)
+    assert motion.termination is None
+    assert motion.force[0] == pytest.approx(steady, rel=1e-9)
+    assert motion.force[-1] == pytest.approx(-steady, rel=1e-6)
+    assert motion.velocity[-1] == pytest.approx(-V, rel=1e-4)
     # Until slip sets in backwards, the spring unloads at K V.
-    (reversal,) = found.event_times("reversal")
+    (reversal,) = motion.event_times("reversal")
     assert reversal == pytest.approx(0.5 + steady / (K * V), rel=0.02)
 
 
 def test_a_slider_at_rest_sticks_until_the_spring_is_loaded() -> None:
     # Stuck, the spring takes up all of the drive.
     programme = Programme(Slide(1.5, V), load=W, velocity=0.0)
-    found = transient(slider(0.5), programme, initial=[0.0, 0.0, 0.0], inertia=True, sampling=100.0)
-    early = found.time < 0.5
-    np.testing.assert_allclose(found.force[early], K * V * found.time[early], rtol=0, atol=1e-9)
-    assert np.all(np.abs(found.velocity[early]) < 1e-12)
-    assert found.velocity[-1] == pytest.approx(V, rel=0.05)
+    motion = transient(
+        slider(0.5), programme, initial=[0.0, 0.0, 0.0], inertia=True, sampling=100.0
+    )
+    early = motion.time < 0.5
+    np.testing.assert_allclose(motion.force[early], K * V * motion.time[early], rtol=0, atol=1e-9)
+    assert np.all(np.abs(motion.velocity[early]) < 1e-12)
+    assert motion.velocity[-1] == pytest.approx(V, rel=0.05)
 
 
 def test_a_law_with_a_jump_at_rest_ends_the_run_with_advice() -> None:
     law = asp.laws.CutOff(mu0=0.5, A=A, B=B, D0=D0, V0=V0, V1=1e-8, V2=1e-2)
     programme = Programme(Slide(0.2, V), Slide(3.0, -V), **START)
-    found = transient(
+    motion = transient(
         asp.Slider(law, spring=K, load=W, mass=M), programme, inertia=True
     )  # fmt: skip
-    assert found.termination.kind == "rest"
-    assert "'regularised'" in found.stopped
+    assert motion.termination.kind == "rest"
+    assert "'regularised'" in motion.stopped

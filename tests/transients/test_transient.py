@@ -66,33 +66,35 @@ def test_steps_holds_and_ramps_agree_with_scipy(physical, law, more, method) -> 
         programme = Programme(Slide("10 ms"), StepLoad("9 N"), Slide("0.3 s"), **START)
         phases = [physical.level(0.01, 7, 1e-6), physical.level(0.3, 9, 1e-6)]
     times = np.linspace(0, programme.duration, 201)
-    found = transient(p.slider, programme, sampling=times, **p.options)
-    assert found.motion.slider.law.name == law
-    assert found.stopped is None
+    motion = transient(p.slider, programme, sampling=times, **p.options)
+    assert motion.motion.slider.law.name == law
+    assert motion.stopped is None
     true = physical.integrate(p, p.steady(1e-6, 7.0), 7.0, phases, times, method)
-    np.testing.assert_allclose(found.force / p.W0, true.force / p.W0, rtol=0, atol=CLOSE)
-    np.testing.assert_allclose(found.displacement, true.x, rtol=0, atol=CLOSE * p.W0 / p.K)
+    np.testing.assert_allclose(motion.force / p.W0, true.force / p.W0, rtol=0, atol=CLOSE)
+    np.testing.assert_allclose(motion.displacement, true.x, rtol=0, atol=CLOSE * p.W0 / p.K)
 
 
 def test_a_modulation_that_begins_suddenly_agrees_with_scipy(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     programme = Programme(Modulate("0.2 s", 0.24, "120 Hz"), **START)
     times = np.linspace(0, 0.2, 1001)
-    found = transient(p.slider, programme, sampling=times)
+    motion = transient(p.slider, programme, sampling=times)
     swing = physical.swing(0.2, 7, 1e-6, 0.24, 120)
     true = physical.integrate(p, p.steady(1e-6, 7.0), 7.0, [swing], times)
-    np.testing.assert_allclose(found.force, true.force, rtol=0, atol=7e-9)
-    np.testing.assert_allclose(found.load, 7 * (1 + 0.24 * np.cos(240 * np.pi * times)), rtol=1e-12)
+    np.testing.assert_allclose(motion.force, true.force, rtol=0, atol=7e-9)
+    np.testing.assert_allclose(
+        motion.load, 7 * (1 + 0.24 * np.cos(240 * np.pi * times)), rtol=1e-12
+    )
     # At t = 0 the load has just stepped up by eps: springs in series share the load anew.
-    assert found.displacement[0] == pytest.approx(true.x[0], rel=1e-12)
-    assert found.displacement[0] < 0
+    assert motion.displacement[0] == pytest.approx(true.x[0], rel=1e-12)
+    assert motion.displacement[0] < 0
 
 
 def test_a_recorded_load_agrees_with_scipy(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
     t = np.linspace(0, 0.1, 9)
     W = 7 + np.sin(30 * t)
-    found = transient(p.slider, Programme(Follow(t, W), **START), sampling="200 Hz")
+    motion = transient(p.slider, Programme(Follow(t, W), **START), sampling="200 Hz")
     from scipy.interpolate import PchipInterpolator
 
     w = PchipInterpolator(t, W)
@@ -105,8 +107,8 @@ def test_a_recorded_load_agrees_with_scipy(physical) -> None:
         )
         for a in t[:-1]
     ]
-    true = physical.integrate(p, p.steady(1e-6, 7.0), 7.0, phases, found.time)
-    np.testing.assert_allclose(found.force, true.force, rtol=0, atol=7e-8)
+    true = physical.integrate(p, p.steady(1e-6, 7.0), 7.0, phases, motion.time)
+    np.testing.assert_allclose(motion.force, true.force, rtol=0, atol=7e-8)
 
 
 def test_the_error_follows_the_tolerance(physical) -> None:
@@ -115,9 +117,9 @@ def test_the_error_follows_the_tolerance(physical) -> None:
     true = physical.integrate(p, p.steady(1e-6, 7.0), 7.0, mixed_phases(physical), times)
     errors, steps = [], []
     for rtol in (1e-5, 1e-7, 1e-9, 1e-11):
-        found = transient(p.slider, MIXED, sampling=times, rtol=rtol)
-        errors.append(np.abs(found.force - true.force).max() / 7)
-        steps.append(found.provenance["steps"])
+        motion = transient(p.slider, MIXED, sampling=times, rtol=rtol)
+        errors.append(np.abs(motion.force - true.force).max() / 7)
+        steps.append(motion.provenance["steps"])
     assert errors[-1] < 1e-10
     assert all(fine < coarse / 5 for coarse, fine in itertools.pairwise(errors))
     assert steps == sorted(steps)
@@ -126,9 +128,9 @@ def test_the_error_follows_the_tolerance(physical) -> None:
 def test_displacement_spring_and_drive_belong_together(physical) -> None:
     """x = integral of V - (F - F0)/K, though x is integrated separately."""
     p = physical.Experiment(lambda_=LAMBDA)
-    found = transient(p.slider, MIXED, sampling="100 Hz")
-    x = MIXED.position(found.time) - (found.force - 3.5) / p.K
-    np.testing.assert_allclose(found.displacement, x, rtol=0, atol=1e-8 * p.W0 / p.K)
+    motion = transient(p.slider, MIXED, sampling="100 Hz")
+    x = MIXED.position(motion.time) - (motion.force - 3.5) / p.K
+    np.testing.assert_allclose(motion.displacement, x, rtol=0, atol=1e-8 * p.W0 / p.K)
     assert np.ptp(x) > 1e-5
 
 
@@ -151,12 +153,12 @@ def test_a_modulated_transient_ends_in_the_periodic_response(physical) -> None:
     rate = 120 * 64
     programme = Programme(Modulate("30 s", 0.24, "120 Hz"), **START)
     times = 30 - np.arange(64, 0, -1) / rate
-    found = transient(p.slider, programme, sampling=times, rtol=1e-11)
+    motion = transient(p.slider, programme, sampling=times, rtol=1e-11)
     response = asp.periodic_response(p.slider, velocity=1e-6, **m)
-    spectrum = np.fft.fft(found.force / 7) / 64
+    spectrum = np.fft.fft(motion.force / 7) / 64
     assert spectrum[0].real == pytest.approx(float(response.mean_friction), rel=1e-7)
     np.testing.assert_allclose(2 * spectrum[1:3], response.harmonics[:2], rtol=0, atol=1e-9)
-    (steady,) = found.event_times("steady")
+    (steady,) = motion.event_times("steady")
     assert 0.4 < steady < 30  # some D0/V
 
 
@@ -187,23 +189,23 @@ def test_every_law_relaxes_to_steady_sliding_under_another_load(name) -> None:
     law = cls(**{f.name: values[f.name.rstrip("_")] for f in dataclasses.fields(cls)})
     slider = asp.Slider(law, spring=1.5e6, load=7.0)
     programme = Programme(StepLoad("8 N"), Slide("8 s", "2 um/s"), **START)
-    found = transient(slider, programme, sampling=[0.0, 8.0], rtol=1e-7)
-    assert found.stopped is None
+    motion = transient(slider, programme, sampling=[0.0, 8.0], rtol=1e-7)
+    assert motion.stopped is None
     again = transient(
         slider, Programme(Slide("1 s"), load="8 N", velocity="2 um/s"), sampling=[0.0], rtol=1e-7
     )
-    assert found.velocity[-1] == pytest.approx(2e-6, rel=1e-4)
-    assert found.force[-1] == pytest.approx(again.force[0], rel=1e-5)
-    x = programme.position(8.0) - (found.force[-1] - 7 * float(law.mu_ss(1e-6))) / 1.5e6
-    assert found.displacement[-1] == pytest.approx(x, rel=1e-6)
-    np.testing.assert_allclose(found.states[-1, 1:], again.states[0, 1:], rtol=1e-4, atol=1e-4)
+    assert motion.velocity[-1] == pytest.approx(2e-6, rel=1e-4)
+    assert motion.force[-1] == pytest.approx(again.force[0], rel=1e-5)
+    x = programme.position(8.0) - (motion.force[-1] - 7 * float(law.mu_ss(1e-6))) / 1.5e6
+    assert motion.displacement[-1] == pytest.approx(x, rel=1e-6)
+    np.testing.assert_allclose(motion.states[-1, 1:], again.states[0, 1:], rtol=1e-4, atol=1e-4)
 
 
 def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
     law = asp.laws.Regularised(**COMMON)
     slider = asp.Slider(law, spring=4e5, load=7.0)
     programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
-    found = transient(slider, programme, sampling="20 Hz")
+    motion = transient(slider, programme, sampling="20 Hz")
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         F, log_age = y
@@ -211,12 +213,12 @@ def test_reversal_of_the_drive_with_a_law_that_has_it() -> None:
         v = 1e-6 * (np.exp((F / 7 - strength) / 0.013) - np.exp((-F / 7 - strength) / 0.013))
         return [4e5 * (-1e-5 - v), np.exp(-log_age) - abs(v) / 4e-7]
 
-    start = [found.force[20], np.log(0.4)]
-    true = solve_ivp(rates, (0, 10), start, "LSODA", found.time[20:] - 1, rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(found.force[20:], true.y[0], rtol=0, atol=7e-8)
-    (reversal,) = found.event_times("reversal")
-    np.testing.assert_allclose(np.interp(reversal, found.time, found.force), 0, atol=0.05)
-    assert found.velocity[-1] < 0 < found.velocity[0]
+    start = [motion.force[20], np.log(0.4)]
+    true = solve_ivp(rates, (0, 10), start, "LSODA", motion.time[20:] - 1, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(motion.force[20:], true.y[0], rtol=0, atol=7e-8)
+    (reversal,) = motion.event_times("reversal")
+    np.testing.assert_allclose(np.interp(reversal, motion.time, motion.force), 0, atol=0.05)
+    assert motion.velocity[-1] < 0 < motion.velocity[0]
 
 
 def test_a_run_continues_from_the_states_of_another(physical) -> None:
@@ -229,16 +231,16 @@ def test_a_run_continues_from_the_states_of_another(physical) -> None:
 
 def test_the_dataset_has_units_events_and_provenance(physical) -> None:
     p = physical.Experiment(lambda_=LAMBDA)
-    found = transient(p.slider, MIXED, sampling="10 Hz")
-    assert isinstance(found, Trajectory)
-    data = found.to_dataset()
+    motion = transient(p.slider, MIXED, sampling="10 Hz")
+    assert isinstance(motion, Trajectory)
+    data = motion.to_dataset()
     assert all({"units", "long_name"} <= set(v.attrs) for v in data.data_vars.values())
-    np.testing.assert_array_equal(data["friction"], found.force / found.load)
+    np.testing.assert_array_equal(data["friction"], motion.force / motion.load)
     stretch = data["load_point_displacement"] - data["displacement"]
-    np.testing.assert_allclose(stretch * p.slider.K, found.force, rtol=1e-9)
+    np.testing.assert_allclose(stretch * p.slider.K, motion.force, rtol=1e-9)
     # Steady sliding at first, under the load of the programme's start: Phi = D0/V.
-    np.testing.assert_allclose(data["age"][0], p.slider.law.D0 / found.velocity[0], rtol=1e-9)
-    assert data.sizes == {"time": 76, "state": 2, "event": len(found.events)}
+    np.testing.assert_allclose(data["age"][0], p.slider.law.D0 / motion.velocity[0], rtol=1e-9)
+    assert data.sizes == {"time": 76, "state": 2, "event": len(motion.events)}
     assert data.attrs["stopped"] == "end of the programme"
     assert "lambda = 6.2e-07 m" in data.attrs["parameters"]
     assert data.attrs["relative_tolerance"] == 1e-9

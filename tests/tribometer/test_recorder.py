@@ -7,7 +7,7 @@ from asperity.errors import InputError
 from asperity.recording import Trace, read
 from asperity.recording.writers import write
 from asperity.tribometer.sensors import DisplacementGauge, LoadCell, SpringGauge
-from asperity.tribometer.tribometer import Recorder, Tribometer
+from asperity.tribometer.tribometer import Recorder, Tribometer, channel_gain
 
 RATE, F = 20_000.0, 120.0
 TIME = np.arange(0, 2, 1 / RATE)
@@ -151,6 +151,14 @@ def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
         (lambda t, p: Recorder(rate="0 Hz"), "Recorder.rate must be positive"),
         (lambda t, p: Recorder(rate="1 kHz", bits=40), "Recorder.bits"),
         (lambda t, p: Recorder(rate="1 kHz", cut_off="100 Hz", order=0), "Recorder.order"),
+        (lambda t, p: Recorder(rate="1 kHz", order="4"), "order must be a whole number, got '4'"),
+        (lambda t, p: Recorder(rate="1 kHz", bits=16.5), "bits must be a whole number, got 16.5"),
+        (lambda t, p: Recorder(rate="1 kHz", ranges={"F": 3}), "ranges.* must be a tuple, got 3"),
+        (lambda t, p: Tribometer(sensors={}, recorder=None), "must be a Recorder, got None"),
+        (
+            lambda t, p: channel_gain(Tribometer(sensors={}, recorder=Recorder(rate=1)), "g", 3.0),
+            "channel must be one of .*, got 'g'",
+        ),
         (lambda t, p: recorded(Recorder(rate="50 kHz")), "at least as fine"),
         (lambda t, p: recorded(Recorder(rate=1e3, ranges={"normal force": (8, 0)})), "must rise"),
     ],

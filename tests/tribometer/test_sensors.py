@@ -31,8 +31,8 @@ def test_noise_has_its_variance_and_its_spectrum() -> None:
     assert noise.var() == pytest.approx(sigma**2, rel=4 * np.sqrt(2 / independent))
     for lag in (5, 20, 60):
         expected = np.exp(-2 * np.pi * corner * lag / RATE)
-        found = np.mean(noise[lag:] * noise[:-lag]) / noise.var()
-        assert found == pytest.approx(expected, abs=4 / np.sqrt(independent))
+        correlation = np.mean(noise[lag:] * noise[:-lag]) / noise.var()
+        assert correlation == pytest.approx(expected, abs=4 / np.sqrt(independent))
 
 
 def test_a_later_filter_lets_its_noise_bandwidth_through() -> None:

@@ -51,11 +51,7 @@ class Exciter:
 
     @classmethod
     def through_air(
-        cls,
-        frequency: float | str,
-        slider: Slider,
-        lambda_z: float | str,
-        layer: AirLayer | None,
+        cls, frequency: float | str, slider: Slider, lambda_z: float | str, layer: AirLayer | None
     ) -> Exciter:
         """The exciter of a slider on elastic contacts and an air layer, None for a vacuum.
 

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.arrays import Bool, Float
+from asperity.arrays import Bool, Float, batches
 from asperity.errors import InputError, require
 from asperity.experiment.labelled import Labelled, measured, shaped
 from asperity.laws import Law
@@ -37,7 +37,7 @@ from asperity.transients.hold_and_step import (
 _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 #: Longest hold (s); the square of a longer time might overflow.
 _LONGEST = 1e20
-#: Numbers of points in a call of the compiled program; a call uses the smallest sufficient one.
+#: Numbers of points in a call of the compiled program.
 _SHAPES = (64, 1024)
 _WITHIN = f"to within {100 * SETTLED:g} % of steady sliding"
 #: Step of the finite difference in ln(hold time); its error is that of an integration step.
@@ -115,7 +115,7 @@ class Holds(_Memory):
         Whether steady sliding is stable: K above the critical stiffness.
     has_maximum : bool array
     result : str array
-        What happens after the maximum.
+        Sentence on the motion after the maximum.
     slider : Slider
     """
 
@@ -155,7 +155,7 @@ class VelocityStepResponse(_Memory):
         Displacement of the drive and of the slider from the step to the extremum (m).
     settling_distance, settling_slip : array
         The same to where the force stays within 5 % of `evolution` from its steady value; NaN where
-        it does not come there.
+        the force does not reach that value.
     states_at_extremum : array, shape (..., size)
     stable, has_extremum : bool array
     result : str array
@@ -231,7 +231,7 @@ def hold_response(
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
         return response, after, np.log(10) * slope
 
-    response, after, rate = _in_shapes(run, flat, V, time)
+    response, after, rate = _in_batches(run, flat, V, time)
     assert isinstance(response, HoldResponse)
     crossing = response.end == End.CROSSING
     names = ("level", "minimum", "maximum", "hold_slip", "states", "states_at_maximum")
@@ -288,7 +288,7 @@ def step_response(
         response, extremum = step(slider, first, V)
         return response, _settled(slider, V, extremum) if settling else None
 
-    response, after = _in_shapes(run, flat, V, first)
+    response, after = _in_batches(run, flat, V, first)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
     columns = {
@@ -325,15 +325,12 @@ def _settled(slider: Slider, V: jax.Array, extremum: Any) -> SettlingDistance:
     return settle(slider, V, extremum, runaway)
 
 
-def _in_shapes(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
-    """Run many points in calls of a few fixed shapes, padded by repetition."""
+def _in_batches(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
+    """Run many points in calls of a few fixed sizes, so that few programs are compiled."""
     require(V.size, "arguments", "have a point", "an array of size 0", "give a value")
-    size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
     parts = []
-    for i in range(0, max(len(V), 1), size):
-        at = np.minimum(np.arange(i, i + size), len(V) - 1)
-        arguments = jax.tree.map(lambda a, at=at: jnp.asarray(a[at]), (slider, V, *other))
-        kept = min(len(V) - i, size)
+    for index, kept in batches(len(V), _SHAPES):
+        arguments = jax.tree.map(lambda a, at=index: jnp.asarray(a[at]), (slider, V, *other))
         parts.append(jax.tree.map(lambda a, n=kept: np.asarray(a)[:n], run(*arguments)))
     return jax.tree.map(lambda *a: np.concatenate(a), *parts)
 
@@ -343,7 +340,7 @@ def _common(
 ) -> dict[str, Any]:
     """Columns of both tests: the way to the extremum, stability, and what follows."""
     run = lambda slider, V: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
-    stable = np.asarray(_in_shapes(run, slider, V) < 0)
+    stable = np.asarray(_in_batches(run, slider, V) < 0)
     none = np.full(len(V), np.nan)
     crossing = response.end == End.CROSSING
     ends = response.end if after is None else after.end

@@ -64,10 +64,8 @@ class VelocitySteps(ProgrammeStep):
         """One segment for each velocity."""
         slip = to_si(self.slip, "length", f"{name}.slip")
         speeds = [to_si(v, "velocity", f"{name}.velocities") for v in self.velocities]
-        moving, got = (
-            speeds and min([*speeds, slip]) > 0,
-            f"{len(speeds)} velocities and {slip:g} m",
-        )
+        moving = speeds and min([*speeds, slip]) > 0
+        got = f"{len(speeds)} velocities and {slip:g} m"
         rule, advice = "have positive velocities and slip", "hold with 'hold 10 s'"
         require(moving, name, rule, got, advice)
         return _laid_out([Slide(slip / v, velocity=v) for v in speeds], level, name)

@@ -120,15 +120,13 @@ def stick_slip_response(
     and `period` are accurate to about 1e-8 relatively. One point after the other takes some
     hundredths of a second each: steps of stiff motions differ too much to be taken together.
     """
-    law, advice = (
-        slider.law,
-        "asperity.theory has the cycle of constant static and dynamic friction",
-    )
+    law = slider.law
+    advice = "asperity.theory has the cycle of constant static and dynamic friction"
     require(law.rate_dependent, "law", "depend on the velocity", law.name, advice)
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
     if spring is not None:
         stiffness: Any = spring
-        slider = Slider(slider.law, spring=stiffness, load=slider.W0, mass=slider.M)
+        slider = Slider(law, spring=stiffness, load=slider.W0, mass=slider.M)
     eta = None
     if radiation_damping is not None:
         eta = number(radiation_damping, MACHINE["eta"].label, "damping", "positive")

@@ -126,14 +126,11 @@ def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
         motion["load point"] = motion["displacement"] + stretched
     signals = {channel: motion[name] for channel, name in setup.exposed.items()}
     # A motion that ends early may end between two samples.
-    even = time.size - 1 if time.size > 3 and _last_is_odd(time) else time.size
+    steps = np.diff(time)
+    uneven = time.size > 3 and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]
+    even = time.size - 1 if uneven else time.size
     signals = {channel: values[:even] for channel, values in signals.items()}
     return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=provenance)
-
-
-def _last_is_odd(time: np.ndarray) -> bool:
-    step = time[1] - time[0]
-    return bool(abs(time[-1] - time[-2] - step) > 1e-6 * step)
 
 
 def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:

@@ -30,7 +30,7 @@ from asperity.protocol.protocol import Protocol, fields_of_protocol, load_protoc
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.slider import Slider, equation_of_motion
 from asperity.theory import closed_forms as cf
-from asperity.transients import Checkpoint, Trajectory, integrate_blocks
+from asperity.transients import Checkpoint, integrate_blocks
 
 if TYPE_CHECKING:
     import xarray
@@ -71,11 +71,7 @@ def stability_statement(protocol: Protocol) -> str:
     ratio = float(numbers["K"] / critical)
     if not 0 < ratio < 1:
         return ""
-    return (
-        f"steady sliding at {level.velocity:g} m/s is unstable at the start: K is {ratio:.3g} of "
-        "the critical stiffness; without a perturbation, such as a step of the load, the run stays "
-        "on it until rounding errors have grown"
-    )
+    return _unstable(level.velocity, f"K is {ratio:.3g} of the critical stiffness")
 
 
 def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
@@ -95,10 +91,14 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     rate = float(steady_growth(motion)[0])
     if not rate > _ROUND_OFF * level.velocity:
         return ""
+    return _unstable(level.velocity, f"a disturbance doubles in {math.log(2) / rate:.3g} s")
+
+
+def _unstable(velocity: float, why: str) -> str:
     return (
-        f"steady sliding at {level.velocity:g} m/s is unstable at the start: a disturbance "
-        f"doubles in {math.log(2) / rate:.3g} s; without a perturbation, such as a step of the "
-        "load, the run stays on it until rounding errors have grown"
+        f"steady sliding at {velocity:g} m/s is unstable at the start: {why}; without a "
+        "perturbation, such as a step of the load, the run stays on it until rounding errors have "
+        "grown"
     )
 
 
@@ -118,8 +118,6 @@ class RunProgress:
         Time of the last row (s); NaN without one.
     checkpoint : Checkpoint or None
         State from which the integration continues.
-    steady_segment : int
-        Segment of the last event "steady", -1 without one.
     steps, rejected : int
         Steps of the integrator so far.
     unresolved_ringing : float
@@ -135,7 +133,6 @@ class RunProgress:
     lengths: dict[str, int] = field(default_factory=dict)
     time: float = float("nan")
     checkpoint: Checkpoint | None = None
-    steady_segment: int = -1
     steps: int = 0
     rejected: int = 0
     unresolved_ringing: float = 0.0
@@ -298,28 +295,25 @@ def _one_block(
         progress=progress,
         **protocol.integration,
     )
-    # If the last block is exactly full, only the end of the motion remains.
+    # After the end of the programme there is no block.
     for block in islice(blocks, 1):
         new = not block.time.size or not block.time[0] <= done.time
-        events, steady_segment = _new_events(protocol, block, done.steady_segment)
-        dataset = block.to_dataset().isel(event=events)
+        dataset = block.to_dataset()
         if not new:
             dataset = dataset.isel(time=slice(1, None))
         if not done.lengths:
             dataset = dataset.assign_attrs(_attributes(protocol, done))
-        over = block.termination is not None or _at_end(protocol, block)
         provenance = block.provenance
         after = RunProgress(
             {name: done.lengths.get(name, 0) + dataset.sizes[name] for name in CHUNKS},
             float(block.time[-1]) if block.time.size else done.time,
             block.checkpoint,
-            steady_segment,
             done.steps + provenance["steps"],
             done.rejected + provenance["rejected_steps"],
             max(done.unresolved_ringing, provenance["unresolved_ringing"]),
             sorted({*done.methods, *provenance["method"].split(" and ")} - {""}),
             block.stopped or "",
-            over,
+            block.termination is not None,
         )
         undisturbed(partial(_write, output, dataset, done, after))
         return after
@@ -343,29 +337,6 @@ def _write(
 def _close(output: UnfinishedOutput, attributes: dict[str, Any]) -> None:
     describe(output.data, attributes)
     output.finish()
-
-
-def _at_end(protocol: Protocol, block: Trajectory) -> bool:
-    last = len(protocol.programme.segments) - 1
-    here = block.checkpoint
-    duration = float(protocol.programme.segments[last].duration)
-    return here.segment > last or (here.segment == last and here.t >= duration)
-
-
-def _new_events(
-    protocol: Protocol, block: Trajectory, steady_segment: int
-) -> tuple[list[int], int]:
-    """Events that no earlier block has; "steady" at most once per segment."""
-    kept = []
-    for i, event in enumerate(block.events):
-        if event.kind == "steady":
-            starts = protocol.programme.starts[1:-1]
-            segment = int(np.searchsorted(starts, event.time, side="right"))
-            if segment <= steady_segment:
-                continue
-            steady_segment = segment
-        kept.append(i)
-    return kept, steady_segment
 
 
 def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:

@@ -53,20 +53,22 @@ _KINDS = {
     "frequency": "frequency",
 }
 
+#: Lists of quantities of a form, whose steps convert them.
+_LISTS = ("holds", "velocities")
+
 #: Largest number of steps with repetitions; a misprint must not fill the memory.
 MOST = 100_000
 
 
-def follow(channels: str, file: str, folder: Path) -> Follow:
+def follow(channels: str, file: Path) -> Follow:
     """The step that follows channels of a recording.
 
     Parameters
     ----------
     channels : str
         ``load``, ``velocity``, or both joined by ``and``.
-    file : str
-        Any recording that `asperity.recording.read` reads; relative to `folder`.
-    folder : Path
+    file : Path
+        Any recording that `asperity.recording.read` reads.
 
     Raises
     ------
@@ -78,18 +80,17 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
         if name not in _CHANNELS:
             rule = "name what is followed"
             raise InputError("follow", rule, f"'{name}'", closest(name, _CHANNELS))
-    path = Path(file.strip("\"'"))
-    trace = read(path if path.is_absolute() else folder / path)
+    trace = read(file)
     for finding in trace.findings:
         rule = f"take a recording without '{finding.name}'"
-        got = f"'{path.name}': {finding.sentence} Cut it to a part without this defect"
+        got = f"'{file.name}': {finding.sentence} Cut it to a part without this defect"
         require(finding.name not in _UNUSABLE, "follow", rule, got)
     values: dict[str, np.ndarray] = {}
     for name in names:
         role, kind = _CHANNELS[name]
         channel = trace.channel(role)
         rule = f"take the {name} from a channel of its unit"
-        got = f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'"
+        got = f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{file.name}'"
         advice = "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'"
         require(channel.kind == kind, "follow", rule, got, advice)
         values[name] = channel.values
@@ -98,7 +99,7 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
         finite &= np.isfinite(column)
     if not finite.all():
         row = int(np.argmin(finite))
-        rule, got = "have a number in every row", f"none in row {row} of '{path.name}'"
+        rule, got = "have a number in every row", f"none in row {row} of '{file.name}'"
         raise InputError("follow", rule, got, "cut or fill the recording first")
     return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))
 
@@ -113,12 +114,12 @@ class StepForm:
         Words, ``{quantity}`` and ``[optional parts]``.
     example : str
     build : callable
-        The step, from the quantities by name and the folder of the file.
+        The step, from keyword arguments with the names of the quantities.
     """
 
     pattern: str
     example: str
-    build: Callable[[Mapping[str, Any], Path], ProgrammeStep]
+    build: Callable[..., ProgrammeStep]
 
     @cached_property
     def verb(self) -> str:
@@ -134,52 +135,37 @@ class StepForm:
         return re.compile(named, re.IGNORECASE)
 
 
-def _list(text: str) -> tuple[str, ...]:
-    """Quantities that commas separate, each with its unit."""
-    return tuple(part.strip() for part in text.split(","))
-
-
 #: All forms of steps.
 FORMS = (
-    StepForm("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
-    StepForm(
-        "slide[at {velocity}] for {duration}",
-        "slide at 10 um/s for 60 s",
-        lambda parts, folder: Slide(**parts),
-    ),
+    StepForm("hold[for] {duration}", "hold 10 s", Hold),
+    StepForm("slide[at {velocity}] for {duration}", "slide at 10 um/s for 60 s", Slide),
     StepForm(
         "modulate {epsilon} at {frequency} for {duration}[rising in {rise}][falling in {fall}]",
         "modulate 24 % at 120 Hz for 20 s",
-        lambda parts, folder: Modulate(**parts),
+        Modulate,
     ),
-    StepForm(
-        "step load to {load}", "step load to 9 N", lambda parts, folder: StepLoad(parts["load"])
-    ),
+    StepForm("step load to {load}", "step load to 9 N", lambda load: StepLoad(load)),
     StepForm(
         "ramp load to {load} in {duration}",
         "ramp load to 9 N in 5 s",
-        lambda parts, folder: RampLoad(parts["load"], parts["duration"]),
+        lambda load, duration: RampLoad(load, duration),
     ),
     StepForm(
         "ramp velocity to {velocity} in {duration}",
         "ramp velocity to 100 um/s in 5 s",
-        lambda parts, folder: RampVelocity(parts["velocity"], parts["duration"]),
+        lambda velocity, duration: RampVelocity(velocity, duration),
     ),
     StepForm(
         "slide-hold-slide for {holds} sliding {sliding}",
         "slide-hold-slide for 1 s, 10 s, 100 s sliding 20 s",
-        lambda parts, folder: SlideHoldSlide(_list(parts["holds"]), parts["sliding"]),
+        SlideHoldSlide,
     ),
     StepForm(
         "velocity steps {velocities} over {slip}",
         "velocity steps 1 um/s, 10 um/s, 1 um/s over 100 um",
-        lambda parts, folder: VelocitySteps(_list(parts["velocities"]), parts["slip"]),
+        VelocitySteps,
     ),
-    StepForm(
-        "follow {channels} from {file}",
-        "follow load from recording.csv",
-        lambda parts, folder: follow(parts["channels"], parts["file"], folder),
-    ),
+    StepForm("follow {channels} from {file}", "follow load from recording.csv", follow),
 )
 
 REPEAT = re.compile(r"repeat (?P<times>\S+)(?: times)?:(?P<steps>.*)", re.IGNORECASE)
@@ -208,7 +194,7 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
         match = form.expression.fullmatch(line)
         if match is not None:
             parts = {key: value for key, value in match.groupdict().items() if value is not None}
-            return form.build(_quantities(parts, name, line, form.example), folder)
+            return form.build(**_arguments(parts, name, line, form.example, folder))
     examples = " or ".join(f"'{form.example}'" for form in forms)
     raise InputError(name, "be a complete step", f"'{line}'", f"write it like {examples}")
 
@@ -227,35 +213,31 @@ def _meant(line: str, name: str) -> list[StepForm]:
         return [f for f in FORMS if f.verb.split()[0] == words[0] or named in f.pattern]
     verbs = [*verbs, "repeat"]
     tried = (" ".join(words[:2]), words[0] if words else "")
-    near = [
-        m for words_said in tried for m in get_close_matches(words_said, verbs, n=1, cutoff=0.6)
-    ]
-    examples = [form.example for form in FORMS if near and form.verb.startswith(near[0])]
-    if near == ["repeat"]:
-        examples = [REPEAT_EXAMPLE]
-    shown = "' or '".join(examples or [form.example for form in FORMS])
-    raise InputError(
-        name,
-        "be a step",
-        f"'{line}'",
-        f"did you mean something like '{shown}'?" if near else f"write it like '{shown}'",
-    )
+    matches = (get_close_matches(text, verbs, n=1, cutoff=0.6) for text in tried)
+    near = next(filter(None, matches), [""])[0]
+    like = {form.example: form.verb for form in FORMS} | {REPEAT_EXAMPLE: "repeat"}
+    examples = [example for example, verb in like.items() if near and verb.startswith(near)]
+    listed = "' or '".join(examples or [form.example for form in FORMS])
+    advice = f"did you mean something like '{listed}'?" if near else f"write it like '{listed}'"
+    raise InputError(name, "be a step", f"'{line}'", advice)
 
 
-def _quantities(
-    parts: Mapping[str, str], name: str, line: str, example: str
-) -> dict[str, float | str]:
-    """Values in SI; parts that are no quantities stay texts."""
-    quantities: dict[str, float | str] = {}
+def _arguments(
+    parts: Mapping[str, str], name: str, line: str, example: str, folder: Path
+) -> dict[str, Any]:
+    """Arguments of a step: quantities in SI, lists of texts with units, channels, or a file."""
+    arguments: dict[str, Any] = {}
     for key, text in parts.items():
-        if key not in _KINDS:
-            quantities[key] = text
-            continue
-        try:
-            quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}")
-        except InputError as error:
-            raise error.noting(f", as in '{example}' (in '{line}')") from None
-    return quantities
+        if key in _KINDS:
+            try:
+                arguments[key] = to_si(text, _KINDS[key], f"{name}.{key}")
+            except InputError as error:
+                raise error.noting(f", as in '{example}' (in '{line}')") from None
+        elif key in _LISTS:
+            arguments[key] = tuple(part.strip() for part in text.split(","))
+        else:
+            arguments[key] = folder / text.strip("\"'") if key == "file" else text
+    return arguments
 
 
 @dataclass(frozen=True)
@@ -267,7 +249,9 @@ class PlannedStep:
     step: ProgrammeStep
 
 
-def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
+def plan(
+    steps: Sequence[Any], folder: Path, prefix: str = "step "
+) -> tuple[list[PlannedStep], list[InputError]]:
     """All steps in order, with repetitions expanded, and their mistakes.
 
     Parameters
@@ -275,9 +259,19 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[In
     steps : sequence of str, ProgrammeStep, or object with ``repeat`` and ``steps``
     folder : Path
         Folder of files that lines name.
+    prefix : str
+        What the place of a step begins with.
     """
+    planned: list[PlannedStep] = []
     mistakes: list[InputError] = []
-    return _planned(steps, "step ", folder, mistakes), mistakes
+    for number, step in enumerate(steps, start=1):
+        try:
+            block, wrong = _planned(step, f"{prefix}{number}", folder)
+        except InputError as error:
+            block, wrong = [], [error]
+        planned += block
+        mistakes += wrong
+    return planned, mistakes
 
 
 def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[InputError]:
@@ -295,53 +289,37 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
                 yield error.noting(f" (in '{one.text}')")
 
 
-def _planned(
-    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[InputError]
-) -> list[PlannedStep]:
-    planned: list[PlannedStep] = []
-    for number, step in enumerate(steps, start=1):
-        place = f"{prefix}{number}"
-        try:
-            planned += _one(step, place, folder, mistakes)
-        except InputError as error:
-            mistakes.append(error)
-    return planned
-
-
-def _one(step: Any, place: str, folder: Path, mistakes: list[InputError]) -> list[PlannedStep]:
+def _planned(step: Any, place: str, folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
+    """The steps that one entry of a protocol stands for, and their mistakes."""
     if isinstance(step, ProgrammeStep):
-        return [PlannedStep(place, repr(step), step)]
+        return [PlannedStep(place, repr(step), step)], []
     if isinstance(step, str):
         line = " ".join(step.split())
         if line.lower().split(" ")[0] != "repeat":
-            return [PlannedStep(place, line, parse_step(line, place, folder))]
+            return [PlannedStep(place, line, parse_step(line, place, folder))], []
         times, inner = _repetition(line, place)
     else:
         times, inner = step.repeat, step.steps
-    block = _planned(inner, f"{place}.", folder, mistakes)
-    rule, got = f"come to at most {MOST} steps", f"{shown(times)} times {len(block)}"
-    require(not times * len(block) > MOST, place, rule, got, "repeat it less often")
-    return block * times
+    block, mistakes = plan(inner, folder, f"{place}.")
+    if times * len(block) > MOST:
+        rule, got = f"come to at most {MOST} steps", f"{shown(times)} times {len(block)}"
+        return [], [*mistakes, InputError(place, rule, got, "repeat it less often")]
+    # Without a right step inside, times may be too large for a list.
+    return block * min(times, MOST), mistakes
 
 
 def _repetition(line: str, place: str) -> tuple[int, list[str]]:
+    """How often a line repeats, and the lines that it repeats."""
     match = REPEAT.fullmatch(line)
-    inner = [part.strip() for part in match["steps"].split(";")] if match else []
-    if match is None or not match["times"].isdecimal() or _count(match["times"]) < 1:
+    # A number of a thousand digits exceeds `MOST` as well as a longer one, which Python refuses.
+    times = int(match["times"][:1000]) if match and match["times"].isdecimal() else 0
+    if match is None or times < 1:
         rule = "say how often what is repeated"
         raise InputError(place, rule, f"'{line}'", f"write it like '{REPEAT_EXAMPLE}'")
+    inner = [part.strip() for part in match["steps"].split(";")]
     if any(part.lower().startswith("repeat") for part in inner):
-        raise InputError(
-            place,
-            "not repeat within a line that repeats",
-            f"'{line}'",
-            "write the outer "
-            "one as a table, like { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }",
-        )
+        rule = "not repeat within a line that repeats"
+        table = "{ repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
+        raise InputError(place, rule, f"'{line}'", f"write the outer one as a table, like {table}")
     # A line may end in a semicolon.
-    return _count(match["times"]), [part for i, part in enumerate(inner) if part or i == 0]
-
-
-def _count(digits: str) -> int:
-    """The number that digits write; if they are too many, a number that exceeds `MOST`."""
-    return int(digits) if len(digits) < 1000 else 10**1000
+    return times, [part for i, part in enumerate(inner) if part or i == 0]

@@ -7,14 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    StrictBool,
-    StrictFloat,
-    WrapValidator,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, StrictBool, StrictFloat, WrapValidator, model_validator
 
 from asperity.errors import Argument, InputError, require
 from asperity.questions.record import (

@@ -9,7 +9,7 @@ from typing import Any
 
 from asperity.questions.fit import Fit
 from asperity.questions.record import Record
-from asperity.questions.recording import Measurement, Source
+from asperity.questions.recording import OF_MODULATION, Measurement, Source
 
 #: Options that choose the column of a role; other roles have --column.
 COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--time"}
@@ -109,9 +109,9 @@ def source_options(source: Source) -> list[str]:
     """How a file is read, as options."""
     parts = []
     for role, column in source.columns.items():
-        own = COLUMN_OPTIONS.get(role)
-        text = str(column) if own else f"{role}={column}"
-        parts.append(f"{own or '--column'} {shlex.quote(text)}")
+        option = COLUMN_OPTIONS.get(role)
+        text = str(column) if option else f"{role}={column}"
+        parts.append(f"{option or '--column'} {shlex.quote(text)}")
     channels = {f"{name} ": f" {expression}" for name, expression in source.channels.items()}
     fields = source.model_dump(exclude={"columns", "title", "channels"}, exclude_defaults=True)
     return parts + as_options({**fields, "channels": channels}, SOURCE_OPTIONS)
@@ -126,12 +126,8 @@ def measure_options(question: Measurement, *, modulated: bool) -> list[str]:
     modulated : bool
         What the recording was read as: options of the other kind are left out.
     """
-    other = (
-        {"steps", "velocities", "holds"}
-        if modulated
-        else {"frequency", "exact_frequency", "harmonics"}
-    )
-    other |= set() if modulated else {"whole_periods"}
-    fields = question.model_dump(exclude=other | {"modulated"}, exclude_defaults=True)
+    of_steps, of_modulation = {"steps", "velocities", "holds"}, set(OF_MODULATION) - {"detrend"}
+    other = of_steps if modulated else of_modulation
+    fields = question.model_dump(exclude={*other, "modulated"}, exclude_defaults=True)
     switch = [] if modulated else [MEASURE_OPTIONS["modulated"]]
     return switch + as_options(fields, MEASURE_OPTIONS)

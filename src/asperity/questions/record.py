@@ -268,12 +268,12 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)
     if reported["type"] == "missing":
-        inside = _fields_at(model, reported["loc"])
+        inside = _types_at(model, reported["loc"])
         advice = f"add it, a table of {', '.join(inside)}" if inside else "add it"
         return (InputError(field, "be given", "nothing", advice),)
     value = shown(reported["input"])
     if reported["type"] == "extra_forbidden":
-        known = _fields_at(model, reported["loc"][:-1])
+        known = list(_types_at(model, reported["loc"][:-1]))
         # A word that only one field takes says more than the likeness of names: scale = "log".
         word = reported["input"] if isinstance(reported["input"], str) else None
         meant = [n for n in known if word in _choices(model, reported["loc"], n)]
@@ -299,11 +299,6 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
         (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), text
     )
     return (InputError(field, f"be {rule}", value, "correct the value"),)
-
-
-def _fields_at(model: type[BaseModel], place: tuple[Any, ...]) -> list[str]:
-    """Names of the fields of the table at a place."""
-    return list(_types_at(model, place))
 
 
 def _choices(model: type[BaseModel], place: tuple[Any, ...], name: str) -> list[Any]:

@@ -172,11 +172,9 @@ class Measurement(Question):
         rule, advice = f"go with {frequency}", "give the frequency or leave it out"
         require(given, "measure.exact_frequency", rule, "none", advice)
         steady = not self.modulated or not (self.steps or self.holds)
-        rule, got = (
-            f"go with {Argument('modulated', value='False')}",
-            "them of a modulated recording",
-        )
-        require(steady, "measure.steps and holds", rule, got, "leave one of them out")
+        rule = f"go with {Argument('modulated', value='False')}"
+        got, advice = "them of a modulated recording", "leave one of them out"
+        require(steady, "measure.steps and holds", rule, got, advice)
         inside = [
             f"{step:g} s in {start:g} to {end:g} s"
             for start, end in self.holds or ()
@@ -184,7 +182,7 @@ class Measurement(Question):
             if start < step < end
         ]
         rule = f"lie outside {Argument('measure.holds')}"
-        require(not inside, "measure.steps", rule, ", ".join(inside), "leave one of them out")
+        require(not inside, "measure.steps", rule, ", ".join(inside), advice)
         if self.velocities is not None:
             got = f"{len(self.velocities)} for {len(self.steps or ())}"
             rule, counted = "be one more than the steps", len(self.steps or ()) + 1

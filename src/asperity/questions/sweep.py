@@ -67,11 +67,8 @@ class AxisTable(Record):
         require(one, "", rule, shown, like)
         needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
         missing = [name for name in needed if getattr(self, name) is None]
-        rule, got = (
-            f"have {' and '.join(needed)} together with {forms[0]}",
-            " and no ".join(missing),
-        )
-        require(not missing, "", rule, f"no {got}", "add it")
+        rule = f"have {' and '.join(needed)} together with {forms[0]}"
+        require(not missing, "", rule, f"no {' and no '.join(missing)}", "add it")
         return self
 
 

@@ -1,10 +1,7 @@
 # Public names of the package, each with its module; `asperity._lazy` imports them when used.
 
 from asperity.study.engine import SweepProgress as SweepProgress
-from asperity.study.plan import (
-    SweepPlan as SweepPlan,
-    load_plan as load_plan,
-)
+from asperity.study.plan import SweepPlan as SweepPlan, load_plan as load_plan
 from asperity.study.points import reasons as reasons
 from asperity.study.results import (
     SweepStatus as SweepStatus,

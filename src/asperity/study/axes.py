@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.arrays import spaced
+from asperity.arrays import between, spaced
 from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
 from asperity.parameters import Parameter, canonical_name, suggestion
@@ -116,9 +116,7 @@ def _quantile(spread: Mapping[str, Any], u: Column) -> Column:
     low, high = spread["low"], spread["high"]
     if spread["kind"] == "normal":
         return np.asarray(low + high * ndtri(u))
-    if spread["kind"] == "log":
-        return np.asarray(np.exp(np.log(low) + u * np.log(high / low)))
-    return np.asarray(low + u * (high - low))
+    return between(low, high, u, log=spread["kind"] == "log")
 
 
 def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
@@ -145,12 +143,7 @@ def axis_record(
         holds = table.draw != "sobol" or not (table.count or 0) > 2**SOBOL_BITS
         rule = f"be at most 2^{SOBOL_BITS} of a Sobol sequence"
         require(holds, "count", rule, f"{table.count:,}", "draw 'halton' or 'random'")
-        return name, {
-            "draw": table.draw,
-            "seed": plan.seed,
-            "count": table.count,
-            "over": spreads,
-        }
+        return name, {"draw": table.draw, "seed": plan.seed, "count": table.count, "over": spreads}
     if table.zip is not None:
         columns = {_name(n, known): _column(n, v, known, plan.folder) for n, v in table.zip.items()}
         lengths = {n: len(v) for n, v in columns.items()}

@@ -192,10 +192,7 @@ def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:
 
 
 def _numbers(
-    plan: Sweep,
-    axes: Mapping[str, Any],
-    laws: Sequence[str],
-    known: Mapping[str, Parameter],
+    plan: Sweep, axes: Mapping[str, Any], laws: Sequence[str], known: Mapping[str, Parameter]
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Numbers that are the same at every point, in SI, and the origin of each."""
     material = material_of(plan)

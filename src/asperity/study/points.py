@@ -180,7 +180,7 @@ _SENTENCES = {
 }
 
 
-def words() -> dict[int, str]:
+def outcome_words() -> dict[int, str]:
     """The word of each outcome code, as in the attribute ``flag_meanings``."""
     codes = {int(o): o.name.lower() for o in Outcome} | {
         int(o): o.name.lower() for o in SweepOutcome
@@ -188,7 +188,7 @@ def words() -> dict[int, str]:
     return dict(sorted(codes.items()))
 
 
-def reason(outcome: int, detail: float) -> str:
+def _reason(outcome: int, detail: float) -> str:
     """The sentence of an outcome with its number."""
     if outcome == SweepOutcome.CONTACT_LOST:
         return no_contact(detail)
@@ -199,7 +199,7 @@ def reason(outcome: int, detail: float) -> str:
 
 def flag_attributes() -> dict[str, Any]:
     """CF attributes of the variable ``outcome``: codes and their meanings."""
-    known = words()
+    known = outcome_words()
     return {
         "units": "1",
         "long_name": "outcome of the point",
@@ -219,7 +219,7 @@ def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
     outcome, detail = np.broadcast_arrays(np.asarray(outcome), np.asarray(detail))
     texts = np.full(outcome.shape, "converged", dtype=object)
     for i in map(tuple, np.argwhere(outcome != SweepOutcome.CONVERGED)):
-        texts[i] = reason(int(outcome[i]), float(detail[i]))
+        texts[i] = _reason(int(outcome[i]), float(detail[i]))
     return texts
 
 

@@ -18,7 +18,7 @@ from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path, typed
 from asperity.study.axes import TEXTS
 from asperity.study.plan import OF_CHUNKS
-from asperity.study.points import SweepOutcome, words
+from asperity.study.points import SweepOutcome, outcome_words
 from asperity.study.store.lock import running_driver
 from asperity.study.store.store import SweepStore
 
@@ -109,7 +109,7 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         chunks, done, failed = chunks + 1, done + opened.grid.size(chunk), failed + count
         codes, counts = np.unique(opened.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
-    names = words()
+    names = outcome_words()
     return SweepStatus(
         store=opened.path,
         title=str(opened.attributes.get("title", "")),
@@ -242,7 +242,7 @@ def _frames(store: SweepStore) -> Iterator[pandas.DataFrame]:
     axes = [name for axis in store.grid.axes for name in axis.names]
     kinds = {n: str if n in _TEXTS else float for n in (*axes, *store.arrays)}
     yield pandas.DataFrame({name: pandas.Series(dtype=kind) for name, kind in kinds.items()})
-    meanings = words()
+    meanings = outcome_words()
     for chunk in store.done():
         points = store.grid.at(chunk)
         known: dict[str, Any] = {**points.values, "law": points.laws, "data": points.data}

@@ -18,7 +18,7 @@ from asperity.errors import InputError, require
 from asperity.laws import Law
 from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
-from asperity.parameters.arguments import at_least, number, typed
+from asperity.parameters.arguments import at_least, broadcast_shape, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
@@ -131,11 +131,8 @@ def stiffness_threshold(
     >>> asp.stiffness_threshold(slider, velocity="1 um/s", epsilon=0.1, frequency="120 Hz")
     """
     eps, f = DRIVE["epsilon"].check(epsilon), DRIVE["frequency"].check(frequency)
-    try:
-        eps, f = np.broadcast_arrays(eps, f)
-    except ValueError:
-        rule, got = "have shapes that broadcast", f"{np.shape(eps)} and {np.shape(f)}"
-        raise InputError("epsilon and frequency", rule, got, "give arrays of one shape") from None
+    shape = broadcast_shape("epsilon and frequency", eps, f)
+    eps, f = np.broadcast_to(eps, shape), np.broadcast_to(f, shape)
     try:
         critical, _ = natural_scales(slider, velocity)
     except InputError:
@@ -143,11 +140,10 @@ def stiffness_threshold(
             raise
         critical = np.nan
     low, high = _ends(critical, between)
+    eta = 0.0 if radiation_damping is None else radiation_damping
     values = _numbers(slider) | {
         "V": number(velocity, "velocity", "velocity", "positive"),
-        "eta": 0.0
-        if radiation_damping is None
-        else number(radiation_damping, "radiation_damping", "damping", "not negative"),
+        "eta": number(eta, "radiation_damping", "damping", "not negative"),
         "inertia": float(inertia),
     }
     count = eps.size
@@ -160,7 +156,7 @@ def stiffness_threshold(
         np.full(count, high),
         scan,
     )
-    K, turn = (searched[name].reshape(eps.shape) for name in ("K", "turn"))
+    K = searched["K"].reshape(shape)
     code = np.nan_to_num(searched["bifurcation"], nan=-1).astype(int)
     kinds = np.array([*BIFURCATIONS, ""], dtype=object)[code]
     # Stiffnesses are in N/m here, and in K_c in a sweep.
@@ -168,9 +164,9 @@ def stiffness_threshold(
     return StiffnessThreshold(
         K=K,
         ratio=K / critical,
-        kind=kinds.reshape(eps.shape),
-        mode_frequency=turn * f,
-        result=np.array(texts, dtype=object).reshape(eps.shape),
+        kind=kinds.reshape(shape),
+        mode_frequency=searched["mode_frequency"].reshape(shape),
+        result=np.array(texts, dtype=object).reshape(shape),
     )
 
 
@@ -206,9 +202,10 @@ def search_thresholds(
     Returns
     -------
     Answers
-        ``K`` (N/m), ``turn``, |arg m|/(2 pi) of the leading multiplier, and ``bifurcation``, its
-        number in `BIFURCATIONS`. The detail of a point without a threshold is the stiffness (N/m)
-        of its outcome: of a failed point, or of an end of the scan.
+        ``K`` (N/m), ``mode_frequency`` (Hz), |arg m|/(2 pi) of the leading multiplier times the
+        frequency, and ``bifurcation``, its number in `BIFURCATIONS`. The detail of a point without
+        a threshold is the stiffness (N/m) of its outcome: of a failed point, or of an end of the
+        scan.
     """
     count = len(low)
 
@@ -241,15 +238,15 @@ def search_thresholds(
         g[line, k],
         g[line, k + 1],
     )
-    answers = Answers.empty(("K", "turn", "bifurcation"), count)
+    answers = Answers.empty(("K", "mode_frequency", "bifurcation"), count)
     at, located = stiffness(crossings.where), crossings.located
     answers.fail(line, SweepOutcome.NO_CROSSING, at)
     points = crossings.points.take(located)
     kinds = [
         BIFURCATIONS.index(k) if k in BIFURCATIONS else np.nan for k in bifurcation_kinds(points)
     ]
-    turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
-    numbers = {"K": at[located], "turn": turn, "bifurcation": np.array(kinds, dtype=float)}
+    mode = np.abs(points["multiplier_argument"]) / (2 * np.pi) * values["frequency"][line[located]]
+    numbers = {"K": at[located], "mode_frequency": mode, "bifurcation": np.array(kinds, float)}
     answers.put(line[located], Answers(numbers, points.outcome, points.detail))
     for i in np.flatnonzero(~usable):
         if failed[i].any():

@@ -27,9 +27,6 @@ from asperity.transients.explicit import attempt_step
 _RTOL, _ATOL = 1e-11, 1e-13
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
-#: ln(v_pl / V) of a slider that slips: 30 times as fast as its drive.
-_SLIPPING = 3.4
-
 #: Largest number of steps of a motion, with rejected ones.
 MOST_STEPS = 60_000
 _ROOT_STEPS = 60
@@ -184,12 +181,10 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
         log_slip = stop_gradient(system.log_slip(trial.end))
         off = jnp.abs(log_slip) + jnp.abs(trial.end[:-1] - target)[1:].sum()
         lost = ~good & ~(t + h_next > t)
-        # A fast slider without an accurate step ends at infinity.
-        away = lost & (stop_gradient(system.log_slip(Y)) > _SLIPPING)
         end = jnp.select(
             [
                 rising[0],
-                away | (good & (log_slip > drive.runaway)),
+                good & (log_slip > drive.runaway),
                 good & cut,
                 good & (off < drive.steady),
                 lost | (run.steps >= MOST_STEPS),

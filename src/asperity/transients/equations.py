@@ -22,6 +22,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.arrays import batches
 from asperity.loads import Excitation
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.slider import Motion, QuasiStatic, ReversingInertial
@@ -30,8 +31,8 @@ from asperity.transients.dense_output import PARTS, StepChunk
 #: Lower bound of the relative error of the displacement, above rounding.
 _DIGITS = 1e-13
 
-#: Numbers of instants in a call of a compiled program; a call uses the smallest sufficient one.
-BATCH_SIZES = (64, 1024, 4096)
+#: Numbers of instants in a call of a compiled program.
+_BATCH_SIZES = (64, 1024, 4096)
 
 
 class SegmentEquations(eqx.Module):
@@ -149,12 +150,10 @@ _read_points = jax.jit(_read)
 
 def motion_samples(system: SegmentEquations, t: np.ndarray, Y: np.ndarray) -> MotionSamples:
     """Evaluate the states `Y`, shape (size + 1, n), at the times `t` of the segment, shape (n,)."""
-    parts = []
-    most = next((room for room in BATCH_SIZES if len(t) <= room), BATCH_SIZES[-1])
-    for i in range(0, max(len(t), 1), most):
-        # Padded with the last instant, so that one program serves any number of instants.
-        part = np.minimum(np.arange(i, i + most), len(t) - 1)
-        parts.append(np.asarray(_read_points(system, t[part], Y[:, part]))[:, : len(t) - i])
+    parts = [
+        np.asarray(_read_points(system, t[index], Y[:, index]))[:, :kept]
+        for index, kept in batches(len(t), _BATCH_SIZES)
+    ]
     return MotionSamples(*np.concatenate(parts, axis=1))
 
 

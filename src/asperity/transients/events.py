@@ -127,6 +127,11 @@ class EventDetector:
     ----------
     motion : Motion
     thresholds : EventThresholds
+
+    Attributes
+    ----------
+    steady : bool
+        Whether the event "steady" of the current segment has been detected.
     """
 
     def __init__(self, motion: Motion, thresholds: EventThresholds) -> None:
@@ -140,28 +145,31 @@ class EventDetector:
             with np.errstate(over="ignore"):
                 return np.log(np.maximum(velocity * V, 1e-300)) - np.log(threshold)
 
-        self._slip: Distance = lambda r: log_speed(r.slip, thresholds.slip)
-        self._runaway: Distance = lambda r: log_speed(r.slip, thresholds.runaway)
-        self._unsteadiness: Distance = lambda r: np.log(r.unsteadiness / thresholds.steady)
-        self._friction: Distance = lambda r: r.friction
-        self._level = thresholds.level
-        self._above: Distance = lambda r: r.force - thresholds.level
-        # The drive moves at V where a level is given.
-        self._ahead: Distance = lambda r: r.velocity - 1
-        self._steady = thresholds.steady
+        level = thresholds.level
+        #: Events are changes of the sign of these distances.
+        self._distances: dict[str, Distance] = {
+            "slip": lambda r: log_speed(r.slip, thresholds.slip),
+            "runaway": lambda r: log_speed(r.slip, thresholds.runaway),
+            "unsteadiness": lambda r: np.log(r.unsteadiness / thresholds.steady),
+            "friction": lambda r: r.friction,
+            "above level": lambda r: r.force - level,
+            # The drive moves at V where a level is given.
+            "ahead of the drive": lambda r: r.velocity - 1,
+        }
+        self._has_level = level is not None
+        self._tolerance = thresholds.steady
         self._before: dict[str, float] = {}
 
-    def enter(self, system: SegmentEquations, start: float) -> None:
-        """Begin a segment; slip that began before it continues."""
-        self._system, self._start = system, start
-        self._steady_reached = not system.segment.constant
-        self._periodic = _PeriodicSteadiness(system.segment.period, self._steady)
+    def enter(self, system: SegmentEquations, start: float, steady: bool) -> None:
+        """Begin a segment, or continue one that was `steady`; slip before it continues."""
+        self._system, self._start, self.steady = system, start, steady
+        self._periodic = _PeriodicSteadiness(system.segment.period, self._tolerance)
 
     def underflow(self, t: float, states: np.ndarray) -> Termination:
         """Why no step was accurate at the time `t` of the segment, from `states` (size + 1,)."""
         now = motion_samples(self._system, np.array([t]), states[:, None])
         kind = "no accurate step"
-        if self._may_run_away and not self._slip(now)[0] < 0:
+        if self._may_run_away and not self._distances["slip"](now)[0] < 0:
             kind = "runaway"
         if self._may_come_to_rest and now.velocity[0] < _REST:
             kind = "rest"
@@ -178,24 +186,23 @@ class EventDetector:
             return [], None
         times = dense_output.refined()
 
-        def crossings(name: str, distance: Distance) -> list[tuple[float, bool]]:
-            return self._crossings(name, distance, times, samples, dense_output)
+        def crossings(name: str) -> list[tuple[float, bool]]:
+            return self._crossings(name, times, samples, dense_output)
 
-        if self._level is None:
-            slips = crossings("slip", self._slip)
-            result = [Event(t, "slip start" if up else "slip end") for t, up in slips]
-        else:
-            falls = crossings("level", self._above)
-            extrema = crossings("extremum", self._ahead)
-            result = [Event(t, "fall") for t, up in falls if not up]
+        if self._has_level:
+            result = [Event(t, "fall") for t, up in crossings("above level") if not up]
+            extrema = crossings("ahead of the drive")
             result += [Event(t, "peak" if up else "trough") for t, up in extrema]
+        else:
+            slips = crossings("slip")
+            result = [Event(t, "slip start" if up else "slip end") for t, up in slips]
         terminations = []
         if self._may_run_away:
-            crossed = crossings("runaway", self._runaway)
+            crossed = crossings("runaway")
             terminations += [
                 Termination("runaway", t) for t, up in crossed if up and t > self._start
             ]
-        reversals = crossings("friction", self._friction)
+        reversals = crossings("friction")
         if self._reverses:
             result += [Event(t, "reversal") for t, _ in reversals]
         else:
@@ -208,29 +215,28 @@ class EventDetector:
         self, times: np.ndarray, samples: MotionSamples, dense_output: DenseOutput
     ) -> list[Event]:
         """Steady sliding, or a steady response to a modulation, at most once in a segment."""
-        t = self._periodic.detect(dense_output)
-        if t is not None:
-            return [Event(self._start + t, "steady")]
-        if self._steady_reached:
+        if self.steady:
             return []
-        if samples.unsteadiness[0] < self._steady and dense_output.begin[0] == 0:
-            self._steady_reached = True
-            return [Event(self._start, "steady")]
+        t = self._periodic.detect(dense_output)
+        if t is None:
+            if not self._system.segment.constant:
+                return []
+            if samples.unsteadiness[0] < self._tolerance and dense_output.begin[0] == 0:
+                t = 0.0
+        if t is not None:
+            self.steady = True
+            return [Event(self._start + t, "steady")]
         self._before.pop("unsteadiness", None)
-        crossed = self._crossings("unsteadiness", self._unsteadiness, times, samples, dense_output)
+        crossed = self._crossings("unsteadiness", times, samples, dense_output)
         down = [t for t, up in crossed if not up][:1]
-        self._steady_reached = bool(down)
+        self.steady = bool(down)
         return [Event(t, "steady") for t in down]
 
     def _crossings(
-        self,
-        name: str,
-        distance: Distance,
-        times: np.ndarray,
-        samples: MotionSamples,
-        dense_output: DenseOutput,
+        self, name: str, times: np.ndarray, samples: MotionSamples, dense_output: DenseOutput
     ) -> list[tuple[float, bool]]:
         """Times (s) at which a distance changes its sign, and whether it rises."""
+        distance = self._distances[name]
         with np.errstate(divide="ignore", invalid="ignore"):
             values = distance(samples)
         before = self._before.get(name)
@@ -248,7 +254,10 @@ class EventDetector:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     return distance(motion_samples(self._system, t, dense_output.evaluate(t)))
 
-            roots = find_root(between, (times[change], times[change + 1]), tolerances=_ROOT).x
+            ends = times[change], times[change + 1]
+            roots = find_root(between, ends, tolerances=_ROOT).x
+            # Within a step shorter than the spacing of doubles there is one time only.
+            roots = np.where(np.isnan(roots), ends[1], roots)
             crossings += [
                 (self._start + float(t), bool(values[i] < 0))
                 for t, i in zip(roots, change, strict=True)
@@ -291,7 +300,4 @@ class _PeriodicSteadiness:
         left = changes * np.minimum(ratios / np.maximum(1 - ratios, 1e-12), 1e3)
         self._last, self._change = states[:, -1:], changes[-1]
         steady = np.flatnonzero(left < self._tolerance)
-        if steady.size == 0:
-            return None
-        self._period = None
-        return float(times[steady[0]])
+        return float(times[steady[0]]) if steady.size else None

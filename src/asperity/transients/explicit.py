@@ -42,7 +42,7 @@ def advance(
     rtol, atol : array
         Tolerances of `SegmentEquations.scale`.
     """
-    chunk = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    chunk = _run(system, t, Y, h, end, rtol, atol)
     dense = _dense(system, chunk.begin, chunk.length, *chunk.coefficients)
     return chunk._replace(coefficients=dense)
 
@@ -50,11 +50,11 @@ def advance(
 @one_kernel
 def _run(
     system: SegmentEquations,
+    longest: Array,
     t: Array,
     Y: Array,
     h: Array,
     end: Array,
-    longest: Array,
     rtol: Array,
     atol: Array,
 ) -> StepChunk:
@@ -62,7 +62,7 @@ def _run(
         return attempt_step(system, t, Y, h, slope, rtol, atol)
 
     slope = system.rates(system.at(t), Y)
-    return run_steps(system, t, Y, h, end, longest, attempt, slope, _LIMITS)
+    return run_steps(system, longest, t, Y, h, end, attempt, slope, _LIMITS)
 
 
 def attempt_step(

@@ -66,8 +66,8 @@ def _tableau() -> _ModalTableau:
     # the error.
     gamma = 1 / values[kept[0]].real
     weights = (1 / k - gamma * (k == 1)) @ scheme.monomials
-    powers = np.zeros((s + 1, s))
-    powers[1:] = np.linalg.inv(c[:, None] ** k)
+    # The polynomial is t times the one through Z/c.
+    powers = np.vstack([np.zeros(s), scheme.monomials / c])
     return _ModalTableau(
         c, a, inverse, values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept] * twice,
         (weights - a[-1]) @ inverse, powers,
@@ -81,25 +81,18 @@ class _LastStep(NamedTuple):
     length: Array  # 0 before the first
 
 
-def advance(
-    system: SegmentEquations, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
-) -> StepChunk:
-    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
-    chunk: StepChunk = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
-    return chunk
-
-
 @one_kernel
-def _run(
+def advance(
     system: SegmentEquations,
+    longest: Array,
     t: Array,
     Y: Array,
     h: Array,
     end: Array,
-    longest: Array,
     rtol: Array,
     atol: Array,
 ) -> StepChunk:
+    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
     powers = jnp.asarray(_tableau().powers)
 
     def attempt(t: Array, Y: Array, h: Array, last: _LastStep) -> TrialStep:
@@ -112,7 +105,7 @@ def _run(
         return TrialStep(Y + Z[:, -1], error, factor, _LastStep(piece, h), h * slope < _MILD, piece)
 
     none = _LastStep(jnp.zeros((STAGES + 1, Y.shape[0])), jnp.zeros(()))
-    return run_steps(system, t, Y, h, end, longest, attempt, none, _LIMITS)
+    return run_steps(system, longest, t, Y, h, end, attempt, none, _LIMITS)
 
 
 def _extrapolated(last: _LastStep, Y: Array, h: Array) -> Array:

@@ -232,6 +232,8 @@ class Checkpoint:
     ringless : bool
         Whether ringing of the slider on its asperities is left out from here to the end of
         the segment.
+    steady : bool
+        Whether the motion has become steady in the segment.
     """
 
     segment: int
@@ -240,6 +242,7 @@ class Checkpoint:
     length: float = 0.0
     sampled: float = -np.inf
     ringless: bool = False
+    steady: bool = False
 
 
 @dataclass(frozen=True)
@@ -347,7 +350,7 @@ class Integration:
         if lost is not None and lost <= here.t:
             yield self._standstill(system, start, Termination("loss of contact", start + lost))
             return
-        self._detector.enter(system, start)
+        self._detector.enter(system, start, here.steady)
         self._pace.enter()
         t, Y = here.t, here.states
         length = here.length
@@ -379,7 +382,10 @@ class Integration:
             states = Y
             if termination is not None and len(dense_output.begin):
                 states = dense_output.evaluate(np.array([ends_at]))[:, 0]
-            mark = Checkpoint(here.segment, ends_at, states, length, ringless=ringless)
+            mark = Checkpoint(
+                here.segment, ends_at, states, length,
+                ringless=ringless, steady=self._detector.steady,
+            )  # fmt: skip
             closes = termination is None and reached >= end
             yield SegmentPart(
                 system, start, dense_output, ends_at, events, termination, closes, mark

@@ -36,10 +36,11 @@ from asperity.arrays import Float
 from asperity.loads import Excitation, Programme, Slide
 from asperity.slider import Motion, Slider
 from asperity.slider.named import equation_parameters
+from asperity.transients.dense_output import DenseOutput
 from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
 from asperity.transients.integration import Checkpoint, Integration, SegmentPart
-from asperity.transients.variation import Variation
+from asperity.transients.variation import variations
 
 #: Velocities of sliding before the first cycle, over that of the drive. The second is used where
 #: the first slip after the slower sliding is too large for the law.
@@ -225,8 +226,8 @@ class _Orbit:
         States at the falls.
     names : tuple of str
         Parameters.
-    variation : Variation
-        With these parameters.
+    force_slopes : DenseOutput
+        Derivatives of F/W0 to the first states and to the parameters, at all times.
     map : array, shape (size, size + parameters)
         Derivatives of the last states, on the section, to the first states and to the parameters.
     duration : array, shape (size + parameters,)
@@ -239,7 +240,7 @@ class _Orbit:
     first: Float
     last: Float
     names: tuple[str, ...]
-    variation: Variation
+    force_slopes: DenseOutput
     map: Float
     duration: Float
 
@@ -249,14 +250,13 @@ class _Orbit:
         motion = run.parts[0].system.motion
         names = tuple(equation_parameters(motion))
         first, last = run.states(np.array([begin, end]))[:-1].T
-        variation = Variation.along(
+        ends, slopes = variations(
             motion, lambda t: run.states(t)[:-1], run.nodes(begin, end), names
         )
         rates, gradient = (np.asarray(a) for a in _rates_and_gradient(motion, last))
-        ends = variation.at_end
         later = gradient @ ends / (gradient @ rates)
         return cls(
-            run, begin, end, first, last, names, variation, ends - np.outer(rates, later), -later
+            run, begin, end, first, last, names, slopes, ends - np.outer(rates, later), -later
         )
 
     @property
@@ -297,15 +297,14 @@ class _Orbit:
         first = self.solve(self.map[:, columns])
         period = self.duration[:size] @ first + self.duration[columns]
         since, number = self.within(t)
-        # The force is the first state wherever there is a mass.
-        states = self.variation.evaluate(since, 0)
-        force = states[:, :size] @ first + states[:, columns]
+        slopes = self.force_slopes.evaluate(since)
+        force = slopes[:size].T @ first + slopes[columns].T
         return force - (number * self.force_and_rate(since)[1])[:, None] * period, period
 
     def force_and_rate(self, t: Float) -> tuple[Float, Float]:
         """F/W0, and K (V - v)/W0 (1/s), at times of the motion."""
         now = self.run.samples(t)
-        later = self.variation.evaluate(t, 0)[:, : len(self.first)] @ self.step
+        later = self.step @ self.force_slopes.evaluate(t)[: len(self.first)]
         return now.force + later, float(self.motion.kappa) * (1 - now.velocity)
 
     def fastest(self) -> float:

@@ -136,10 +136,12 @@ class _BlockWriter:
         self._columns.append([times, *forces, *speeds, place, Y[:-1].T])
         self.room -= len(t)
         # A block that ends within a segment part is resumed from its last sample.
-        self.reached = Checkpoint(
-            checkpoint.segment, float(t[-1]), Y[:, -1].copy(), ringless=checkpoint.ringless
-        )
         self._sampled = float(times[-1])
+        later = any(e.kind == "steady" and e.time > self._sampled for e in part.events)
+        self.reached = dataclasses.replace(
+            checkpoint, t=float(t[-1]), states=Y[:, -1].copy(), length=0.0,
+            steady=checkpoint.steady and not later,
+        )  # fmt: skip
 
     def block(self, last: SegmentPart | None) -> Trajectory:
         """Samples collected since the last block; empties the buffer."""

@@ -48,14 +48,15 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Parameters
     ----------
     function : callable
-        Function of a `SegmentEquations` and other arguments.
+        Function of a `SegmentEquations`, the length that no step may exceed (s), which the compiled
+        function takes from the segment, and other arguments.
     """
     many, single = jax.jit(function), jax.jit(_as_one_kernel(function))
 
     @wraps(function)
     def call(system: SegmentEquations, *arguments: Any) -> Any:
         run = single if _compiles_to_one(system) else many
-        return run(system, *arguments)
+        return run(system, system.segment.longest_step, *arguments)
 
     return call
 
@@ -146,11 +147,11 @@ StepAttempt = Callable[[Array, Array, Array, Any], TrialStep]
 
 def run_steps(
     system: SegmentEquations,
+    longest: Array,
     t: Array,
     Y: Array,
     h: Array,
     end: Array,
-    longest: Array,
     attempt: StepAttempt,
     memory: Any,
     limits: tuple[float, float],
@@ -162,13 +163,13 @@ def run_steps(
     Parameters
     ----------
     system : SegmentEquations
+    longest : array
+        Length that no step may exceed (s).
     t, end : array
         Times of the segment (s).
     Y : array, shape (size + 1,)
     h : array
         Length of the first step to try (s), 0 for a guess.
-    longest : array
-        Length that no step may exceed (s).
     attempt : callable
     memory : pytree of arrays
         Passed to the first step.

@@ -119,11 +119,8 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
         return SampleTimes()
     if isinstance(sampling, str) or np.ndim(sampling) == 0:
         rate = number(sampling, "sampling", "frequency", "positive")
-        rule, advice = (
-            f"give at most {_MOST_ROWS:g} rows",
-            "lower the rate or shorten the programme",
-        )
-        got = f"{rate:g} Hz for {duration:g} s"
+        rule, got = f"give at most {_MOST_ROWS:g} rows", f"{rate:g} Hz for {duration:g} s"
+        advice = "lower the rate or shorten the programme"
         require(rate * duration <= _MOST_ROWS, "sampling", rule, got, advice)
         return SampleTimes(rate=rate)
     times = np.asarray(to_si(sampling, "time", "sampling"), float)

@@ -16,7 +16,6 @@ Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -32,89 +31,61 @@ from asperity.loads import Excitation
 from asperity.slider import Motion
 from asperity.slider.named import equation_parameters, with_value
 from asperity.slider.problem import Problem
+from asperity.transients.dense_output import DenseOutput
 from asperity.transients.implicit import STAGES
 
 #: Fewest instants in a call of the compiled program; more are padded to a power of two.
 _FEWEST = 1024
 
 
-@dataclass(frozen=True, eq=False)
-class Variation:
+def variations(
+    motion: Motion, states: Callable[[Float], Float], nodes: Float, names: Sequence[str]
+) -> tuple[Float, DenseOutput]:
     """Derivatives of the states along a motion under constant load and drive.
 
-    Attributes
+    Parameters
     ----------
+    motion : Motion
+        With scalar parameters and omega = 1 rad/s.
+    states : callable
+        States of shape (size, n) at times (s) of shape (n,).
     nodes : array, shape (steps + 1,)
-        Beginnings of the steps, and the end (s).
-    coefficients : array, shape (STAGES + 1, steps, size, size + parameters)
-        Coefficients of rising powers of the share of a step. Columns are the first states, then the
-        parameters.
+        Times of the steps; the derivatives refer to the beginning of the first step.
+    names : sequence of str
+        Parameters of the law or the machine, whose derivatives are in SI.
+
+    Returns
+    -------
+    at_end : array, shape (size, size + parameters)
+        Derivatives at the end of the last step. Columns are the first states, then the parameters.
+    of_first_state : DenseOutput
+        The first row of such arrays at all times: of F/W0, wherever there is a mass.
     """
-
-    nodes: Float
-    coefficients: Float
-
-    @classmethod
-    def along(
-        cls,
-        motion: Motion,
-        states: Callable[[Float], Float],
-        nodes: Float,
-        names: Sequence[str] = (),
-    ) -> Variation:
-        """Solve the variational equations along a motion.
-
-        Parameters
-        ----------
-        motion : Motion
-            With scalar parameters and omega = 1 rad/s.
-        states : callable
-            States of shape (size, n) at times (s) of shape (n,).
-        nodes : array, shape (steps + 1,)
-            Times of the steps; the derivatives refer to the beginning of the first step.
-        names : sequence of str
-            Parameters of the law or the machine, whose derivatives are in SI.
-        """
-        scheme, size = radau_iia(STAGES), motion.size
-        lengths = np.diff(nodes)
-        times = nodes[:-1, None] + lengths[:, None] * scheme.c
-        jacobian, sides = _linearised(motion, names, states(times.ravel()))
-        # (steps, stages, size, size) and (steps, stages, size, size + parameters)
-        jacobian = jacobian.reshape(size, size, *times.shape).transpose(2, 3, 0, 1)
-        sides = sides.reshape(len(names), size, *times.shape).transpose(2, 3, 1, 0)
-        sides = np.concatenate([jacobian, sides], axis=3)
-        weights = lengths[:, None, None] * scheme.a
-        whole = STAGES * size
-        matrix = np.eye(whole) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
-            -1, whole, whole
-        )
-        known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), whole, -1)
-        stages = np.linalg.solve(matrix, known).reshape(len(lengths), STAGES, size, -1)
-        powers = np.linalg.inv(scheme.c[:, None] ** np.arange(1, STAGES + 1))
-        rising = np.einsum("kj,njrc->knrc", powers, stages)
-        here = np.eye(size, size + len(names))
-        # The rows for first states have no entries for the parameters.
-        only = np.concatenate([np.zeros((size, size)), np.ones((size, len(names)))], axis=1)
-        coefficients = np.empty((STAGES + 1, *rising.shape[1:]))
-        for i in range(len(lengths)):
-            coefficients[0, i] = here
-            coefficients[1:, i] = rising[:, i, :, :size] @ here + rising[:, i] * only
-            here = coefficients[:, i].sum(0)
-        return cls(nodes, coefficients)
-
-    @property
-    def at_end(self) -> Float:
-        """At the end of the last step, shape (size, size + parameters)."""
-        return np.asarray(self.coefficients[:, -1].sum(0))
-
-    def evaluate(self, t: Float, state: int) -> Float:
-        """Derivatives of one state at times (s), shape (n, size + parameters)."""
-        i = np.clip(np.searchsorted(self.nodes, t, side="right") - 1, 0, len(self.nodes) - 2)
-        share = ((t - self.nodes[i]) / (self.nodes[i + 1] - self.nodes[i]))[:, None]
-        value = self.coefficients[-1, i, state]
-        for coefficient in self.coefficients[-2::-1]:
-            value = value * share + coefficient[i, state]
-        return np.asarray(value)
+    scheme, size = radau_iia(STAGES), motion.size
+    lengths = np.diff(nodes)
+    times = nodes[:-1, None] + lengths[:, None] * scheme.c
+    jacobian, sides = _linearised(motion, names, states(times.ravel()))
+    # (steps, stages, size, size) and (steps, stages, size, size + parameters)
+    jacobian = jacobian.reshape(size, size, *times.shape).transpose(2, 3, 0, 1)
+    sides = sides.reshape(len(names), size, *times.shape).transpose(2, 3, 1, 0)
+    sides = np.concatenate([jacobian, sides], axis=3)
+    weights = lengths[:, None, None] * scheme.a
+    whole = STAGES * size
+    matrix = np.eye(whole) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
+        -1, whole, whole
+    )
+    known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), whole, -1)
+    stages = np.linalg.solve(matrix, known).reshape(len(lengths), STAGES, size, -1)
+    rising = np.einsum("kj,njrc->knrc", scheme.monomials / scheme.c, stages)
+    here = np.eye(size, size + len(names))
+    # The rows for first states have no entries for the parameters.
+    only = np.concatenate([np.zeros((size, size)), np.ones((size, len(names)))], axis=1)
+    first = np.empty((STAGES + 1, size + len(names), len(lengths)))
+    for i in range(len(lengths)):
+        changes = rising[:, i, :, :size] @ here + rising[:, i] * only
+        first[0, :, i], first[1:, :, i] = here[0], changes[:, 0]
+        here = here + changes.sum(0)
+    return here, DenseOutput(nodes[:-1], lengths, first)
 
 
 def _linearised(motion: Motion, names: Sequence[str], Y: Float) -> tuple[Float, Float]:
@@ -123,11 +94,7 @@ def _linearised(motion: Motion, names: Sequence[str], Y: Float) -> tuple[Float, 
     room = max(_FEWEST, 1 << (count - 1).bit_length())
     Y = np.concatenate([Y, np.repeat(Y[:, -1:], room - count, axis=1)], axis=1)
     jacobian, sides = _slopes(motion, _directions(jax.tree.structure(motion), tuple(names)), Y)
-    sides = [np.asarray(a)[:, :count] for a in sides]
-    return (
-        np.asarray(jacobian)[:, :, :count],
-        np.stack(sides) if sides else np.empty((0, *Y[:, :count].shape)),
-    )
+    return np.asarray(jacobian)[:, :, :count], np.stack(sides)[:, :, :count]
 
 
 @cache

@@ -83,10 +83,7 @@ class Triaxial:
         return float(np.pi * self.diameter**2 / 4 / np.sin(self.angle))
 
     def stresses(
-        self,
-        axial_force: ArrayLike,
-        confining_pressure: ArrayLike,
-        pore_pressure: ArrayLike = 0.0,
+        self, axial_force: ArrayLike, confining_pressure: ArrayLike, pore_pressure: ArrayLike = 0.0
     ) -> tuple[Float, Float]:
         """Shear and effective normal stress (Pa) on the cut.
 

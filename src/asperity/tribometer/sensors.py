@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.arrays import Float
-from asperity.errors import InputError
+from asperity.errors import InputError, require
 from asperity.parameters.arguments import number
 
 #: Nodes of the quadrature over an interval, sufficient for e^{ps} of the fastest poles.
@@ -204,11 +204,8 @@ class Sensor:
             value = number(stated, name, "dimensionless" if field.name == "drift" else kind, rule)
             object.__setattr__(self, field.name, value)
         for name in ("damping", "impulses"):
-            if not getattr(self, name) < 1:
-                raise InputError(
-                    f"{type(self).__name__}.{name} must be below 1, got {getattr(self, name):g}; "
-                    "correct the value"
-                )
+            value, label = getattr(self, name), f"{type(self).__name__}.{name}"
+            require(value < 1, label, "be below 1", f"{value:g}", "correct the value")
 
     def read(self, values: Float, rate: float, random: np.random.Generator) -> Float:
         """The sensor's output at the samples of a quantity; the recorder's clock adds the delay.

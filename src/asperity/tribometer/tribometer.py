@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
-from asperity.parameters.arguments import number, typed
+from asperity.parameters.arguments import number, one_of, typed
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
@@ -31,6 +31,7 @@ from asperity.tribometer.sensors import (
 from asperity.units import KINDS, to_si
 
 
+@typed
 @dataclass(frozen=True, kw_only=True)
 class Recorder:
     """Anti-alias filter, clock and analogue-to-digital converter, the same for all channels.
@@ -75,13 +76,9 @@ class Recorder:
                 value = number(stated, f"Recorder.{name}", kind, rule)
                 object.__setattr__(self, name, value)
         for name, low, high in (("order", 1, 8), ("bits", 0, 32)):
-            if not low <= getattr(self, name) <= high:
-                raise InputError(
-                    f"Recorder.{name}",
-                    f"lie between {low} and {high}",
-                    getattr(self, name),
-                    f"give one such as {high // 2}",
-                )
+            value, rule = getattr(self, name), f"lie between {low} and {high}"
+            advice = f"give one such as {high // 2}"
+            require(low <= value <= high, f"Recorder.{name}", rule, value, advice)
 
     def step(self, channel: str, kind: str) -> tuple[float, float, float] | None:
         """Lowest value, highest value and step of the converter for a channel, in SI."""
@@ -93,6 +90,7 @@ class Recorder:
         return low, high, (high - low) / (2**self.bits - 1)
 
 
+@typed
 @dataclass(frozen=True, kw_only=True)
 class Tribometer:
     """Sensors by the name of the channel that each makes, and the recorder.
@@ -108,6 +106,7 @@ class Tribometer:
     sensors: Mapping[str, Sensor]
     recorder: Recorder
 
+    @typed
     def record(
         self,
         time: ArrayLike,
@@ -140,7 +139,7 @@ class Tribometer:
         InputError
             If signals and sensors do not belong together or the times are not even.
         """
-        grid = np.asarray(time, float)
+        grid = np.asarray(to_si(time, "time", "Tribometer.time"), float)
         rate = even_rate(grid) if grid.ndim == 1 and grid.size > 3 else None
         if rate is None:
             rule, advice = "be evenly spaced", "sample the motion at a rate, like sampling='20 kHz'"
@@ -217,7 +216,8 @@ def channel_gain(tribometer: Tribometer, channel: str, frequency: ArrayLike) -> 
     complex array, of the shape of `frequency`
         Gain of sensor and anti-alias filter, without the error of the clock.
     """
-    sensor, recorder = tribometer.sensors[channel], tribometer.recorder
+    sensor = tribometer.sensors[one_of(channel, tribometer.sensors, "channel_gain.channel")]
+    recorder = tribometer.recorder
     s = 2j * np.pi * np.asarray(frequency, float)
     gain = _filter(s, *low_pass(1, sensor.bandwidth)) * np.exp(-s * sensor.delay)
     if sensor.resonance > 0:

@@ -20,8 +20,8 @@ def pmma():
 def numbers(pmma):
     """What `response_map` needs besides K and epsilon."""
     names = ("mu0", "A", "B", "D0", "V0", "lambda", "W0")
-    found = {name: pmma[name].si for name in names}
-    return {**found, "V": "1 um/s", "frequency": "120 Hz"}
+    values = {name: pmma[name].si for name in names}
+    return {**values, "V": "1 um/s", "frequency": "120 Hz"}
 
 
 class KnownPlane:

@@ -82,8 +82,8 @@ def test_a_boundary_too_sharp_for_the_grid_is_told(known) -> None:
 def test_points_without_response_end_the_boundary(known) -> None:
     plane = known(circle, 21, failed=lambda x, y: x > 0.6)
     boundary, lines = traced(plane)
-    found = boundary.where[boundary.line >= 0]
-    assert found[:, 0].max() <= 0.6 + 1e-9
+    points = boundary.where[boundary.line >= 0]
+    assert points[:, 0].max() <= 0.6 + 1e-9
     assert len(lines) == 1
     assert lines[0][0].tolist() != lines[0][-1].tolist()
 
@@ -167,8 +167,8 @@ def test_points_without_response_are_hatched_and_named() -> None:
     converged = np.ones((3, 4), bool)
     converged[0, 0] = False
     units = {"units": "1", "long_name": "x"}
-    found = planted(converged=(("K", "epsilon"), converged, units))
-    assert "no response" in [entry.get_label() for entry in keys(found)]
+    dataset = planted(converged=(("K", "epsilon"), converged, units))
+    assert "no response" in [entry.get_label() for entry in keys(dataset)]
     assert "no response" not in [entry.get_label() for entry in keys(planted())]
 
 

@@ -24,8 +24,8 @@ def rigid(numbers):
     return response_map("rice-ruina", numbers, x=EPS, y=K)
 
 
-def on_lines(found, name):
-    return found[f"boundary_{name}"].values[found["boundary_line"].values >= 0]
+def on_lines(dataset, name):
+    return dataset[f"boundary_{name}"].values[dataset["boundary_line"].values >= 0]
 
 
 def test_without_modulation_the_boundary_is_the_critical_stiffness(rigid, pmma) -> None:
@@ -43,13 +43,13 @@ def test_without_modulation_the_boundary_is_the_critical_stiffness(rigid, pmma) 
 
 def test_elastic_asperities_have_their_own_critical_stiffness(numbers, pmma) -> None:
     rest = {name: value for name, value in numbers.items() if name != "lambda"}
-    found = response_map(
+    dataset = response_map(
         "elasto-plastic",
         rest | {"epsilon": 0.0},
         x=Axis("lambda", "0 um", "1 um", 3),
         y=Axis("K", 1.5e5, 3e5, 4),
     )
-    stiffness, length = on_lines(found, "K"), on_lines(found, "lambda")
+    stiffness, length = on_lines(dataset, "K"), on_lines(dataset, "lambda")
     expected = (pmma.B - pmma.A) * pmma.W0 / (pmma.D0 + pmma.A * length)
     # The span of the axis is 1.5e5 N/m, a crossing is located to 1e-6 of it.
     np.testing.assert_allclose(stiffness, expected, atol=0.5)
@@ -79,9 +79,9 @@ def test_chords_between_the_points_stay_on_the_boundary(rigid, pmma) -> None:
 
 def test_a_planted_mistake_in_the_search_is_seen(numbers, pmma, monkeypatch) -> None:
     monkeypatch.setattr(crossings, "TOLERANCE", 0.3)
-    found = response_map("rice-ruina", numbers, x=Axis("epsilon", 0.0, 0.4, 2), y=K)
+    dataset = response_map("rice-ruina", numbers, x=Axis("epsilon", 0.0, 0.4, 2), y=K)
     Kc = (pmma.B - pmma.A) * pmma.W0 / pmma.D0
-    eps, stiffness = found["boundary_epsilon"].values, found["boundary_K"].values
+    eps, stiffness = dataset["boundary_epsilon"].values, dataset["boundary_K"].values
     assert abs(stiffness[eps == 0][0] / Kc - 1) > 1e-4
 
 
@@ -114,25 +114,25 @@ def test_a_point_that_fails_says_why_and_costs_no_other(numbers, monkeypatch) ->
         return dataclasses.replace(response, **planted)
 
     monkeypatch.setattr(responses, "respond", failing)
-    found = response_map("rice-ruina", numbers, x=EPS, y=K)
-    failed = ~found["converged"].values
-    assert (failed == (found["epsilon"].values > 0.3)).all()
+    dataset = response_map("rice-ruina", numbers, x=EPS, y=K)
+    failed = ~dataset["converged"].values
+    assert (failed == (dataset["epsilon"].values > 0.3)).all()
     for name in SHOWN:
-        assert (np.isnan(found[name].values) == failed).all(), name
-    reasons = found["result"].values
+        assert (np.isnan(dataset[name].values) == failed).all(), name
+    reasons = dataset["result"].values
     assert all("no method found a periodic orbit" in text for text in reasons[failed])
     assert (reasons[~failed] == "converged").all()
-    assert not found["stable"].values[failed].any()
-    assert found["boundary_epsilon"].max() <= 0.3
+    assert not dataset["stable"].values[failed].any()
+    assert dataset["boundary_epsilon"].max() <= 0.3
 
 
 def test_a_law_without_dynamics_has_no_boundary(numbers) -> None:
-    found = response_map("amontons", numbers, x=Axis("epsilon", 0.1, 0.4, 4), y=K)
+    dataset = response_map("amontons", numbers, x=Axis("epsilon", 0.1, 0.4, 4), y=K)
     np.testing.assert_allclose(
-        found["mu1"].values, 0.5 * found["epsilon"].values + 0 * found["mu1"]
+        dataset["mu1"].values, 0.5 * dataset["epsilon"].values + 0 * dataset["mu1"]
     )
-    assert found["stable"].values.all()
-    assert found.sizes["boundary_point"] == 0
+    assert dataset["stable"].values.all()
+    assert dataset.sizes["boundary_point"] == 0
 
 
 def test_inertia_and_damping_are_passed_on(numbers, monkeypatch) -> None:
@@ -145,13 +145,13 @@ def test_inertia_and_damping_are_passed_on(numbers, monkeypatch) -> None:
     monkeypatch.setattr(responses, "respond", note)
     x, y = Axis("M", "1 kg", "2 kg", 2), Axis("eta", 0.0, 500.0, 2)
     point = {"K": 2.2e5, "epsilon": 0.2, "inertia": 1}
-    found = response_map("elasto-plastic", numbers | point, x=x, y=y)
+    dataset = response_map("elasto-plastic", numbers | point, x=x, y=y)
     # Points with and without damping have equations of their own, and are asked for apart.
     assert [call["eta"].tolist() for call in asked] == [[0.0, 0.0], [500.0, 500.0]]
     for call in asked:
         assert call["M"].tolist() == [1.0, 2.0]
         assert (call["inertia"] == 1).all()
-    assert float(found["inertia"]) == 1.0
+    assert float(dataset["inertia"]) == 1.0
 
 
 def test_the_file_is_read_back_with_units(rigid, numbers, tmp_path) -> None:
@@ -231,13 +231,13 @@ def test_bad_questions(numbers, law, more, axes, parts) -> None:
 def test_an_axis_of_another_modulation(numbers, pmma) -> None:
     numbers = numbers | {"K": pmma.K}
     x, y = Axis("epsilon2", 0.0, 0.4, 3), Axis("epsilon", 0.2, 0.7, 2)
-    found = response_map("rice-ruina", numbers, x=x, y=y)
+    dataset = response_map("rice-ruina", numbers, x=x, y=y)
     # w = 1 + 0.7 cos t + 0.4 cos 2t: lowest where cos t = -0.4375, at 1 - 0.4 - 0.153 > 0.
-    assert found["converged"].all()
+    assert dataset["converged"].all()
     slider = asp.Slider(pmma.law("rice-ruina"), spring=pmma.K, load=pmma.W0)
     load = asp.loads.modulated([0.2, 0.7], load={2: (0.2, 0.0)})
     r = asp.periodic_response(slider, velocity=1e-6, frequency=120.0, modulation=load)
-    np.testing.assert_allclose(found["mu1"].sel(epsilon2=0.2), r.mu1, rtol=1e-8)
+    np.testing.assert_allclose(dataset["mu1"].sel(epsilon2=0.2), r.mu1, rtol=1e-8)
     lost = response_map("rice-ruina", numbers | {"epsilon2_phase": np.pi}, x=x, y=y)
     assert "lowest W/W0 of -0.1;" in str(lost["result"].values[1, 2])
     assert lost["converged"].sum() == 5

@@ -20,6 +20,7 @@ def drawn(method: str, count: int) -> SweepGrid:
         "K": {"from": 1e5, "to": 1e7, "spacing": "log"},
         "epsilon": {"from": 0.1, "to": 0.5},
         "W0": {"mean": 7.0, "std": 0.1},
+        "tilt": {"from": -0.1, "to": -0.001, "spacing": "log"},
     }
     axes = {"sample": {"draw": method, "count": count, "over": over}}
     return SweepGrid.of(SweepPlan(**FIXED, axes=axes, seed=5))
@@ -37,6 +38,7 @@ def test_draws_follow_their_distributions_and_need_no_earlier_ones(method: str) 
     assert all(np.array_equal(longer[name], whole[name]) for name in whole)
     uniform = np.log(whole["K"] / 1e5) / np.log(100)
     assert kstest(uniform, "uniform").pvalue > 1e-3
+    assert kstest(np.log(whole["tilt"] / -0.1) / np.log(0.01), "uniform").pvalue > 1e-3
     assert kstest((whole["W0"] - 7.0) / 0.1, "norm").pvalue > 1e-3
     assert abs(np.corrcoef(whole["epsilon"], uniform)[0, 1]) < 0.05
 

@@ -10,8 +10,8 @@ from references.closed_form_sweep import ClosedForm
 def closed_form(monkeypatch: pytest.MonkeyPatch) -> ClosedForm:
     from asperity.study import job
 
-    found = ClosedForm()
-    monkeypatch.setitem(SOLVES, "periodic", found)
+    solve = ClosedForm()
+    monkeypatch.setitem(SOLVES, "periodic", solve)
     monkeypatch.setenv("NPROC", "1")
     job._opened.cache_clear()
-    return found
+    return solve

@@ -216,10 +216,10 @@ def test_laws_from_a_file_and_a_module_reach_dask_workers_of_which_one_is_killed
     several = '[axes.law]\nvalues = ["my_law.py:Mine", "my_module:Mine"]'
     plan.write_text(PLAN.replace('law = "my_law.py:Mine"', "") + several)
     with local_cluster(2) as workers:
-        found = run_sweep(plan, out, workers=InClosedForm(workers, str(mark)))
+        progress = run_sweep(plan, out, workers=InClosedForm(workers, str(mark)))
     # The worker that made the mark died by SIGKILL in the middle of a task.
     assert mark.exists()
-    assert (found.points, found.lost) == (120, 0)
+    assert (progress.points, progress.lost) == (120, 0)
     run_sweep(plan, tmp_path / "whole.zarr", workers=ThisProcess())
     assert files_of(out) == files_of(tmp_path / "whole.zarr")
     assert open_store(out)["law"].values.tolist() == ["mine", "other"]

@@ -67,22 +67,22 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
     told: list[str] = []
     out = tmp_path / "s.zarr"
     run_sweep(plan(tmp_path, axes=axes), out, workers=ThisProcess(), log=told.append)
-    found = open_store(out)
-    assert found["data"].values.tolist() == ["a.csv", "b.csv", "short.csv"]
+    dataset = open_store(out)
+    assert dataset["data"].values.tolist() == ["a.csv", "b.csv", "short.csv"]
     # Weighted least squares: mean = mu0 - (B - A) ln(V/V0).
     columns = np.column_stack([np.ones_like(V), -np.log(V / PMMA.V0)])
     covariance = ERROR**2 * np.linalg.inv(columns.T @ columns)
     for i, mean in enumerate(means):
         (mu0, slope), (square,), *_ = np.linalg.lstsq(columns, mean)
-        at = found.isel(data=i)
+        at = dataset.isel(data=i)
         assert at["mu0_fit"].values == pytest.approx(mu0, rel=1e-6)
-        assert at["B_fit"].values == pytest.approx(slope + found["A"].values, rel=1e-5)
+        assert at["B_fit"].values == pytest.approx(slope + dataset["A"].values, rel=1e-5)
         assert at["B_se"].values == pytest.approx(np.sqrt(covariance[1, 1]), rel=1e-4)
         assert at["chi2"].values == pytest.approx(square / ERROR**2, rel=1e-5)
         assert at["p_value"].values == pytest.approx(chi2.sf(square / ERROR**2, 5), rel=1e-4)
     # Fewer data than parameters are no estimate.
     assert store_status(out).outcomes == {"converged": 4, "refused": 2}
-    assert np.isnan(found["B_fit"].sel(data="short.csv")).all()
+    assert np.isnan(dataset["B_fit"].sel(data="short.csv")).all()
     assert "must hold more data than free parameters" in told[0]
     # Names of files are texts in every format.
     for suffix in ("csv", "nc"):
@@ -90,7 +90,7 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
     names = pd.read_csv(tmp_path / "s.csv")["data"]
     assert names.tolist() == ["a.csv", "a.csv", "b.csv", "b.csv", "short.csv", "short.csv"]
     with xr.open_dataset(tmp_path / "s.nc") as exported:
-        assert exported["data"].values.tolist() == found["data"].values.tolist()
+        assert exported["data"].values.tolist() == dataset["data"].values.tolist()
     # Other readings in a file of the same name are another plan.
     write(tmp_path / "b.csv", 5)
     with pytest.raises(InputError, match=r"same plan, got settings\.files\.b\.csv = "):
@@ -104,24 +104,24 @@ def test_readings_drawn_at_true_values_scatter_as_the_standard_errors_say(tmp_pa
 
     def drawn(A: float, count: int) -> xr.Dataset:
         out = tmp_path / f"{A}.zarr"
-        found_plan = plan(
+        drawn_plan = plan(
             tmp_path,
             fit={"free": ("mu0", "B"), "starts": 1, "data": "a.csv"},
             parameters={"K": "1 N/um", "epsilon": 1e-6, "frequency": "120 Hz", "B": true},
             axes={"noise_seed": {"values": tuple(range(count))}, "A": {"values": (A,)}},
             outputs=("B_fit", "B_se", "chi2"),
         )
-        run_sweep(found_plan, out, workers=ThisProcess())
+        run_sweep(drawn_plan, out, workers=ThisProcess())
         return open_store(out).isel(A=0)
 
-    found = drawn(0.01, seeds)
-    pull = ((found["B_fit"] - true) / found["B_se"]).values
+    dataset = drawn(0.01, seeds)
+    pull = ((dataset["B_fit"] - true) / dataset["B_se"]).values
     low, high = chi2.ppf([1e-4, 1 - 1e-4], seeds)
     assert low < (pull**2).sum() < high
     low, high = chi2.ppf([1e-4, 1 - 1e-4], 5 * seeds)
-    assert low < found["chi2"].sum() < high
+    assert low < dataset["chi2"].sum() < high
     # One seed is one noise, whatever else varies.
-    assert drawn(0.012, 4)["chi2"].values == pytest.approx(found["chi2"].values[:4], rel=1e-4)
+    assert drawn(0.012, 4)["chi2"].values == pytest.approx(dataset["chi2"].values[:4], rel=1e-4)
 
 
 def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_the_table() -> None:

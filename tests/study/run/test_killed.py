@@ -89,11 +89,13 @@ def test_one_of_two_workers_is_killed(tmp_path: Path, whole: dict[str, bytes]) -
     out, mark = tmp_path / "s.zarr", tmp_path / "killed"
     told: list[str] = []
     with local_processes(2) as workers:
-        found = run_sweep(plan_of(), out, workers=InClosedForm(workers, str(mark)), log=told.append)
+        progress = run_sweep(
+            plan_of(), out, workers=InClosedForm(workers, str(mark)), log=told.append
+        )
     # The worker that made the mark died by SIGKILL in the middle of a task.
     assert mark.exists()
-    assert found.points == 60
+    assert progress.points == 60
     assert store_status(out).outcomes == {"converged": 36, "folded": 18, "stopped": 6}
     assert files_of(out) == whole
-    assert found.lost == 1
+    assert progress.lost == 1
     assert "died" in told[0]

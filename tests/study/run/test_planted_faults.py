@@ -48,14 +48,14 @@ def call(*arguments: object) -> Result:
 
 def content_of(store: Path, consolidated: bool) -> dict[str, Any]:
     """Everything that xarray reads: kinds, values to the last bit, and attributes."""
-    with xarray.open_zarr(store, consolidated=consolidated, chunks=None) as found:
+    with xarray.open_zarr(store, consolidated=consolidated, chunks=None) as dataset:
         variables = {
             str(name): (v.dims, v.dtype.str, v.values.tolist() if v.dtype.kind in "OUT" else
                         v.values.tobytes(), repr(v.attrs))
-            for name, v in found.variables.items()
+            for name, v in dataset.variables.items()
         }  # fmt: skip
         of_runs = ("runs", "seal")
-        return {**variables, "": {n: v for n, v in found.attrs.items() if n not in of_runs}}
+        return {**variables, "": {n: v for n, v in dataset.attrs.items() if n not in of_runs}}
 
 
 class Whole:

@@ -29,7 +29,7 @@ def sweep(out: Path, **fields: Any) -> Any:
 
 
 def test_periodic_responses_of_several_laws(tmp_path: Path) -> None:
-    found = sweep(
+    dataset = sweep(
         tmp_path / "s.zarr",
         parameters={"V": "1 um/s", "frequency": "120 Hz"},
         axes={
@@ -43,9 +43,9 @@ def test_periodic_responses_of_several_laws(tmp_path: Path) -> None:
             "epsilon": {"values": (0.1, 0.3, 0.5)},
         },
     )
-    assert found["law"].values.tolist() == ["rice-ruina", "linker-dieterich", "linker-dieterich"]
-    assert np.array_equal(found["alpha"], [np.nan, 0.02, 0.2], equal_nan=True)
-    assert found["K"].values == pytest.approx([0.9 * KC, 1.5 * KC], rel=1e-14)
+    assert dataset["law"].values.tolist() == ["rice-ruina", "linker-dieterich", "linker-dieterich"]
+    assert np.array_equal(dataset["alpha"], [np.nan, 0.02, 0.2], equal_nan=True)
+    assert dataset["K"].values == pytest.approx([0.9 * KC, 1.5 * KC], rel=1e-14)
     for i, law in enumerate((PMMA.law("rice-ruina"), PMMA.law("linker-dieterich"))):
         if i:
             law = type(law)(**{**vars(law), "alpha": 0.02})
@@ -54,8 +54,8 @@ def test_periodic_responses_of_several_laws(tmp_path: Path) -> None:
             slider, velocity=1e-6, epsilon=np.array([0.1, 0.3, 0.5]), frequency=120.0
         )
         for name in ("delta_mu", "mu1", "phase2"):
-            assert found[name][i].values == pytest.approx(getattr(alone, name), rel=1e-8)
-        assert np.array_equal(found["stable"][i].values == 1, alone.stable)
+            assert dataset[name][i].values == pytest.approx(getattr(alone, name), rel=1e-8)
+        assert np.array_equal(dataset["stable"][i].values == 1, alone.stable)
 
 
 def test_points_that_cannot_be_solved_say_why(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_points_that_cannot_be_solved_say_why(tmp_path: Path) -> None:
 
 
 def test_thresholds_without_modulation_are_the_closed_form(tmp_path: Path) -> None:
-    found = sweep(
+    dataset = sweep(
         tmp_path / "s.zarr",
         solve="threshold",
         law="elasto-plastic",
@@ -83,16 +83,16 @@ def test_thresholds_without_modulation_are_the_closed_form(tmp_path: Path) -> No
         axes={"lambda": {"values": ("0.1 um", "0.62 um")}, "B": {"values": (0.02, 0.026)}},
         threshold={"between": (0.5, 2.0), "scan": 5},
     )
-    lambda_, B = np.meshgrid(found["lambda"], found["B"], indexing="ij")
+    lambda_, B = np.meshgrid(dataset["lambda"], dataset["B"], indexing="ij")
     expected = PMMA.D0 / (PMMA.D0 + PMMA.A * lambda_)
-    assert found["threshold_ratio"].values == pytest.approx(expected, rel=1e-5)
+    assert dataset["threshold_ratio"].values == pytest.approx(expected, rel=1e-5)
     K = expected * (B - PMMA.A) * PMMA.W0 / PMMA.D0
-    assert found["K_threshold"].values == pytest.approx(K, rel=1e-5)
-    assert (found["bifurcation"] == 2).all()
+    assert dataset["K_threshold"].values == pytest.approx(K, rel=1e-5)
+    assert (dataset["bifurcation"] == 2).all()
 
 
 def test_transients_become_named_numbers(tmp_path: Path) -> None:
-    found = sweep(
+    dataset = sweep(
         tmp_path / "s.zarr",
         solve="transient",
         law="rice-ruina",
@@ -109,10 +109,10 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
         },
     )
     steady = PMMA.mu0 - (PMMA.B - PMMA.A) * np.log(np.array([1e-6, 2e-6]) / PMMA.V0)
-    assert found["before"].values == pytest.approx(steady[0], abs=1e-9)
-    assert found["after"].values == pytest.approx(steady[1], abs=1e-5)
+    assert dataset["before"].values == pytest.approx(steady[0], abs=1e-9)
+    assert dataset["after"].values == pytest.approx(steady[1], abs=1e-5)
     # The direct effect of the step, at most A ln 2, less for a soft spring.
-    peak = found["peak"].values - steady[0]
+    peak = dataset["peak"].values - steady[0]
     assert (peak > 0).all()
     assert (peak < PMMA.A * np.log(2)).all()
     assert peak[1] > peak[0]  # the lighter slider is held by the stiffer spring, K/Kc

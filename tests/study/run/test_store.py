@@ -41,22 +41,22 @@ def run(out: Path, **options: Any) -> Any:
 def test_numbers_labels_units_and_reasons(tmp_path: Path, closed_form: ClosedForm) -> None:
     summary = run(tmp_path / "s.zarr")
     assert (summary.points, summary.failed, summary.solved) == (POINTS, FAILED, POINTS)
-    with open_store(tmp_path / "s.zarr") as found:
-        K, epsilon = np.meshgrid(found["K"], found["epsilon"], indexing="ij")
+    with open_store(tmp_path / "s.zarr") as dataset:
+        K, epsilon = np.meshgrid(dataset["K"], dataset["epsilon"], indexing="ij")
         good = (K != 3.0) & (epsilon <= 0.9)
-        assert np.array_equal(found["mu1"].values[good], (epsilon * K)[good])
-        assert np.isnan(found["mu2"].values[~good]).all()
-        assert found["K"].attrs["units"] == "N/m"
-        assert float(found["A"]) == 0.013
+        assert np.array_equal(dataset["mu1"].values[good], (epsilon * K)[good])
+        assert np.isnan(dataset["mu2"].values[~good]).all()
+        assert dataset["K"].attrs["units"] == "N/m"
+        assert float(dataset["A"]) == 0.013
         words = dict(
             zip(
-                found["outcome"].attrs["flag_values"],
-                found["outcome"].attrs["flag_meanings"].split(),
+                dataset["outcome"].attrs["flag_values"],
+                dataset["outcome"].attrs["flag_meanings"].split(),
                 strict=True,
             )
         )
-        assert words[int(found["outcome"].sel(K=3.0)[0])] == "folded"
-        last = found.isel(K=0, epsilon=-1)
+        assert words[int(dataset["outcome"].sel(K=3.0)[0])] == "folded"
+        last = dataset.isel(K=0, epsilon=-1)
         assert reasons(last["outcome"], last["detail"])[()] == (
             "the transient stopped before its end, at 2.5 s"
         )
@@ -82,10 +82,10 @@ def test_another_reader_needs_neither_asperity_nor_xarray(
 def test_xarray_opens_it_as_it_is(tmp_path: Path, closed_form: ClosedForm) -> None:
     run(tmp_path / "s.zarr")
     # Warnings are errors here: nothing is to be explained to the reader first.
-    found = xarray.open_zarr(tmp_path / "s.zarr", chunks=None)
-    assert set(found.dims) == {"K", "epsilon", "K_chunk", "epsilon_chunk"}
-    assert {"A", "B", "law", "frequency"} <= set(found.coords)
-    assert str(found["law"].values) == "rice-ruina"
+    dataset = xarray.open_zarr(tmp_path / "s.zarr", chunks=None)
+    assert set(dataset.dims) == {"K", "epsilon", "K_chunk", "epsilon_chunk"}
+    assert {"A", "B", "law", "frequency"} <= set(dataset.coords)
+    assert str(dataset["law"].values) == "rice-ruina"
 
 
 def test_a_chunk_without_one_number_is_a_chunk_that_is_done(
@@ -343,9 +343,9 @@ def test_an_axis_whose_last_chunk_was_not_full_is_extended(
         break
     assert killed > 2
     run(out, plan=plan(21), extend_store=True)
-    with open_store(out) as found:
-        assert np.array_equal(found["epsilon"], values)
-        assert np.array_equal(found["mu1"][:, 0], values)
+    with open_store(out) as dataset:
+        assert np.array_equal(dataset["epsilon"], values)
+        assert np.array_equal(dataset["mu1"][:, 0], values)
     assert store_status(out).done == 21
 
 
@@ -427,11 +427,11 @@ def test_an_error_of_the_solver_is_the_outcome_of_its_point(
 def test_statistics_are_those_of_all_numbers(tmp_path: Path, closed_form: ClosedForm) -> None:
     run(tmp_path / "s.zarr")
     values = open_store(tmp_path / "s.zarr")["mu1"].values
-    found = summary_statistics(tmp_path / "s.zarr")["mu1"]
-    assert found["count"] == POINTS - FAILED
-    assert found["mean"] == pytest.approx(np.nanmean(values), rel=1e-14)
-    assert found["std"] == pytest.approx(np.nanstd(values), rel=1e-14)
-    assert (found["min"], found["max"]) == (np.nanmin(values), np.nanmax(values))
+    statistics = summary_statistics(tmp_path / "s.zarr")["mu1"]
+    assert statistics["count"] == POINTS - FAILED
+    assert statistics["mean"] == pytest.approx(np.nanmean(values), rel=1e-14)
+    assert statistics["std"] == pytest.approx(np.nanstd(values), rel=1e-14)
+    assert (statistics["min"], statistics["max"]) == (np.nanmin(values), np.nanmax(values))
 
 
 def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedForm) -> None:
@@ -442,11 +442,11 @@ def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedFo
     values = open_store(out)["mu1"].values
     for suffix in ("nc", "csv", "parquet"):
         assert export_store(out, tmp_path / f"s.{suffix}") == POINTS
-    with xarray.open_dataset(tmp_path / "s.nc") as found:
-        assert np.array_equal(found["mu1"].values, values, equal_nan=True)
-        assert found["mu1"].attrs["units"] == "1"
-        assert str(found["law"].values) == "rice-ruina"
-        assert set(open_store(out).coords) == set(found.coords)
+    with xarray.open_dataset(tmp_path / "s.nc") as dataset:
+        assert np.array_equal(dataset["mu1"].values, values, equal_nan=True)
+        assert dataset["mu1"].attrs["units"] == "1"
+        assert str(dataset["law"].values) == "rice-ruina"
+        assert set(open_store(out).coords) == set(dataset.coords)
     for table in (pd.read_csv(tmp_path / "s.csv"), pd.read_parquet(tmp_path / "s.parquet")):
         both = table.merge(pd.DataFrame({"K": [1.0, 2.0, 3.0]}), on="K")
         wide = both.pivot_table(index="K", columns="epsilon", values="mu1", dropna=False)

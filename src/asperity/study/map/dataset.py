@@ -47,11 +47,7 @@ def as_dataset(
         data[name] = (dims, values.reshape(plane.shape), OUTPUTS[name].attributes)
     data |= _boundary(plane, boundary)
     for side, values in _critical_stiffness_along(plane).items():
-        data["critical_stiffness"] = (
-            side,
-            values,
-            _described("N/m", "K_c of unmodulated sliding"),
-        )
+        data["critical_stiffness"] = (side, values, _described("N/m", "K_c of unmodulated sliding"))
     return xarray.Dataset(
         data, coords=_coordinates(plane, origins), attrs=_global_attributes(plane, boundary)
     )

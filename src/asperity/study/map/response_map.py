@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.errors import InputError, require
 from asperity.laws import get_law
-from asperity.operating_point import (
-    SourcedNumber,
-    numbers_for,
-    refuse_foreign,
-    sourced_numbers,
-)
+from asperity.operating_point import SourcedNumber, numbers_for, refuse_foreign, sourced_numbers
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import FilePath, counted, typed
@@ -139,42 +134,43 @@ def write_map(
     plane, origins = _plane(law, numbers, x, y)
     target = output_file(out, example="map.nc")
     axes = {name: dataclasses.asdict(getattr(plane, name)) for name in ("x", "y")}
-    kept = UnfinishedText(target, {"law": plane.law.name, "numbers": dict(plane.fixed), **axes})
-    kept.start(resume)
-    with kept.interruptible("points", x.count * y.count):
-        grid = _solved(plane, kept, progress, block)
+    inputs = {"law": plane.law.name, "numbers": dict(plane.fixed), **axes}
+    unfinished = UnfinishedText(target, inputs)
+    unfinished.start(resume)
+    with unfinished.interruptible("points", x.count * y.count):
+        grid = _solved(plane, unfinished, progress, block)
         dataset = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
         with written_file(target) as file:
             dataset.to_netcdf(file, engine="h5netcdf")
-    kept.discard()
+    unfinished.discard()
     return dataset
 
 
 def _solved(
     plane: MapPlane,
-    kept: UnfinishedText | None,
+    unfinished: UnfinishedText | None,
     progress: Callable[[int, int], None] | None,
     chunk: int,
 ) -> Answers:
-    """Responses at the points of the grid; `kept` has a line for each point of finished chunks."""
+    """Responses at the points of the grid; `unfinished` has a line for each point solved before."""
     nodes = plane.nodes()
     grid = Answers.empty(OUTPUTS, len(nodes))
-    if kept is not None:
-        for i, row in enumerate(csv.reader(kept.text().splitlines())):
+    if unfinished is not None:
+        for i, row in enumerate(csv.reader(unfinished.text().splitlines())):
             *numbers, outcome, detail = row
             for name, cell in zip(OUTPUTS, numbers, strict=True):
                 grid.numbers[name][i] = float(cell)
             grid.outcome[i], grid.detail[i] = int(outcome), float(detail)
 
-    done = 0 if kept is None else kept.rows
+    done = 0 if unfinished is None else unfinished.rows
     advance = counted(progress, len(nodes), done)
     advance(0)
     for start in range(done, len(nodes), chunk):
         part = plane.solve(nodes[start : start + chunk], advance)
         grid.put(slice(start, start + chunk), part)
-        if kept is not None:
+        if unfinished is not None:
             columns: list[Any] = [*part.numbers.values(), part.outcome, part.detail]
-            kept.append_rows(list(zip(*(c.tolist() for c in columns), strict=True)))
+            unfinished.append_rows(list(zip(*(c.tolist() for c in columns), strict=True)))
     return grid
 
 

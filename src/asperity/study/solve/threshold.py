@@ -64,8 +64,7 @@ class ThresholdSolve(SolveKind):
         numbers = {
             "K_threshold": searched["K"],
             "threshold_ratio": searched["K"] / critical,
-            "mode_frequency": searched["turn"] * values["frequency"],
-            "bifurcation": searched["bifurcation"],
+            **searched.numbers,
         }
         kept = {name: numbers[name] for name in record["outputs"]}
         answers.put(sound, Answers(kept, searched.outcome, searched.detail / critical))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from glob import glob
 from pathlib import Path
 from typing import Any, Literal
 
@@ -189,13 +190,10 @@ class SweepStore:
 
     def sweep_orphans(self) -> int:
         """Remove half-written files of killed processes; returns their number."""
-        count = 0
-        for folder, _, names in os.walk(self.path):
-            for name in names:
-                if name.endswith(".partial"):
-                    Path(folder, name).unlink(missing_ok=True)
-                    count += 1
-        return count
+        orphans = glob("**/*.partial", root_dir=self.path, recursive=True)
+        for name in orphans:
+            (self.path / name).unlink(missing_ok=True)
+        return len(orphans)
 
     # Attributes
 
