@@ -208,17 +208,16 @@ def _list(items: Sequence[str], kind: str) -> str:
 
 
 def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:
-    rows = [(rich(h.claim), rich(h.result), _standing(h) + _basis(h, claims)) for h in headlines]
+    rows = []
+    for h in headlines:
+        kind = "undecided" if h.standing == "undecided" else "differs"
+        chip = _chip("reproduced" if h.holds else kind, h.standing)
+        rows.append((rich(h.claim), rich(h.result), chip + _basis(h, claims)))
     heads = {"The paper concludes": "statement", "Computed here": "computed", "Holds?": "verdict"}
     return (
         "<h3>The paper’s conclusions</h3>"
         f"{table(heads, rows, 'Conclusions of the paper', 'ledger brief')}"
     )
-
-
-def _standing(headline: Headline) -> str:
-    kind = "undecided" if headline.standing == "undecided" else "differs"
-    return _chip("reproduced" if headline.holds else kind, headline.standing)
 
 
 def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
@@ -247,11 +246,11 @@ def _counted_apart(claims: Sequence[Claim]) -> str:
         ("arithmetic", "calculation with printed numbers", "calculations with printed numbers"),
         ("identity", "identity", "identities"),
     ):
-        number = counts([c for c in claims if c.kind == kind])
-        total, others = sum(number.values()), sum(number.values()) - number["reproduced"]
-        if total:
-            name = one if total == 1 else several
-            parts.append(f"{total} {name}" + f" ({others} not as stated)" * bool(others))
+        verdicts = [claim.verdict for claim in claims if claim.kind == kind]
+        others = len(verdicts) - verdicts.count("reproduced")
+        if verdicts:
+            name = one if len(verdicts) == 1 else several
+            parts.append(f"{len(verdicts)} {name}" + f" ({others} not as stated)" * bool(others))
     return f"Counted apart: {', '.join(parts)}." if parts else ""
 
 
