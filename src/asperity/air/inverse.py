@@ -138,7 +138,9 @@ def _invert(
     W0, M, lambda_z = machine
     wanted = as_real("inverse.ratio", ratio, "dimensionless")
     target = float(np.log(wanted))
-    lower, upper = _limits(bracket)
+    ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
+    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
+    require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
 
     def log_fractions(u: Any) -> Any:
         chosen: AirLayer = replace(layer, **{field: np.exp(u)})
@@ -147,7 +149,7 @@ def _invert(
     def log_fraction(u: float) -> float:
         return float(log_fractions(u))
 
-    u = np.linspace(np.log(lower), np.log(upper), _SCAN)
+    u = np.linspace(*np.log(ends), _SCAN)
     scan = log_fractions(u)
     knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
     roots = _roots(log_fraction, np.array(knots), target)
@@ -157,17 +159,10 @@ def _invert(
     text = "found"
     if not result:
         text = (
-            f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {wanted:g}; "
+            f"no {field} between {ends[0]:g} and {ends[1]:g} m gives eps_eff/eps = {wanted:g}; "
             f"there it ranges from {lowest:.6g} to {highest:.6g}"
         )
     return InverseResult(result, lowest, highest, text)
-
-
-def _limits(bracket: ArrayLike) -> tuple[float, float]:
-    ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
-    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
-    require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
-    return float(ends[0]), float(ends[1])
 
 
 def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[float]:

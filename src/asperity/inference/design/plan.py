@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -31,7 +30,7 @@ from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.toml_file import toml_content
-from asperity.questions.design import MOST, Design, Noise, Range
+from asperity.questions.design import MOST, Design, Range
 from asperity.questions.record import require_unit as with_unit, units_required
 from asperity.units import to_radians, to_si
 
@@ -272,32 +271,28 @@ def _levels(name: str, given: Range, parameter: Parameter) -> Float:
 
 
 def _noise(question: Design) -> dict[str, NoiseLevel]:
-    """Standard uncertainties of a reading, by observable."""
+    """Standard uncertainties of a reading, by observable, in the order of `OBSERVABLES`."""
     for name in question.noise:
         if name not in OBSERVABLES:
             rule = "be of observables"
             raise InputError("noise", rule, f"'{name}'", closest(name, OBSERVABLES))
-    return {n: _level(n, question.noise[n]) for n in OBSERVABLES if n in question.noise}
-
-
-def _level(name: str, given: Noise) -> NoiseLevel:
-    """Standard uncertainty of one observable."""
-    label = f"noise.{name}"
-    phase = name.startswith("phase")
-    rule = "be absolute"
-    require(not phase or not given.relative, label, rule, "a relative part", "give an angle")
-    absolute = given.absolute
-    if phase and not isinstance(absolute, str) and absolute != 0:
-        rule = "be an angle in rad or deg, with its unit"
-        raise InputError(label, rule, repr(absolute), "write it like '1 deg' or '20 mrad'")
-    a = to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label)
-    r = to_si(given.relative, "dimensionless", f"{label}.relative")
-    a, r = float(a), float(r)
-    if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
-        worst = max(a, r) if min(a, r) >= 0 else min(a, r)
-        rule = "be positive"
-        raise InputError(label, rule, f"{worst:g}", "give the standard uncertainty of one reading")
-    return NoiseLevel(a, r)
+    levels = {}
+    for name in (name for name in OBSERVABLES if name in question.noise):
+        absolute, relative = question.noise[name].absolute, question.noise[name].relative
+        label, phase = f"noise.{name}", name.startswith("phase")
+        rule = "be absolute"
+        require(not phase or not relative, label, rule, "a relative part", "give an angle")
+        if phase and not isinstance(absolute, str) and absolute != 0:
+            rule = "be an angle in rad or deg, with its unit"
+            raise InputError(label, rule, repr(absolute), "write it like '1 deg' or '20 mrad'")
+        a = float(to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label))
+        r = float(to_si(relative, "dimensionless", f"{label}.relative"))
+        if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
+            worst = max(a, r) if min(a, r) >= 0 else min(a, r)
+            advice = "give the standard uncertainty of one reading"
+            raise InputError(label, "be positive", f"{worst:g}", advice)
+        levels[name] = NoiseLevel(a, r)
+    return levels
 
 
 def _hypothesis(
@@ -319,10 +314,13 @@ def _hypothesis(
         {n: v for n, v in _numbers(question, field, every).items() if n in known}
         for field in ("values", "fixed")
     )
-    for name, field in itertools.chain(((n, "fixed") for n in fixed), ((n, "free") for n in free)):
-        rule = "not have what ranges has"
-        advice = "drop one" if field == "fixed" else "it is set, not fitted"
-        require(name not in table.points, field, rule, f"'{name}'", advice)
+    for field, names, advice in (
+        ("fixed", fixed, "drop one"),
+        ("free", free, "it is set, not fitted"),
+    ):
+        for name in names:
+            rule = "not have what ranges has"
+            require(name not in table.points, field, rule, f"'{name}'", advice)
     for name in given:
         rule = "be given once"
         require(name not in fixed or name in free, f"values.{name}", rule, "two", "drop one")
