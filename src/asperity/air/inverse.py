@@ -26,8 +26,6 @@ from asperity.parameters.arguments import typed
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
 #: monotone over decades, so that a few points a decade reveal it.
 _SCAN = 513
-#: Differences of ln(eps_eff/eps) below this are round-off on a plateau, not an extremum.
-_FLAT = 1e-12
 #: At a root the fraction must agree with the measured one to this relative accuracy: at a jump of
 #: "free-molecular" the difference changes sign without a root.
 _CLOSE = 1e-8
@@ -170,7 +168,7 @@ def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[
     from scipy.optimize import minimize_scalar
 
     slope = np.diff(scan)
-    (steps,) = np.nonzero(np.abs(slope) > _FLAT)
+    (steps,) = np.nonzero(slope)
     result = []
     for left, right in pairwise(steps):
         if slope[left] * slope[right] < 0:
@@ -191,12 +189,11 @@ def _roots(function: Callable[[float], float], knots: Float, target: float) -> l
     from scipy.optimize import brentq
 
     result: list[float] = []
-    excess = [function(k) - target for k in knots]
-    for i in range(len(knots) - 1):
-        if excess[i] * excess[i + 1] > 0:
+    for low, high in pairwise(knots):
+        if (function(low) - target) * (function(high) - target) > 0:
             continue
-        root = float(brentq(lambda x: function(x) - target, knots[i], knots[i + 1], xtol=1e-15))
-        new = not result or root - result[-1] > _FLAT
-        if new and abs(function(root) - target) < _CLOSE:
+        root = float(brentq(lambda x: function(x) - target, low, high, xtol=1e-15))
+        # A root at a knot is that of the pieces on both sides.
+        if root not in result and abs(function(root) - target) < _CLOSE:
             result.append(root)
     return result

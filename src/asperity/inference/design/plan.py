@@ -314,13 +314,11 @@ def _hypothesis(
         {n: v for n, v in _numbers(question, field, every).items() if n in known}
         for field in ("values", "fixed")
     )
-    for field, names, advice in (
-        ("fixed", fixed, "drop one"),
-        ("free", free, "it is set, not fitted"),
-    ):
-        for name in names:
-            rule = "not have what ranges has"
-            require(name not in table.points, field, rule, f"'{name}'", advice)
+    rule = "not have what ranges has"
+    for name in fixed:
+        require(name not in table.points, "fixed", rule, f"'{name}'", "drop one")
+    for name in free:
+        require(name not in table.points, "free", rule, f"'{name}'", "it is set, not fitted")
     for name in given:
         rule = "be given once"
         require(name not in fixed or name in free, f"values.{name}", rule, "two", "drop one")
