@@ -62,7 +62,7 @@ def build_page(
     """
     about, known = paper.contents.paper, {claim.id: claim for claim in claims}
     pictures = {figure.name: _picture(figure, folder) for _, figures in shown for figure in figures}
-    summary = "\n".join(_paragraph(one, known, pictures) for one in paper.contents.summary)
+    summary = "\n".join(_paragraph(words, known, pictures) for words in paper.contents.summary)
     brief = f'<div class="summary">\n{summary}\n</div>\n{_conclusions(headlines, known)}'
     parts = {
         "In brief": ("brief", brief),
@@ -97,12 +97,12 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
     kinds = {"agrees": "reproduced", "disagrees": "differs", "undecided": "undecided"}
     rows = [
         (
-            rich(one.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
-            rich(f"{one.observable}, {one.law}".lstrip(", ")),
-            f"{one.chi_squared:.4g} for {one.points}, p = {one.p_value:.2g}",
-            _chip(kinds[one.verdict], one.verdict),
+            rich(curve.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
+            rich(f"{curve.observable}, {curve.law}".lstrip(", ")),
+            f"{curve.chi_squared:.4g} for {curve.points}, p = {curve.p_value:.2g}",
+            _chip(kinds[curve.verdict], curve.verdict),
         )
-        for one in agreement
+        for curve in agreement
     ]
     heads = {"Points": "statement", "Quantity": "statement", "χ²": "computed", "Verdict": "verdict"}
     return (
@@ -241,7 +241,7 @@ def counts(claims: Sequence[Claim]) -> dict[str, int]:
 def _counted_apart(claims: Sequence[Claim]) -> str:
     """How many claims are no tests, in a sentence; empty if all are."""
     parts = []
-    for kind, one, several in (
+    for kind, singular, plural in (
         ("fit", "fit", "fits"),
         ("arithmetic", "calculation with printed numbers", "calculations with printed numbers"),
         ("identity", "identity", "identities"),
@@ -249,7 +249,7 @@ def _counted_apart(claims: Sequence[Claim]) -> str:
         verdicts = [claim.verdict for claim in claims if claim.kind == kind]
         others = len(verdicts) - verdicts.count("reproduced")
         if verdicts:
-            name = one if len(verdicts) == 1 else several
+            name = singular if len(verdicts) == 1 else plural
             parts.append(f"{len(verdicts)} {name}" + f" ({others} not as stated)" * bool(others))
     return f"Counted apart: {', '.join(parts)}." if parts else ""
 

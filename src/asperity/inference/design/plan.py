@@ -224,8 +224,7 @@ def _known(law: type[Law]) -> dict[str, Parameter]:
 
 def _quantity(value: Any, parameter: Parameter, label: str) -> float:
     """A value of a parameter in SI, checked by the rule of the parameter."""
-    with_unit(value, parameter.kind, label)
-    return float(parameter.check(to_si(value, parameter.kind, label), label))
+    return float(parameter.check(with_unit(value, parameter.kind, label), label))
 
 
 def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> dict[str, float]:
