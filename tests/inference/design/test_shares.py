@@ -25,10 +25,10 @@ def polynomial(degree, interest=None, x=X):
 
 
 def shares_at(points, shares, x=X):
-    found = np.zeros(x.size)
+    whole = np.zeros(x.size)
     for point, share in zip(points, shares, strict=True):
-        found[np.argmin(np.abs(x - point))] = share
-    return found
+        whole[np.argmin(np.abs(x - point))] = share
+    return whole
 
 
 @pytest.mark.parametrize(
@@ -44,9 +44,9 @@ def shares_at(points, shares, x=X):
 )
 def test_shares_are_those_of_the_closed_form(degree, interest, points, shares):
     criterion = polynomial(degree, interest)
-    found = optimal_shares(criterion, np.ones(X.size))
-    np.testing.assert_allclose(found.shares, shares_at(points, shares), atol=0.01)
-    assert found.efficiency >= 0.999
+    optimum = optimal_shares(criterion, np.ones(X.size))
+    np.testing.assert_allclose(optimum.shares, shares_at(points, shares), atol=0.01)
+    assert optimum.efficiency >= 0.999
 
 
 def test_the_bound_of_the_equivalence_theorem_holds_and_is_reached_at_the_optimum_only():
@@ -85,8 +85,8 @@ def test_cost_of_readings_moves_shares_to_the_dear_points():
     # Slope of a line: the variance c1/w1 + c2/w2 is smallest with shares as the roots of the costs.
     criterion = polynomial(1, [1], np.array([-1.0, 1.0]))
     cost = np.array([1.0, 9.0])
-    found = optimal_shares(criterion, 1000 / cost)
-    np.testing.assert_allclose(found.shares, [0.25, 0.75], atol=0.01)
+    optimum = optimal_shares(criterion, 1000 / cost)
+    np.testing.assert_allclose(optimum.shares, [0.25, 0.75], atol=0.01)
 
 
 def textbook(x):
@@ -99,11 +99,11 @@ def textbook(x):
 def test_textbook_case_of_two_laws():
     x = np.linspace(-1, 1, 2001)
     criterion, truth, basis = textbook(x)
-    found = optimal_shares(criterion, np.ones(x.size))
-    support = np.flatnonzero(found.shares > 0.005)
+    optimum = optimal_shares(criterion, np.ones(x.size))
+    support = np.flatnonzero(optimum.shares > 0.005)
     groups = np.split(support, np.flatnonzero(np.diff(support) > 20) + 1)
-    shares = [found.shares[g].sum() for g in groups]
-    centres = [found.shares[g] @ x[g] / found.shares[g].sum() for g in groups]
+    shares = [optimum.shares[g].sum() for g in groups]
+    centres = [optimum.shares[g] @ x[g] / optimum.shares[g].sum() for g in groups]
     np.testing.assert_allclose(centres, [-1, -0.669, 0.144, 0.957], atol=0.01)
     np.testing.assert_allclose(shares, [0.253, 0.428, 0.247, 0.072], atol=0.01)
     # The square of the best uniform approximation by a parabola, a linear programme.
@@ -114,7 +114,7 @@ def test_textbook_case_of_two_laws():
         b_ub=np.concatenate([truth, -truth]),
         bounds=[(None, None)] * 3 + [(0, None)],
     )
-    assert criterion.value(found.shares) == pytest.approx(best.fun**2, rel=2e-3)
+    assert criterion.value(optimum.shares) == pytest.approx(best.fun**2, rel=2e-3)
     assert best.fun**2 == pytest.approx(1.087e-3, rel=1e-3)
 
 
