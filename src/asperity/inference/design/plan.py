@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -174,12 +174,15 @@ def _checked(question: Design, name: str) -> DesignPlan:
     # A table with the ends of all axes stands for the candidates.
     ends = {n: np.array([levels.min(), levels.max()]) for n, levels in axes.items()}
     table = LockInTable(name, ends, {}, {})
-    truth = _hypothesis(question, law, law, question.free, material, table)
+    rival_law = None if question.rival is None else _law(question.rival, "rival")
+    # Numbers of a plan may be of either law.
+    every = known if rival_law is None else {**_known(rival_law), **known}
+    truth = _hypothesis(question, law, every, question.free, material, table)
     rival = None
-    if question.rival is not None:
-        rival_law = _law(question.rival, "rival")
+    if rival_law is not None:
         free = question.rival_free or tuple(n for n in truth.names if n in _known(rival_law))
-        rival = _hypothesis(question, rival_law, law, free, material, table)
+        of_truth = () if rival_law is law else known
+        rival = _hypothesis(question, rival_law, every, free, material, table, of_truth)
         holds = rival_law is not law or not set(truth.names) <= set(rival.names)
         rule, got = "differ from the law", f"{law.name} with the same free parameters"
         require(holds, "rival", rule, got, "name another law, or leave one out in rival_free")
@@ -297,18 +300,19 @@ def _noise(question: Design) -> dict[str, NoiseLevel]:
 def _hypothesis(
     question: Design,
     law: type[Law],
-    first: type[Law],
+    every: Mapping[str, Parameter],
     free: Sequence[str],
     material: Material | None,
     table: LockInTable,
+    of_truth: Collection[str] = (),
 ) -> Objective:
     """A law with its free and fixed parameters, without data.
 
-    `first` says whether this is the law of the plan, which has the values of the plan. `table`
-    stands for the candidates.
+    The numbers of the plan are of parameters in `every`. An expected value of a parameter that is
+    not free is a fixed number; but those of `of_truth`, the parameters of another law that the
+    readings follow, say nothing about this law. `table` stands for the candidates.
     """
     known = _known(law)
-    every = {**known, **_known(first)}
     given, fixed = (
         {n: v for n, v in _numbers(question, field, every).items() if n in known}
         for field in ("values", "fixed")
@@ -321,7 +325,7 @@ def _hypothesis(
     for name in given:
         rule = "be given once"
         require(name not in fixed or name in free, f"values.{name}", rule, "two", "drop one")
-        if name not in free and first is law:
+        if name not in free and name not in of_truth:
             fixed[name] = given[name]
     start = start_values(law, free, {n: v for n, v in given.items() if n in free}, material)
     if "eps_ratio" in free:
