@@ -79,6 +79,7 @@ def test_the_jump_of_the_free_molecular_model_is_no_solution():
     ("change", "message"),
     [
         ({"ratio": 0.0}, "inverse.ratio must be positive, got 0;"),
+        ({"ratio": [[0.4], [0.5, 0.6]]}, "inverse.ratio must"),
         ({"ratio": [0.4, 0.5]}, "inverse.arguments must be single numbers, got an array of shape"),
         (
             {"bracket": (1.0, 1e-3)},

@@ -132,9 +132,10 @@ def _invert(
     bracket: ArrayLike,
 ) -> InverseResult:
     """Solutions of the field of the layer; `machine` is W0, M and lambda_z."""
-    _check_single(ratio, frequency, layer, *machine)
     W0, M, lambda_z = machine
     wanted = as_real("inverse.ratio", ratio, "dimensionless")
+    frequency = as_real("inverse.frequency", frequency, "frequency", "not negative")
+    _check_single(wanted, frequency, layer, *machine)
     target = float(np.log(wanted))
     ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
     rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
@@ -147,7 +148,7 @@ def _invert(
     def log_fraction(u: float) -> float:
         return float(log_fractions(u))
 
-    u = np.linspace(*np.log(ends), _SCAN)
+    u = np.linspace(np.log(ends[0]), np.log(ends[1]), _SCAN)
     scan = log_fractions(u)
     knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
     roots = _roots(log_fraction, np.array(knots), target)

@@ -43,7 +43,7 @@ from asperity.ledger.claims import (
 )
 from asperity.ledger.contents import Contents, read_contents
 from asperity.ledger.figures import FiguresFile, PaperFigure, Section, TabFigure, figure_words
-from asperity.parameters.arguments import of_type, shown
+from asperity.parameters.arguments import of_type, shown, typed
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -180,6 +180,7 @@ def available() -> dict[str, str]:
     return papers
 
 
+@typed
 def find_paper(name: str | None = None) -> Paper:
     """A paper by its name; without a name the first in alphabetical order.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.inference import plan_of, read_plan
+from asperity.inference import design, plan_of, read_plan
 from asperity.inference.design.plan import expected_values
 
 PLAN = {
@@ -164,6 +164,11 @@ def test_a_mistake_is_one_sentence(changes, message):
     assert message in str(raised.value)
     assert "plan." not in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_a_number_of_synthetic_sets_below_zero_is_refused():
+    with pytest.raises(InputError, match="simulate must be a whole number of at least 0"):
+        design(PLAN, simulate=-1)
 
 
 def test_a_file_is_named_by_its_keys(tmp_path):

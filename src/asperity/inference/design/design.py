@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, typed
 
 
 @dataclass(frozen=True)
@@ -297,7 +297,7 @@ _SAME = 1e-12
 def design(
     plan: DesignPlan | Mapping[str, Any] | str | Path,
     *,
-    simulate: int = 0,
+    simulate: Annotated[int, at_least(0)] = 0,
     progress: Progress | None = None,
 ) -> Design:
     """Operating points that measure parameters or exclude a law best.

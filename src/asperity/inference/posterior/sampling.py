@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, wait
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
+from typing import Annotated, Any
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +25,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.outputs import Interrupted
-from asperity.parameters.arguments import counted, typed
+from asperity.parameters.arguments import at_least, counted, typed
 
 #: Logarithm of a density as a function of z and of arrays.
 LogDensity = Callable[[Array, Any], Array]
@@ -52,7 +52,7 @@ def sample_posterior(
     *,
     chains: int = 4,
     draws: int = 1000,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Posterior:
