@@ -257,10 +257,14 @@ def compare(
                 mine["start"] = {n: before[name].values[n] for n in names}
                 most = _STARTS_WITHOUT_OUTLIERS
                 mine["starts"] = min(most, options.get("starts", most))
-            part = {"progress": lambda done, total, k=k: report(k + done / total)}
-            internal = {"bare": True, "simpler": list(done.values()), "check_stiffness": False}
+            internal: dict[str, Any] = {
+                "bare": True,
+                "simpler": list(done.values()),
+                "check_stiffness": False,
+                "progress": lambda done, total, k=k: report(k + done / total),
+            }
             try:
-                done[name] = fit(data, name, names, **internal, **part, **{**options, **mine})
+                done[name] = fit(data, name, names, **internal, **{**options, **mine})
             except UnfittableLawError as error:
                 not_compared[name] = str(error)
             report(k + 1)
