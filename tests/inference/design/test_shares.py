@@ -69,7 +69,8 @@ def test_derivatives_are_those_of_the_value():
         Determinant(draws, np.zeros((2, 3, 3)), [1]),
         textbook(X)[0],
     ):
-        step = 1e-5
+        # Round-off of the sum of squares, 31, over the step is 1e-10; the derivative is 9e-4.
+        step = 1e-4
         i = 7
         more, less = n.copy(), n.copy()
         more[i] += step
@@ -150,3 +151,15 @@ def test_even_grid_of_a_line_needs_nine_fifths_of_the_readings():
     assert times_fewer(criterion, grid.readings(cost, 4), criterion.value(design)) == pytest.approx(
         9 / 5, rel=1e-5
     )
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0])
+def test_a_rival_that_gives_the_same_readings_has_no_misfit(shift):
+    """Its residuals are zero, or vanish when its parameters are fitted."""
+    jacobian = np.random.default_rng(0).normal(size=(9, 2, 2))
+    residual = jacobian @ np.full(2, shift)
+    criterion = Misfit(residual, jacobian, np.zeros(0), np.zeros((0, 2)))
+    for n in (np.ones(9), np.eye(9)[0]):
+        assert 0 <= criterion.value(n) < 1e-9
+        np.testing.assert_allclose(criterion.gradient(n), 0, atol=1e-9)
+        np.testing.assert_allclose(criterion.exchanged(n), 0, atol=1e-9)

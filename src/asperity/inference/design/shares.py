@@ -34,6 +34,8 @@ from asperity.arrays import Float, Index
 
 #: Relative addition to the diagonal of an information matrix, which makes it invertible.
 _RIDGE = 1e-11
+#: Relative round-off of a sum of squares.
+_ROUND_OFF = 1e-15
 
 
 class Determinant:
@@ -135,6 +137,8 @@ class Misfit(Determinant):
         prior = np.column_stack([prior_residual, prior_jacobian])
         products = np.einsum("ima,imb->iab", columns, columns)
         super().__init__(products[None], (prior.T @ prior)[None], [0])
+        # What is added to the squares of the residuals counts as chi-squared: only their round-off.
+        self._ridge[:, 0, 0] *= _ROUND_OFF / _RIDGE
 
     def value(self, n: Float) -> float:
         """chi-squared of the refitted rival."""
