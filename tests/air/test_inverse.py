@@ -79,6 +79,7 @@ def test_the_jump_of_the_free_molecular_model_is_no_solution():
     ("change", "message"),
     [
         ({"ratio": 0.0}, "inverse.ratio must be positive, got 0;"),
+        ({"ratio": [[0.4], [0.5, 0.6]]}, "inverse.ratio must"),
         ({"ratio": [0.4, 0.5]}, "inverse.arguments must be single numbers, got an array of shape"),
         (
             {"bracket": (1.0, 1e-3)},
@@ -96,3 +97,12 @@ def test_bad_input_is_answered_by_one_sentence(change, message):
         patch_radius(**arguments)
     with pytest.raises(InputError, match=message):
         gap(**arguments)
+
+
+def test_a_gap_on_a_slope_of_1e_11_is_not_said_to_be_out_of_reach():
+    # Beyond the jump of the viscosity the fraction rises by 6e-12, and then falls.
+    layer = AirLayer(P0=53.0, h0=1e-6, eta=1.8e-5, R=2.2e-3, gas_flow="free-molecular")
+    slider = {"W0": 36.0, "M": 2.2, "lambda_z": 1.5e-6}
+    ratio = float(effective_modulation(4.0, **slider, layer=replace(layer, h0=2e-4)))
+    answer = gap(ratio, 4.0, **slider, layer=layer)
+    assert answer.solutions[-1] == pytest.approx(2e-4, rel=1e-3)

@@ -71,13 +71,13 @@ def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise, fitte
 def test_derivatives_are_those_of_differences(exact):
     term = HoldTerm(table(exact, exact[1], healing_err=1.0), RiceRuina, {"mu0": 0.6, "V0": 1e-6})
     at = {"A": A, "B": B, "D0": D0}
-    found = term.residuals(at)
-    np.testing.assert_allclose(found.values, 0, atol=1e-8)
+    residuals = term.residuals(at)
+    np.testing.assert_allclose(residuals.values, 0, atol=1e-8)
     for column, name in enumerate(at):
         high, low = (term.residuals(at | {name: at[name] * f}).values for f in (1 + 1e-4, 1 - 1e-4))
         slope = (high - low) / (2e-4 * at[name])
         np.testing.assert_allclose(
-            found.jacobian[:, column], slope, rtol=1e-4, atol=1e-5 * abs(slope).max()
+            residuals.jacobian[:, column], slope, rtol=1e-4, atol=1e-5 * abs(slope).max()
         )
 
 

@@ -41,6 +41,11 @@ def test_papers_are_found_in_their_folders_and_by_entry_points(installed):
         find_paper("toy2002")
 
 
+def test_the_name_of_a_paper_is_a_text():
+    with pytest.raises(TypeError, match="name must be a text or None, got 3"):
+        find_paper(3)
+
+
 def test_verdicts_and_conclusions_of_the_second_paper(installed):
     paper = find_paper("toy2020")
     frequency, weight = claims = paper.ledger(sensitivity=True)

@@ -26,8 +26,6 @@ from asperity.parameters.arguments import typed
 #: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
 #: monotone over decades, so that a few points a decade reveal it.
 _SCAN = 513
-#: Differences of ln(eps_eff/eps) below this are round-off on a plateau, not an extremum.
-_FLAT = 1e-12
 #: At a root the fraction must agree with the measured one to this relative accuracy: at a jump of
 #: "free-molecular" the difference changes sign without a root.
 _CLOSE = 1e-8
@@ -134,11 +132,14 @@ def _invert(
     bracket: ArrayLike,
 ) -> InverseResult:
     """Solutions of the field of the layer; `machine` is W0, M and lambda_z."""
-    _check_single(ratio, frequency, layer, *machine)
     W0, M, lambda_z = machine
     wanted = as_real("inverse.ratio", ratio, "dimensionless")
+    frequency = as_real("inverse.frequency", frequency, "frequency", "not negative")
+    _check_single(wanted, frequency, layer, *machine)
     target = float(np.log(wanted))
-    lower, upper = _limits(bracket)
+    ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
+    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
+    require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
 
     def log_fractions(u: Any) -> Any:
         chosen: AirLayer = replace(layer, **{field: np.exp(u)})
@@ -147,7 +148,7 @@ def _invert(
     def log_fraction(u: float) -> float:
         return float(log_fractions(u))
 
-    u = np.linspace(np.log(lower), np.log(upper), _SCAN)
+    u = np.linspace(np.log(ends[0]), np.log(ends[1]), _SCAN)
     scan = log_fractions(u)
     knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
     roots = _roots(log_fraction, np.array(knots), target)
@@ -157,17 +158,10 @@ def _invert(
     text = "found"
     if not result:
         text = (
-            f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {wanted:g}; "
+            f"no {field} between {ends[0]:g} and {ends[1]:g} m gives eps_eff/eps = {wanted:g}; "
             f"there it ranges from {lowest:.6g} to {highest:.6g}"
         )
     return InverseResult(result, lowest, highest, text)
-
-
-def _limits(bracket: ArrayLike) -> tuple[float, float]:
-    ends = np.asarray(as_real("inverse.bracket", bracket, "length"))
-    rule, got, advice = "be two ascending lengths", f"{bracket!r} m", "swap or correct them"
-    require(ends.shape == (2,) and ends[0] < ends[1], "inverse.bracket", rule, got, advice)
-    return float(ends[0]), float(ends[1])
 
 
 def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[float]:
@@ -175,7 +169,7 @@ def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[
     from scipy.optimize import minimize_scalar
 
     slope = np.diff(scan)
-    (steps,) = np.nonzero(np.abs(slope) > _FLAT)
+    (steps,) = np.nonzero(slope)
     result = []
     for left, right in pairwise(steps):
         if slope[left] * slope[right] < 0:
@@ -196,12 +190,11 @@ def _roots(function: Callable[[float], float], knots: Float, target: float) -> l
     from scipy.optimize import brentq
 
     result: list[float] = []
-    excess = [function(k) - target for k in knots]
-    for i in range(len(knots) - 1):
-        if excess[i] * excess[i + 1] > 0:
+    for low, high in pairwise(knots):
+        if (function(low) - target) * (function(high) - target) > 0:
             continue
-        root = float(brentq(lambda x: function(x) - target, knots[i], knots[i + 1], xtol=1e-15))
-        new = not result or root - result[-1] > _FLAT
-        if new and abs(function(root) - target) < _CLOSE:
+        root = float(brentq(lambda x: function(x) - target, low, high, xtol=1e-15))
+        # A root at a knot is that of the pieces on both sides.
+        if root not in result and abs(function(root) - target) < _CLOSE:
             result.append(root)
     return result

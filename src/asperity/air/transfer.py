@@ -77,10 +77,6 @@ def transfer_function(
         rule = "leave stiffnesses that are finite numbers"
         advice = "bring it, the slider and the layer nearer to an experiment"
         raise InputError("modulation.frequency", rule, f"{np.max(f):g} Hz", advice)
-    return _reciprocal(denominator)
-
-
-def _reciprocal(denominator: Any) -> Any:
     d = np.asarray(denominator)
     # Adding 0 turns the -0.0 imaginary part of 1/(negative real) into +0.0: the phase is then
     # +pi, in (-pi, pi], and not -pi.

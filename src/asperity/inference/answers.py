@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from asperity import materials
 from asperity.errors import Argument, InputError, require
@@ -66,20 +66,24 @@ def default_law(data: Sequence[AnyData]) -> str:
 
 
 def is_table(data: questions.Data) -> bool:
-    """Whether a file is a table of readings, with a column of an observable, and no recording."""
-    path = data.file
+    """Whether a file is a table of readings or of holds, and no recording."""
+    return _kind(data.file) != "recording"
+
+
+def _kind(path: Path) -> Literal["readings", "holds", "recording"]:
+    """What a file is, by its ending and its heading."""
     require_rereadable(path, "data")
     if path.suffix.lower() == ".json":
-        return True
+        return "readings"
     cells = _heading(path)
     # If a file cannot be opened, the reader of tables raises the error.
+    if cells is None:
+        return "readings"
+    if HEALING in cells:
+        return "holds"
     # A table written by `measure` has no observable if no file could be measured.
-    return (
-        cells is None
-        or HEALING in cells
-        or {"kind", "reason"} <= {*cells}
-        or any(cell in OBSERVABLES for cell in cells)
-    )
+    observed = {"kind", "reason"} <= {*cells} or any(cell in OBSERVABLES for cell in cells)
+    return "readings" if observed else "recording"
 
 
 def _heading(path: Path) -> list[str] | None:
@@ -116,8 +120,8 @@ def read_data(
     InputError
         If a file cannot be read, or an argument for a single recording is given with several.
     """
-    tables = [is_table(data) for data in question.data]
-    recordings = tables.count(False)
+    kinds = [_kind(data.file) for data in question.data]
+    recordings = kinds.count("recording")
     # Arguments of recordings, such as velocities, need a recording.
     for name in ("steps", "velocities"):
         if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
@@ -139,7 +143,8 @@ def read_data(
     }
     held: dict[str, Any] = {n: question.fixed[n] for n in ("V", "K", "W0") if n in question.fixed}
     result: list[AnyData] = []
-    for data, table in zip(question.data, tables, strict=True):
+    for data, kind in zip(question.data, kinds, strict=True):
+        table = kind != "recording"
         rule, advice = "go with a recording", "leave it out, or cut the rows of the table"
         require(not table or data.window is None, "window", rule, "a table", advice)
         # One source may be that of a recording next to a table.
@@ -148,10 +153,9 @@ def read_data(
             keyed = isinstance(value, Mapping)
             field = Argument(name, next(iter(value))) if keyed else f"read.{name}"
             raise InputError(field, rule, "a table", "leave it out, or correct the table")
-        json = data.file.suffix.lower() == ".json"
-        if table and not json and HEALING in (_heading(data.file) or ()):
+        if kind == "holds":
             result.append(read_healing(data.file, held))
-        elif table:
+        elif kind == "readings":
             result.append(read_table(data.file, at, name=data.name))
         else:
             trace, reading = _recording(data, read), _reading(data)
@@ -224,17 +228,6 @@ def _reading(data: questions.Data) -> dict[str, Any]:
     }
 
 
-def run_options(question: questions.Fit | questions.Comparison) -> RunOptions:
-    """Options of the comparison of recordings with the motion."""
-    drift: tuple[Linear, ...] = ("drift",) if question.drift else ()
-    return RunOptions(
-        linear=("offset", *_TRENDS[question.trend], *drift),
-        initial=question.initial,
-        gauge=None if question.gauge is None else (question.gauge_order, question.gauge),
-        fit_rate=question.fit_rate,
-    )
-
-
 def _options(
     question: questions.Fit | questions.Comparison, read: Reader, progress: Progress | None
 ) -> dict[str, Any]:
@@ -242,12 +235,19 @@ def _options(
     priors = priors_of(question.prior, question.free)
     if question.stiffness_from is not None:
         priors |= {"K": _prior_of_unloading(question, priors, read)}
+    drift: tuple[Linear, ...] = ("drift",) if question.drift else ()
+    runs = RunOptions(
+        linear=("offset", *_TRENDS[question.trend], *drift),
+        initial=question.initial,
+        gauge=None if question.gauge is None else (question.gauge_order, question.gauge),
+        fit_rate=question.fit_rate,
+    )
     same = ("fixed", "start", "profile", "inertia", "radiation_damping", "starts", "seed")
     return {
         **{name: getattr(question, name) for name in same},
         "material": None if question.material is None else materials.load(question.material),
         "prior": priors,
-        "runs": run_options(question),
+        "runs": runs,
         "progress": progress,
     }
 

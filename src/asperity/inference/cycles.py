@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
@@ -138,9 +139,9 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
     after = min(_FOLLOWED * slip, float(np.min(onset[1:] - middle[:-1])))
     edges = _edges(_COVERED * stick, slip, after, step)
     middle = middle[(middle + edges[0] >= time[0]) & (middle + edges[-1] <= time[-1])]
-    integral = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time))])
-    at = middle[1:, None] + edges
-    means = np.diff(_integral(time, force, integral, at), axis=1) / np.diff(edges)
+    # The force is linear between its samples.
+    integral = make_interp_spline(time, force, k=1).antiderivative()
+    means = np.diff(integral(middle[1:, None] + edges), axis=1) / np.diff(edges)
     rows = np.column_stack([means, np.diff(middle)])
     noise = measurement.noise
     steepness = np.pi / 2 * float(np.mean(drop)) / slip
@@ -189,14 +190,6 @@ def _edges(stick: float, slip: float, after: float, step: float) -> Float:
         if edge - kept[-1] > 0.999 * step:
             kept.append(edge)
     return np.array(kept)
-
-
-def _integral(time: Float, force: Float, integral: Float, at: Float) -> Float:
-    """Integral of the force, linear between its samples, up to the times `at`."""
-    i = np.clip(np.searchsorted(time, at) - 1, 0, time.size - 2)
-    since, step = at - time[i], time[i + 1] - time[i]
-    slope = (force[i + 1] - force[i]) / step
-    return np.asarray(integral[i] + since * (force[i] + slope * since / 2))
 
 
 def _whitening(rows: Float, scales: Float) -> tuple[Float, float]:

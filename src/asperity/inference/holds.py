@@ -27,7 +27,6 @@ from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 from asperity.slider.named import slider_from
 from asperity.transients.hold_and_step import hold
-from asperity.units import to_si
 
 #: The column that identifies a table of holds.
 HEALING = "healing"
@@ -133,10 +132,8 @@ def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> Healing
             continue
         kind, rule = _KINDS[column]
         kind = "stiffness" if column == "K" and with_load else kind
-        label = f"{name}.{column}"
-        texts = isinstance(values, list | tuple) and any(isinstance(v, str) for v in values)
-        plain = [to_si(v, kind, label) for v in values] if texts else values
-        arrays[column] = np.atleast_1d(np.asarray(obeying(plain, label, kind, rule), float))
+        checked = obeying(values, f"{name}.{column}", kind, rule)
+        arrays[column] = np.atleast_1d(np.asarray(checked, float))
     rows = max(a.size for a in arrays.values())
     arrays = {n: in_all_rows(array, rows, f"{name}.{n}") for n, array in arrays.items()}
     K = arrays["K"] / arrays["W0"] if with_load else arrays["K"]

@@ -229,8 +229,11 @@ def _rule_and_verdict(
                 f"tolerance, got none of: {lacking}; add it"
             )
         printed, derived, independent = (numbers.get(name, math.nan) for name in _FORMULA)
-        verdict = formula_verdict(printed, derived, independent, words.tolerance)
-        return rules.formula_text(words.tolerance), verdict
+        text = (
+            f"reproduced if the printed formula is within {words.tolerance:.2g} (relative) of an "
+            "independent determination; a misprint if only the derived one is"
+        )
+        return text, formula_verdict(printed, derived, independent, words.tolerance)
     rule = words.build(stated, entry.id)
     kept = bool(numbers) and all(rule.holds(value) for value in numbers.values())
     text = f"every one of: {rule.text}" if len(numbers) > 1 else rule.text

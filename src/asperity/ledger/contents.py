@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.resources import as_file
 from importlib.resources.abc import Traversable
 from inspect import signature
 from typing import Literal, TypeAlias, TypeVar, get_args
@@ -12,7 +13,6 @@ from pydantic import Field
 from asperity.errors import InputError, closest, require
 from asperity.ledger import rules
 from asperity.ledger.sentences import names_in
-from asperity.parameters.toml_file import parsed_toml
 from asperity.questions.record import Question, Record
 
 Kind: TypeAlias = Literal["test", "fit", "arithmetic", "identity"]
@@ -195,14 +195,10 @@ def read_words(file: Traversable, kind: type[Words]) -> Words:
     Raises
     ------
     InputError
-        If the file is not TOML, or has unknown or missing fields.
+        If the file cannot be read, is not TOML, or has unknown or missing fields.
     """
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        rule = "be a readable text"
-        raise InputError(str(file), rule, type(error).__name__, "write the words there") from None
-    return kind.of_content(parsed_toml(text, file.name, f"'{file}'"), str(file))
+    with as_file(file) as path:
+        return kind.from_file(path)
 
 
 def read_contents(file: Traversable) -> Contents:

@@ -6,24 +6,13 @@ import base64
 import re
 import struct
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from html import escape, unescape
 from pathlib import Path
 
-_GREEK = {
-    "alpha": "α",
-    "Delta": "Δ",
-    "eps": "ε",
-    "eta": "η",
-    "gamma": "γ",
-    "kappa": "κ",
-    "lambda": "λ",
-    "mu": "μ",
-    "omega": "ω",
-    "Phi": "Φ",
-    "pi": "π",
-    "Sigma": "Σ",
-    "sigma": "σ",
-}
+#: Names of Greek letters. In HTML the letters have the same names, but for eps.
+_GREEK = re.compile(
+    r"\b(alpha|Delta|eps|eta|gamma|kappa|lambda|mu|omega|Phi|pi|Sigma|sigma)(?=\b|[_\d])"
+)
 _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), shown)
     for pattern, shown in (
@@ -51,12 +40,15 @@ _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"(?<=[\w>]) ([=≈×]) (?=[−\d])", "\u00a0\\1\u00a0"),
     )
 )
-_NAMES = re.compile(rf"\b({'|'.join(_GREEK)})(?=\b|[_\d])")
+
+
+def _greek(name: re.Match[str]) -> str:
+    return unescape(f"&{name[1].replace('eps', 'epsi')};")
 
 
 def rich(text: str) -> str:
     """Escape a plain text and set eps_eff, 1e-3 and mu1 in signs and subscripts."""
-    shown = _NAMES.sub(lambda m: _GREEK[m[1]], escape(str(text), quote=False))
+    shown = _GREEK.sub(_greek, escape(str(text), quote=False))
     for pattern, replacement in _RULES:
         shown = pattern.sub(replacement, shown)
     return shown

@@ -62,7 +62,7 @@ def build_page(
     """
     about, known = paper.contents.paper, {claim.id: claim for claim in claims}
     pictures = {figure.name: _picture(figure, folder) for _, figures in shown for figure in figures}
-    summary = "\n".join(_paragraph(one, known, pictures) for one in paper.contents.summary)
+    summary = "\n".join(_paragraph(words, known, pictures) for words in paper.contents.summary)
     brief = f'<div class="summary">\n{summary}\n</div>\n{_conclusions(headlines, known)}'
     parts = {
         "In brief": ("brief", brief),
@@ -97,12 +97,12 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
     kinds = {"agrees": "reproduced", "disagrees": "differs", "undecided": "undecided"}
     rows = [
         (
-            rich(one.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
-            rich(f"{one.observable}, {one.law}".lstrip(", ")),
-            f"{one.chi_squared:.4g} for {one.points}, p = {one.p_value:.2g}",
-            _chip(kinds[one.verdict], one.verdict),
+            rich(curve.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
+            rich(f"{curve.observable}, {curve.law}".lstrip(", ")),
+            f"{curve.chi_squared:.4g} for {curve.points}, p = {curve.p_value:.2g}",
+            _chip(kinds[curve.verdict], curve.verdict),
         )
-        for one in agreement
+        for curve in agreement
     ]
     heads = {"Points": "statement", "Quantity": "statement", "χ²": "computed", "Verdict": "verdict"}
     return (
@@ -208,17 +208,16 @@ def _list(items: Sequence[str], kind: str) -> str:
 
 
 def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:
-    rows = [(rich(h.claim), rich(h.result), _standing(h) + _basis(h, claims)) for h in headlines]
+    rows = []
+    for h in headlines:
+        kind = "undecided" if h.standing == "undecided" else "differs"
+        chip = _chip("reproduced" if h.holds else kind, h.standing)
+        rows.append((rich(h.claim), rich(h.result), chip + _basis(h, claims)))
     heads = {"The paper concludes": "statement", "Computed here": "computed", "Holds?": "verdict"}
     return (
         "<h3>The paper’s conclusions</h3>"
         f"{table(heads, rows, 'Conclusions of the paper', 'ledger brief')}"
     )
-
-
-def _standing(headline: Headline) -> str:
-    kind = "undecided" if headline.standing == "undecided" else "differs"
-    return _chip("reproduced" if headline.holds else kind, headline.standing)
 
 
 def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
@@ -242,16 +241,16 @@ def counts(claims: Sequence[Claim]) -> dict[str, int]:
 def _counted_apart(claims: Sequence[Claim]) -> str:
     """How many claims are no tests, in a sentence; empty if all are."""
     parts = []
-    for kind, one, several in (
+    for kind, singular, plural in (
         ("fit", "fit", "fits"),
         ("arithmetic", "calculation with printed numbers", "calculations with printed numbers"),
         ("identity", "identity", "identities"),
     ):
-        number = counts([c for c in claims if c.kind == kind])
-        total, others = sum(number.values()), sum(number.values()) - number["reproduced"]
-        if total:
-            name = one if total == 1 else several
-            parts.append(f"{total} {name}" + f" ({others} not as stated)" * bool(others))
+        verdicts = [claim.verdict for claim in claims if claim.kind == kind]
+        others = len(verdicts) - verdicts.count("reproduced")
+        if verdicts:
+            name = singular if len(verdicts) == 1 else plural
+            parts.append(f"{len(verdicts)} {name}" + f" ({others} not as stated)" * bool(others))
     return f"Counted apart: {', '.join(parts)}." if parts else ""
 
 

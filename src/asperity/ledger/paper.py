@@ -43,9 +43,10 @@ from asperity.ledger.claims import (
 )
 from asperity.ledger.contents import Contents, read_contents
 from asperity.ledger.figures import FiguresFile, PaperFigure, Section, TabFigure, figure_words
-from asperity.parameters.arguments import of_type, shown
+from asperity.parameters.arguments import of_type, shown, typed
 
 if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
     from types import ModuleType
 
     from asperity.ledger.rules import AcceptanceRule
@@ -72,12 +73,16 @@ class Paper:
     package: str
 
     @cached_property
+    def _folder(self) -> Traversable:
+        """The folder of the package, if it can be imported."""
+        self.module("")
+        return files(self.package)
+
+    @cached_property
     def words(self) -> FiguresFile:
         """The content of figures.toml; empty without this file."""
-        self.module("")
-        if not files(self.package).joinpath("figures.toml").is_file():
-            return FiguresFile()
-        return figure_words(self.package)
+        has_words = self._folder.joinpath("figures.toml").is_file()
+        return figure_words(self.package) if has_words else FiguresFile()
 
     @cached_property
     def tab(self) -> Mapping[str, TabFigure]:
@@ -103,8 +108,7 @@ class Paper:
     @cached_property
     def contents(self) -> Contents:
         """The content of claims.toml."""
-        self.module("")
-        return read_contents(files(self.package).joinpath("claims.toml"))
+        return read_contents(self._folder.joinpath("claims.toml"))
 
     @cached_property
     def numbers(self) -> Material:
@@ -112,7 +116,7 @@ class Paper:
         source = self.contents.paper.numbers
         if not source.endswith(".toml"):
             return materials.load(source)
-        with as_file(files(self.package).joinpath(source)) as path:
+        with as_file(self._folder.joinpath(source)) as path:
             return materials.load(path)
 
     def parameter_lines(self) -> list[str]:
@@ -176,6 +180,7 @@ def available() -> dict[str, str]:
     return papers
 
 
+@typed
 def find_paper(name: str | None = None) -> Paper:
     """A paper by its name; without a name the first in alphabetical order.
 

@@ -34,8 +34,6 @@ from asperity.units import to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from asperity.figures.plot import Panel
-
 #: Significance level: the probability that a test rejects a true curve.
 LEVEL = 0.05
 #: A test must reject a curve that is wrong by this share with the probability 1 - LEVEL.
@@ -158,10 +156,23 @@ def with_curves(
     InputError
         If the curve does not exist, or x lies outside of it.
     """
-    rows = [
-        _row(point, table, observables[point["observable"]][1], f"{name}, row {row}")
-        for row, point in points.iterrows()
-    ]
+    from scipy.interpolate import CubicSpline
+
+    rows = []
+    for number, point in points.iterrows():
+        where = f"{name}, row {number}"
+        _, panel = observables[point["observable"]]
+        series = one_of(point["series"], map(str, table["curve"].unique()), f"{where}: series")
+        curve = table[table["curve"] == series]
+        x = to_si(str(point["x"]), panel.x_kind, f"{where}: x")
+        at = curve[panel.x].to_numpy(float)
+        if not at.min() <= x <= at.max():
+            rule = f"lie on the curve, from {at.min():g} to {at.max():g} (SI)"
+            raise InputError(f"{where}: x", rule, f"{x:g}", "leave the point out")
+        model = float(CubicSpline(at, curve[panel.y].to_numpy(float))(x))
+        residual = (point["y"] - model) / point["y_err"]
+        law = str(curve["law"].iloc[0])
+        rows.append({**point, "x": x, "law": law, "model": model, "residual": residual})
     return pd.DataFrame(rows, columns=list(POINT_COLUMNS))
 
 
@@ -178,23 +189,6 @@ POINT_COLUMNS = {
     "residual": "1; (y - model)/y_err",
     "source": "where the point comes from",
 }
-
-
-def _row(point: pd.Series, table: pd.DataFrame, panel: Panel, where: str) -> dict[str, Any]:
-    """A point with the value of its curve; `where` is its row, for messages."""
-    from scipy.interpolate import CubicSpline
-
-    series = one_of(point["series"], map(str, table["curve"].unique()), f"{where}: series")
-    curve = table[table["curve"] == series]
-    x = to_si(str(point["x"]), panel.x_kind, f"{where}: x")
-    at = curve[panel.x].to_numpy(float)
-    if not at.min() <= x <= at.max():
-        rule = f"lie on the curve, from {at.min():g} to {at.max():g} (SI)"
-        raise InputError(f"{where}: x", rule, f"{x:g}", "leave the point out")
-    model = float(CubicSpline(at, curve[panel.y].to_numpy(float))(x))
-    residual = (point["y"] - model) / point["y_err"]
-    law = str(curve["law"].iloc[0])
-    return {**point, "x": x, "law": law, "model": model, "residual": residual}
 
 
 def comparisons(rows: pd.DataFrame) -> list[CurveComparison]:
@@ -255,7 +249,7 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Observables) ->
     sources = ", ".join([*map(str, rows["source"].unique()[:2]), "…"][: rows["source"].nunique()])
     figure.legend(
         handles=list(handles.values()),
-        labels=[f"{name.replace(' um', ' µm')}" for name in handles],
+        labels=[name.replace(" um", " µm") for name in handles],
         title=f"points from: {sources}",
         loc="outside lower center",
         ncols=2,
@@ -313,7 +307,7 @@ class MeasuredPoints:
         head = [f"points of {self.name} and the curves of the figures", RULE]
         save_table(rows, folder / "data" / "points.csv", header=head, columns=POINT_COLUMNS)
         compared = comparisons(rows)
-        found = [asdict(one) for one in compared]
-        text = to_json({"rule": RULE, "file": self.name, "comparisons": found}, indent=2)
+        record = {"rule": RULE, "file": self.name, "comparisons": [asdict(one) for one in compared]}
+        text = to_json(record, indent=2)
         (folder / "agreement.json").write_text(text + "\n", encoding="utf-8", newline="\n")
         return compared

@@ -49,7 +49,7 @@ def read_columns(
         rule = f"have the columns {', '.join(wanted)}"
         raise InputError(path.name, rule, f"none for {missing}", "add them")
     return {name: cells[name] for name in texts} | {
-        name: np.array([to_si(cell, kind, f"{path.name}, {name}") for cell in cells[name]])
+        name: np.asarray(to_si(cells[name], kind, f"{path.name}, {name}"))
         for name, kind in columns.items()
     }
 

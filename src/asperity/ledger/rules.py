@@ -134,14 +134,6 @@ def change_below(limit: float, what: str) -> AcceptanceRule:
     )
 
 
-def formula_text(tolerance: float) -> str:
-    """The rule for a printed formula, as a sentence."""
-    return (
-        f"reproduced if the printed formula is within {tolerance:.2g} (relative) of an "
-        "independent determination; a misprint if only the derived one is"
-    )
-
-
 _OPERATIONS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

@@ -71,13 +71,15 @@ def judged(made, pmma):
 def test_laws_are_compared_without_naming_what_is_free(made, pmma):
     fixed = {"K": pmma.K, "W0": pmma.W0, "B": pmma.B, "D0": pmma.D0}
     laws = ("rice-ruina", "elasto-plastic", "cut-off")
-    found = compare(made("elasto-plastic", 1), laws, fixed=fixed, material=pmma, evidence=False)
-    own = {name: list(j.fit.parameters) for name, j in found.laws.items()}
+    comparison = compare(
+        made("elasto-plastic", 1), laws, fixed=fixed, material=pmma, evidence=False
+    )
+    own = {name: list(j.fit.parameters) for name, j in comparison.laws.items()}
     assert own == {"elasto-plastic": ["A", "lambda", "eps_ratio"], "rice-ruina": ["A", "eps_ratio"]}
-    assert found.best == "elasto-plastic"
+    assert comparison.best == "elasto-plastic"
     # Nothing says where to look for its cut-off velocities.
-    assert list(found.not_compared) == ["cut-off"]
-    assert "Not compared: cut-off, because a number is neither free nor given" in found.verdict
+    assert list(comparison.not_compared) == ["cut-off"]
+    assert "Not compared: cut-off, because a number is neither free nor given" in comparison.verdict
 
 
 @pytest.mark.long
@@ -87,64 +89,66 @@ def test_a_law_with_more_parameters_than_samples_allow_leaves_the_others(tmp_pat
     # 200 s is in these 62 samples: 64 are the fewest for two-state, 48 for the others.
     few = tmp_path / "few.csv"
     few.write_text("\n".join([whole[0], *whole[4001:10801:110]]) + "\n")
-    found = answers.compare(few, ["rice-ruina", "ruina-slip", "two-state"], evidence=False)
-    assert set(found.laws) == {"rice-ruina", "ruina-slip"}
-    assert "at least 64 samples" in found.not_compared["two-state"]
+    comparison = answers.compare(few, ["rice-ruina", "ruina-slip", "two-state"], evidence=False)
+    assert set(comparison.laws) == {"rice-ruina", "ruina-slip"}
+    assert "at least 64 samples" in comparison.not_compared["two-state"]
 
 
 @pytest.mark.parametrize("law", population(["linker-dieterich", "elasto-plastic"]))
 def test_the_law_of_the_data_is_found(judged, law):
-    found = judged(law, 1)
-    assert found.decided
-    assert found.best == law
-    assert all(j.excluded == (name != law) for name, j in found.laws.items())
+    comparison = judged(law, 1)
+    assert comparison.decided
+    assert comparison.best == law
+    assert all(j.excluded == (name != law) for name, j in comparison.laws.items())
 
 
 @pytest.mark.long
 def test_a_special_case_is_never_excluded_by_its_generalisation(judged):
     # Rice-Ruina is Linker-Dieterich with alpha = 0, and elasto-plastic with lambda = 0.
-    found = judged("rice-ruina", 2)
-    assert not found.decided
-    assert not any(j.excluded for j in found.laws.values())
-    assert "cannot tell" in found.verdict
+    comparison = judged("rice-ruina", 2)
+    assert not comparison.decided
+    assert not any(j.excluded for j in comparison.laws.values())
+    assert "cannot tell" in comparison.verdict
 
 
 def test_a_minimum_that_a_law_misses_is_found_by_way_of_its_generalisation(judged, monkeypatch):
     called = []
 
     def missing_once(data, law, *args, **options):
-        found = fit(data, law, *args, **options)
+        result = fit(data, law, *args, **options)
         called.append(law)
         if called.count("rice-ruina") > 1 or law != "rice-ruina":
-            return found
-        A = found.parameters["A"]
-        wrong = found.parameters | {"A": replace(A, value=0.5 * A.value)}
-        missed = replace(found, parameters=wrong)
-        chi2 = found.objective.chi2(found.objective.coordinates(missed.values))
-        assert chi2 > found.chi2 + 1000
+            return result
+        A = result.parameters["A"]
+        wrong = result.parameters | {"A": replace(A, value=0.5 * A.value)}
+        missed = replace(result, parameters=wrong)
+        chi2 = result.objective.chi2(result.objective.coordinates(missed.values))
+        assert chi2 > result.chi2 + 1000
         return replace(missed, chi2=chi2)
 
     exact = judged("rice-ruina", 2, laws=("rice-ruina", "elasto-plastic"))
     monkeypatch.setattr("asperity.inference.comparison.compare.fit", missing_once)
-    found = judged("rice-ruina", 2, laws=("rice-ruina", "elasto-plastic"))
+    comparison = judged("rice-ruina", 2, laws=("rice-ruina", "elasto-plastic"))
     assert called == ["rice-ruina", "elasto-plastic", "rice-ruina"]
-    fits = [result.laws["rice-ruina"].fit for result in (found, exact)]
+    fits = [judgement.laws["rice-ruina"].fit for judgement in (comparison, exact)]
     assert fits[0].chi2 == pytest.approx(fits[1].chi2, rel=1e-9)
 
 
 def test_errors_too_small_exclude_no_law_by_their_size(judged):
-    found = judged("rice-ruina", 3, claimed=1 / 3)
-    assert not found.decided
-    assert "too small by a factor of about 3" in found.verdict
-    assert "with K free" not in found.verdict.lower()
-    assert not any(j.excluded for j in found.laws.values())
+    comparison = judged("rice-ruina", 3, claimed=1 / 3)
+    assert not comparison.decided
+    assert "too small by a factor of about 3" in comparison.verdict
+    assert "with K free" not in comparison.verdict.lower()
+    assert not any(j.excluded for j in comparison.laws.values())
 
 
 def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma):
     table, wrong = made("rice-ruina", 2), 1.3 * pmma.K
-    found = compare(table, LAWS[:2], FREE[1:], material=pmma, evidence=False, fixed={"K": wrong})
-    assert not found.decided
-    assert "With K free, rice-ruina describes these data" in found.verdict
+    comparison = compare(
+        table, LAWS[:2], FREE[1:], material=pmma, evidence=False, fixed={"K": wrong}
+    )
+    assert not comparison.decided
+    assert "With K free, rice-ruina describes these data" in comparison.verdict
     alone = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma, fixed={"K": wrong})
     (said,) = [w for w in alone.warnings if "with K free" in w]
     low, high = map(float, re.search(r"\((\S+) to (\S+), 95 %\)", said).groups())
@@ -155,47 +159,49 @@ def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma):
 
 def test_no_stiffness_is_named_where_none_would_do(made, pmma):
     table = made("rice-ruina", 3, claimed=1 / 3)
-    found = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma)
-    assert found.p_value < 1e-3
-    assert not any("with K free" in w for w in found.warnings)
+    result = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma)
+    assert result.p_value < 1e-3
+    assert not any("with K free" in w for w in result.warnings)
 
 
 def test_errors_too_large_leave_what_the_data_show(judged):
-    found = judged("elasto-plastic", 4, claimed=3.0)
-    assert found.best == "elasto-plastic"
-    assert any("uncertainties are too large" in w for w in found.laws[found.best].fit.warnings)
+    comparison = judged("elasto-plastic", 4, claimed=3.0)
+    assert comparison.best == "elasto-plastic"
+    assert any(
+        "uncertainties are too large" in w for w in comparison.laws[comparison.best].fit.warnings
+    )
 
 
 def test_an_outlier_is_named_and_does_not_decide(judged):
-    found = judged("elasto-plastic", 5, spoiled=5, by=0.4)
-    assert found.left_out == ("row 6",)
-    assert "row 6" in found.verdict
-    assert found.decided
-    assert found.best == "elasto-plastic"
+    comparison = judged("elasto-plastic", 5, spoiled=5, by=0.4)
+    assert comparison.left_out == ("row 6",)
+    assert "row 6" in comparison.verdict
+    assert comparison.decided
+    assert comparison.best == "elasto-plastic"
 
 
 def test_a_law_that_is_wrong_everywhere_has_no_outliers(made, pmma):
-    found = fit(made("elasto-plastic", 6), "rice-ruina", ("eps_ratio", "A"), material=pmma)
-    assert found.p_value < 1e-6
-    assert outlying_rows(found.residuals[0]) == []
-    assert not any("check that reading" in w for w in found.warnings)
+    result = fit(made("elasto-plastic", 6), "rice-ruina", ("eps_ratio", "A"), material=pmma)
+    assert result.p_value < 1e-6
+    assert outlying_rows(result.residuals[0]) == []
+    assert not any("check that reading" in w for w in result.warnings)
 
 
 def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
-    found = fit(made("elasto-plastic", 7), "elasto-plastic", ("eps_ratio",), material=pmma)
-    evidence = evidence_of(found)
+    result = fit(made("elasto-plastic", 7), "elasto-plastic", ("eps_ratio",), material=pmma)
+    evidence = evidence_of(result)
     prior = evidence.prior["eps_ratio"]
     assert prior["kind"] == "uniform in the logarithm"
     width = math.log(prior["high"] / prior["low"])
-    value, se = found.values["eps_ratio"], found.parameters["eps_ratio"].se
+    value, se = result.values["eps_ratio"], result.parameters["eps_ratio"].se
 
     def density(x):
-        return math.exp(0.5 * (found.chi2 - found.objective.chi2(np.array([x])))) / width
+        return math.exp(0.5 * (result.chi2 - result.objective.chi2(np.array([x])))) / width
 
     middle = math.log(value)
     reach = 8 * se / value
     integral = quad(density, middle - reach, middle + reach, epsrel=1e-4)[0]
-    expected = found.log_likelihood + math.log(integral)
+    expected = result.log_likelihood + math.log(integral)
     assert evidence.log == pytest.approx(expected, abs=5 * evidence.standard_error + 1e-3)
     assert evidence.effective_samples > 300
 
@@ -204,8 +210,8 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
     table = made("elasto-plastic", 8)
     runs = np.where(V < 5e-6, "slow", "fast")
     table = replace(table, run=runs)
-    found = fit(table, "elasto-plastic", ("eps_ratio",), material=pmma)
-    validation = leave_one_run_out(found)
+    result = fit(table, "elasto-plastic", ("eps_ratio",), material=pmma)
+    validation = leave_one_run_out(result)
     parts = [
         fit(table.without(runs != n), "elasto-plastic", ("eps_ratio",), material=pmma)
         for n in ("slow", "fast")
@@ -238,12 +244,12 @@ def test_second_opinions_stand_beside_the_verdict(made, pmma):
     table = made("rice-ruina", 9)
     done = []
     count = {"progress": lambda *steps: done.append(steps)}
-    found = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, **count)
+    comparison = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, **count)
     assert done == sorted(done)
     assert done[-1] == (400, 400)
-    assert "The evidence " in found.verdict
-    assert all(j.evidence.effective_samples > 50 for j in found.laws.values())
-    assert judge({n: j.fit for n, j in found.laws.items()}).decided == found.decided
+    assert "The evidence " in comparison.verdict
+    assert all(j.evidence.effective_samples > 50 for j in comparison.laws.values())
+    assert judge({n: j.fit for n, j in comparison.laws.items()}).decided == comparison.decided
 
 
 def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
@@ -251,9 +257,9 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     with pytest.raises(InputError, match="got 'lambda', which none of rice-ruina, linker-d"):
         compare(table, ("rice-ruina", "linker-dieterich"), ("lambda",), material=pmma)
     given = {"material": pmma, "fixed": {"eps_ratio": 0.48}, "starts": 1}
-    found = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), **given)
-    assert set(found.laws) == {"rice-ruina", "elasto-plastic"}
-    bare = found.laws["rice-ruina"]
+    comparison = compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), **given)
+    assert set(comparison.laws) == {"rice-ruina", "elasto-plastic"}
+    bare = comparison.laws["rice-ruina"]
     assert not bare.fit.parameters
     assert not bare.excluded
     # The law itself at the rows, by the solver.
@@ -287,11 +293,13 @@ def test_outliers_that_hide_each_other_are_named_and_left_out(made, pmma, outlie
     for seed in range(draws):
         law, table, rows = spoiled_table(made, seed, outliers=outliers)
         free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(law, ())]
-        found = fit(table, law, free, material=pmma, check_stiffness=False)
-        right += sorted(found.outliers) == rows
+        result = fit(table, law, free, material=pmma, check_stiffness=False)
+        right += sorted(result.outliers) == rows
         # The names of the table are told.
-        (said,) = [w for w in found.warnings if "chi-squared would be as it should be" in w] or [""]
-        assert all((str(table.row_names[row]) in said) for row in found.outliers)
+        (said,) = [w for w in result.warnings if "chi-squared would be as it should be" in w] or [
+            ""
+        ]
+        assert all((str(table.row_names[row]) in said) for row in result.outliers)
     # Of 40 with two outliers 39 were named, of 70 with one 68; a row may be one that the fit can
     # follow.
     assert right >= draws - 1
@@ -303,8 +311,8 @@ def test_clean_tables_have_no_outliers_even_under_a_wrong_law(made, pmma, draws)
         _, table, _ = spoiled_table(made, seed, outliers=0)
         for other in LAWS:
             free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(other, ())]
-            found = fit(table, other, free, material=pmma, check_stiffness=False)
-            assert found.outliers == ()
+            result = fit(table, other, free, material=pmma, check_stiffness=False)
+            assert result.outliers == ()
 
 
 @pytest.mark.long
@@ -313,10 +321,10 @@ def test_a_row_at_the_edge_of_periodic_sliding_is_no_outlier():
     law = "linker-dieterich"
     response = response_function(get_law(law), search="direct")
     truth, fixed, table = drawn_table(105, law, response, slow_point)
-    found = compare(table, LAWS, ALL_FREE, fixed=fixed, evidence=False)
-    assert found.best == law
-    assert not found.left_out
-    own = found.laws[law].fit
+    comparison = compare(table, LAWS, ALL_FREE, fixed=fixed, evidence=False)
+    assert comparison.best == law
+    assert not comparison.left_out
+    own = comparison.laws[law].fit
     from_truth = own.objective.minimise(own.objective.coordinates(truth))
     assert own.chi2 <= from_truth.chi2 + 0.01
 
@@ -348,13 +356,13 @@ def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     """Its noise is estimated from what a law leaves: chi-squared is that of noise for every law."""
     run = next(runs_of(CASES["holds"], 1))
     laws = ["rice-ruina", "ruina-slip"]
-    found = compare(run, laws, ["A", "B", "D0"], evidence=False, starts=8)
-    assert found.best == "rice-ruina"
-    (out,) = [j for j in found.laws.values() if j.excluded]
-    lower = found.laws["rice-ruina"].fit.log_likelihood - out.fit.log_likelihood
+    comparison = compare(run, laws, ["A", "B", "D0"], evidence=False, starts=8)
+    assert comparison.best == "rice-ruina"
+    (out,) = [j for j in comparison.laws.values() if j.excluded]
+    lower = comparison.laws["rice-ruina"].fit.log_likelihood - out.fit.log_likelihood
     assert out.why.endswith(f"above that of rice-ruina, its log-likelihood {lower:.4g} lower")
-    assert "chi-squared" not in found.verdict
-    head, rows = laws_table(found)
+    assert "chi-squared" not in comparison.verdict
+    head, rows = laws_table(comparison)
     assert head[:3] == ("law", "log-likelihood", "AICc - lowest")
     assert [row[-1].partition(":")[0] for row in rows] == ["lowest AICc", "excluded"]
     undetermined = replace(out.fit, undetermined=("B", "c"))

@@ -28,13 +28,13 @@ PLAN = {
 
 
 @pytest.fixture(scope="module")
-def found():
+def result():
     return design(PLAN, simulate=60)
 
 
-def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(found):
-    rows = [p for p in found.points for _ in range(p.readings)]
-    assert len(rows) == found.readings == 8
+def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(result):
+    rows = [p for p in result.points for _ in range(p.readings)]
+    assert len(rows) == result.readings == 8
     columns = {n: [p.setting[n] for p in rows] for n in ("V", "epsilon", "frequency")}
     for i, name in enumerate(("delta_mu", "mu1", "phase1", "mu2")):
         # Copies of a reading are refused as copied rows: let each differ by nothing that matters.
@@ -54,39 +54,39 @@ def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(found):
     )
     for name, value in truth.items():
         assert fitted.values[name] == pytest.approx(value, rel=1e-5)
-        assert found.parameters[name].se == pytest.approx(fitted.parameters[name].se, rel=1e-4)
+        assert result.parameters[name].se == pytest.approx(fitted.parameters[name].se, rel=1e-4)
 
 
-def test_simulated_fits_spread_as_expected(found):
-    simulation = found.simulation
+def test_simulated_fits_spread_as_expected(result):
+    simulation = result.simulation
     assert simulation.sets == 60
     assert simulation.failed == 0
-    for name, error in found.parameters.items():
+    for name, error in result.parameters.items():
         # Three standard errors of the spread of 60 fits, some 10 % each.
         assert simulation.spread[name] == pytest.approx(
             error.se, abs=3 * simulation.uncertainty[name]
         )
 
 
-def test_the_design_beats_the_grid_as_its_errors_say(found):
-    error = found.parameters["lambda"]
-    assert found.fewer == pytest.approx((error.se_grid / error.se) ** 2, rel=1e-3)
-    assert found.fewer > 1
-    assert found.efficiency >= 0.999
+def test_the_design_beats_the_grid_as_its_errors_say(result):
+    error = result.parameters["lambda"]
+    assert result.fewer == pytest.approx((error.se_grid / error.se) ** 2, rel=1e-3)
+    assert result.fewer > 1
+    assert result.efficiency >= 0.999
     # Eight whole readings of three parameters lose little.
-    assert 0.7 < found.efficiency_whole <= 1
+    assert 0.7 < result.efficiency_whole <= 1
 
 
 def test_stick_slip_is_no_candidate():
     # At 7 N sliding is unstable without modulation; K/Kc = 0.88.
     plan = {**PLAN, "fixed": {"W0": "7 N"}}
     plan["ranges"] = {**PLAN["ranges"], "epsilon": [0.02, 0.4, 0.45, 0.5, 0.55]}
-    found = design(plan)
-    assert found.candidates == 8
-    assert found.combinations == 10
-    assert list(found.left_out.values()) == [2]
-    assert "stick-slip" in next(iter(found.left_out))
-    assert all(p.setting["epsilon"] > 0.02 for p in found.points)
+    result = design(plan)
+    assert result.candidates == 8
+    assert result.combinations == 10
+    assert list(result.left_out.values()) == [2]
+    assert "stick-slip" in next(iter(result.left_out))
+    assert all(p.setting["epsilon"] > 0.02 for p in result.points)
     plan["ranges"] = {**PLAN["ranges"], "epsilon": [0.01, 0.02, 0.03, 0.04, 0.05]}
     with pytest.raises(InputError, match=r"got none of 10 \(10 times: .* stick-slip\)"):
         design(plan)
@@ -108,16 +108,16 @@ def test_a_nested_law_is_excluded_where_its_parameter_is_measured():
 
 def test_draws_average_over_the_uncertain_values():
     plan = {**PLAN, "draws": 2, "uncertainty": {"A": 0.001}}
-    found = design(plan)
-    assert found.candidates == 10
-    assert found.efficiency >= 0.999
+    result = design(plan)
+    assert result.candidates == 10
+    assert result.efficiency >= 0.999
 
 
-def test_the_record_and_the_table_hold_the_points(found):
-    record = found.record()
-    assert [p["readings"] for p in record["points"]] == [p.readings for p in found.points]
-    assert record["even_grid"]["times_fewer"] == found.fewer
-    row = found.rows()[0]
+def test_the_record_and_the_table_hold_the_points(result):
+    record = result.record()
+    assert [p["readings"] for p in record["points"]] == [p.readings for p in result.points]
+    assert record["even_grid"]["times_fewer"] == result.fewer
+    row = result.rows()[0]
     assert row["law"] == "elasto-plastic"
     assert row["A"] == 0.013
     assert row["W0"] == 3.0
@@ -146,19 +146,19 @@ def test_a_law_that_gives_the_same_readings_is_not_to_be_excluded():
 
 def test_a_rival_at_a_bound_of_its_parameters_is_excluded_as_its_misfit_says():
     """Its chi-squared lies far beyond what noise can change."""
-    found = design(ONE_POINT, simulate=5)
-    assert found.chi2 > 1e4
-    assert found.probability == found.simulation.decided == 1
-    assert found.fewer == pytest.approx(1)
+    result = design(ONE_POINT, simulate=5)
+    assert result.chi2 > 1e4
+    assert result.probability == result.simulation.decided == 1
+    assert result.fewer == pytest.approx(1)
 
 
 def test_where_the_rival_loses_its_response_its_misfit_is_a_bound(monkeypatch):
     monkeypatch.setattr(RivalFit, "reached", lambda fits, n, end: False)
-    found = design(ONE_POINT)
-    assert found.probability is found.probability_grid is None
-    assert np.isnan(found.fewer)
-    assert found.efficiency == found.efficiency_whole == 0
-    assert sum("next to values with which it has no response" in w for w in found.warnings) == 2
-    text = as_text(_sections(found))
+    result = design(ONE_POINT)
+    assert result.probability is result.probability_grid is None
+    assert np.isnan(result.fewer)
+    assert result.efficiency == result.efficiency_whole == 0
+    assert sum("next to values with which it has no response" in w for w in result.warnings) == 2
+    text = as_text(_sections(result))
     assert "an unknown number of times fewer readings" in text
     assert "probability of deciding unknown (even grid unknown)" in text

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.inference import plan_of, read_plan
+from asperity.inference import design, plan_of, read_plan
 from asperity.inference.design.plan import expected_values
 
 PLAN = {
@@ -56,6 +56,27 @@ def test_a_prior_of_the_stiffness_may_be_over_the_load():
     plan = plan_of(changed(**free, prior=["K=0.03+-0.001 1/um"]), require_unit=True)
     (prior,) = (u.prior for u in plan.truth.unknowns if u.name == "K")
     assert (prior.mean, prior.sd) == pytest.approx((2.1e5, 7e3))
+
+
+def test_a_number_that_only_the_rival_has_may_be_given():
+    fixed = {"c": 2.0}
+    rivals = {"measure": None, "rival": "nagata"}
+    plan = plan_of(changed(**rivals, rival_free=["A", "B"], fixed=fixed))
+    assert plan.rival.fixed["c"] == 2
+    assert "c" not in plan.truth.fixed
+    plan = plan_of(changed(**rivals, rival_free=["A", "B"], values__c=2.0))
+    assert plan.rival.fixed["c"] == 2
+    plan = plan_of(changed(**rivals, rival_free=["A", "c"], values__c=3.0))
+    assert expected_values(plan.rival)["c"] == 3
+    with pytest.raises(InputError, match="none for c; use free or fixed"):
+        plan_of(changed(**rivals, rival_free=["A", "B"]))
+
+
+def test_a_rival_of_the_same_law_has_the_expected_values_of_what_it_does_not_free():
+    values = {"values": {"eps_ratio": 0.5, "lambda": "0.4 um"}}
+    plan = plan_of(changed(measure=None, rival="elasto-plastic", rival_free="eps_ratio", **values))
+    assert plan.rival.names == ("eps_ratio",)
+    assert plan.rival.fixed["lambda"] == pytest.approx(0.4e-6)
 
 
 def test_time_is_spent_on_settling_and_reading():
@@ -143,6 +164,11 @@ def test_a_mistake_is_one_sentence(changes, message):
     assert message in str(raised.value)
     assert "plan." not in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_a_number_of_synthetic_sets_below_zero_is_refused():
+    with pytest.raises(InputError, match="simulate must be a whole number of at least 0"):
+        design(PLAN, simulate=-1)
 
 
 def test_a_file_is_named_by_its_keys(tmp_path):

@@ -61,20 +61,22 @@ def test_where_the_density_cannot_be_computed_there_are_no_draws():
 
 
 def test_coordinates_carry_densities_over():
-    found = Coordinates(*(np.array([x]) for x in (-1.0, 2.0, False, 1.0, 0.0, 0.0)))
-    np.testing.assert_allclose(found.to_u(found.to_q(np.array([0.7]))), [0.7], rtol=1e-12)
+    coordinates = Coordinates(*(np.array([x]) for x in (-1.0, 2.0, False, 1.0, 0.0, 0.0)))
+    np.testing.assert_allclose(
+        coordinates.to_u(coordinates.to_q(np.array([0.7]))), [0.7], rtol=1e-12
+    )
 
     def carried(q):
         q = np.array([q])
-        x = float(found.to_u(q)[0])
-        return math.exp(-0.5 * x**2 + float(found.log_slope(q)[0]))
+        x = float(coordinates.to_u(q)[0])
+        return math.exp(-0.5 * x**2 + float(coordinates.log_slope(q)[0]))
 
     expected = quad(lambda x: math.exp(-0.5 * x**2), -1, 2)[0]
     assert quad(carried, -40, 40, limit=400, points=[0.0])[0] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.fixture(scope="module")
-def found(readings, pmma):
+def result(readings, pmma):
     return fit(readings(11), "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
 
 
@@ -82,26 +84,26 @@ SAMPLED = {"chains": 2, "draws": 250, "seed": 3, "jobs": 1}
 
 
 @pytest.fixture(scope="module")
-def posterior(found):
-    return sample_posterior(found, **SAMPLED)
+def posterior(result):
+    return sample_posterior(result, **SAMPLED)
 
 
-def test_a_posterior_is_the_normalised_likelihood(found, posterior, tmp_path):
+def test_a_posterior_is_the_normalised_likelihood(result, posterior, tmp_path):
     assert not posterior.failed.any()
     # By quadrature over a grid, in the coordinates in which the prior is flat.
-    values = found.values
-    se = {n: p.se / p.value for n, p in found.parameters.items()}
+    values = result.values
+    se = {n: p.se / p.value for n, p in result.parameters.items()}
     # lambda may be zero, so that its prior is flat in itself; that of eps_ratio in the logarithm.
     x = values["lambda"] * (1 + se["lambda"] * np.linspace(-6, 6, 13))
     y = values["eps_ratio"] * np.exp(se["eps_ratio"] * np.linspace(-6, 6, 13))
     chi2 = [
         [
-            found.objective.chi2(found.objective.coordinates({"lambda": a, "eps_ratio": b}))
+            result.objective.chi2(result.objective.coordinates({"lambda": a, "eps_ratio": b}))
             for b in y
         ]
         for a in x
     ]
-    weight = np.exp(-0.5 * (np.array(chi2) - found.chi2))
+    weight = np.exp(-0.5 * (np.array(chi2) - result.chi2))
     for name, grid, axis in (("lambda", x, 1), ("eps_ratio", y, 0)):
         marginal = weight.sum(axis) / weight.sum()
         mean = float(marginal @ grid)
@@ -119,23 +121,25 @@ def test_a_posterior_is_the_normalised_likelihood(found, posterior, tmp_path):
 
 
 @pytest.mark.long
-def test_draws_do_not_depend_on_the_number_of_processes(found, posterior):
-    again = sample_posterior(found, **{**SAMPLED, "draws": 100, "jobs": 2})
+def test_draws_do_not_depend_on_the_number_of_processes(result, posterior):
+    again = sample_posterior(result, **{**SAMPLED, "draws": 100, "jobs": 2})
     for name, draws in posterior.draws.items():
         np.testing.assert_array_equal(again.draws[name], draws[:, :100])
 
 
-def test_an_interrupted_run_says_so(found):
+def test_an_interrupted_run_says_so(result):
     def stop(done, total):
         raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="nothing was written"):
-        sample_posterior(found, **SAMPLED, progress=stop)
+        sample_posterior(result, **SAMPLED, progress=stop)
 
 
-def test_what_cannot_be_sampled_is_refused(found):
+def test_what_cannot_be_sampled_is_refused(result):
     with pytest.raises(InputError, match="chains must be at least 2"):
-        sample_posterior(found, chains=1)
+        sample_posterior(result, chains=1)
+    with pytest.raises(InputError, match="seed must be a whole number of at least 0"):
+        sample_posterior(result, seed=-1)
 
 
 @pytest.fixture(scope="module")
@@ -153,9 +157,9 @@ def fit_of_steps(run, options=None, prior=None):
     return fit(run, "rice-ruina", free, start=TRUE, starts=1, runs=options, prior=prior)
 
 
-def test_a_posterior_of_nothing_is_refused(found):
+def test_a_posterior_of_nothing_is_refused(result):
     with pytest.raises(InputError, match="posterior must be of free parameters, got none"):
-        sample_posterior(replace(found, parameters={}))
+        sample_posterior(replace(result, parameters={}))
 
 
 @pytest.mark.long
@@ -169,18 +173,18 @@ def test_a_posterior_of_nothing_is_refused(found):
     ],
 )
 def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, options, samples):
-    found = fit_of_steps(steps, options)
-    (term,) = found.objective.terms
-    assert found.observables["friction"][1] == samples
-    residuals, data = term.compiled(found.objective.names)
+    result = fit_of_steps(steps, options)
+    (term,) = result.objective.terms
+    assert result.observables["friction"][1] == samples
+    residuals, data = term.compiled(result.objective.names)
 
     @jax.jit
     @jax.value_and_grad
     def compiled_of(A):
-        return -0.5 * jnp.sum(residuals({**found.values, "A": A}, data) ** 2)
+        return -0.5 * jnp.sum(residuals({**result.values, "A": A}, data) ** 2)
 
     def both(factor):
-        values = found.values | {"A": factor * found.values["A"]}
+        values = result.values | {"A": factor * result.values["A"]}
         compiled = compiled_of(values["A"])
         expected = term.residuals(values)
         j = list(values).index("A")
@@ -196,8 +200,8 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
 
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):
-    found = fit_of_steps(steps, THROUGH_GAUGE, {"gain": Prior(1.0, 0.02, "calibration")})
-    whitened = Whitened.of(found)
+    result = fit_of_steps(steps, THROUGH_GAUGE, {"gain": Prior(1.0, 0.02, "calibration")})
+    whitened = Whitened.of(result)
     density, data = whitened.compiled()
     both = jax.jit(jax.value_and_grad(density))
     drawn = np.random.default_rng(0).normal(size=(2, whitened.mode.size))

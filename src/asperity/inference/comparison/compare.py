@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -251,25 +252,19 @@ def compare(
                 key: {n: values[n] for n in _own_parameters(name, list(values), laws)}
                 for key, values in given.items()
             }
-            chosen = dict(options)
             if before and before[name].converged:
                 # Nearly the same data.
                 mine["start"] = {n: before[name].values[n] for n in names}
-                chosen["starts"] = min(
-                    _STARTS_WITHOUT_OUTLIERS, options.get("starts", _STARTS_WITHOUT_OUTLIERS)
-                )
+                most = _STARTS_WITHOUT_OUTLIERS
+                mine["starts"] = min(most, options.get("starts", most))
+            internal: dict[str, Any] = {
+                "bare": True,
+                "simpler": list(done.values()),
+                "check_stiffness": False,
+                "progress": lambda done, total, k=k: report(k + done / total),
+            }
             try:
-                done[name] = fit(
-                    data,
-                    name,
-                    names,
-                    bare=True,
-                    simpler=list(done.values()),
-                    check_stiffness=False,
-                    progress=lambda done, total, k=k: report(k + done / total),  # type: ignore[misc]
-                    **mine,
-                    **chosen,
-                )
+                done[name] = fit(data, name, names, **internal, **{**options, **mine})
             except UnfittableLawError as error:
                 not_compared[name] = str(error)
             report(k + 1)
@@ -551,41 +546,34 @@ def what_would_tell(first: Fit, second: Fit) -> str:
     largest = float(table.points["epsilon"].max())
     # Free or fixed.
     ratio = max(float({**f.objective.fixed, **f.values}["eps_ratio"]) for f in (first, second))
-    trials = []
-    for name in ("V", "epsilon", "frequency"):
-        for factor in _FACTORS:
-            if name == "epsilon" and largest * factor * ratio >= _LARGEST_EPSILON:
-                continue
-            trials.append({**table.points, name: table.points[name] * factor})
     typical = {n: np.full(table.rows, np.nanmedian(e)) for n, e in table.errors.items()}
-    best: tuple[float, str] = (0.0, "")
-    for changed in trials:
-        trial = LockInTable(table.name, changed, table.values, typical)
-        predictions = []
+    farthest, sentence = 0.0, ""
+    for name, factor in itertools.product(("V", "epsilon", "frequency"), _FACTORS):
+        if name == "epsilon" and largest * factor * ratio >= _LARGEST_EPSILON:
+            continue
+        points = {**table.points, name: table.points[name] * factor}
+        trial = LockInTable(table.name, points, table.values, typical)
+        weights, residuals = weights_of(trial), []
         for f in (first, second):
-            points = {n: v for n, v in changed.items() if n not in f.values}
-            term = LockInTerm(trial, f.objective.law, {**f.objective.fixed, **points}, **motion)
-            predicted, _, outcome = term.predicted(f.values)
-            predictions.append(predicted if all_converged(outcome) else None)
-        if None in predictions:
+            constants = {n: v for n, v in points.items() if n not in f.values}
+            term = LockInTerm(trial, f.objective.law, {**f.objective.fixed, **constants}, **motion)
+            prediction, _, outcome = term.predicted(f.values)
+            if all_converged(outcome):
+                residuals.append(residuals_of(weights, prediction, {}))
+        if len(residuals) < 2:
             continue
-        weights = weights_of(trial)
-        a, b = (residuals_of(weights, p, {}) for p in predictions if p is not None)
-        if a.values.shape != b.values.shape:
-            continue
+        a, b = residuals
         apart = np.abs(a.values - b.values)
         j = int(np.argmax(apart))
-        if apart[j] > best[0]:
-            point = {n: changed[n][a.row[j]] for n in ("V", "epsilon", "frequency")}
-            best = (
-                float(apart[j]),
-                f"{a.observable[j]} at V = {point['V']:.3g} m/s, eps = {point['epsilon']:.3g}, "
-                f"f = {point['frequency']:.4g} Hz, where they differ by {apart[j]:.2g} of its "
-                "standard uncertainties",
+        if apart[j] > farthest:
+            farthest, row = float(apart[j]), a.row[j]
+            sentence = (
+                "what would tell them apart best among points near the measured ones: "
+                f"{a.observable[j]} at V = {points['V'][row]:.3g} m/s, "
+                f"eps = {points['epsilon'][row]:.3g}, f = {points['frequency'][row]:.4g} Hz, "
+                f"where they differ by {farthest:.2g} of its standard uncertainties"
             )
-    if not best[1]:
-        return ""
-    return f"what would tell them apart best among points near the measured ones: {best[1]}"
+    return sentence
 
 
 def comparison_record(comparison: Comparison) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, typed
 
 
 @dataclass(frozen=True)
@@ -297,7 +297,7 @@ _SAME = 1e-12
 def design(
     plan: DesignPlan | Mapping[str, Any] | str | Path,
     *,
-    simulate: int = 0,
+    simulate: Annotated[int, at_least(0)] = 0,
     progress: Progress | None = None,
 ) -> Design:
     """Operating points that measure parameters or exclude a law best.
@@ -392,8 +392,8 @@ class _Task:
         best = criterion.value(shares.shares * total / self.cost)
         reached = shares.efficiency * criterion.least_efficiency(best - value, value)
         fewer = times_fewer(criterion, self.grid.readings(self.cost, total), value)
-        numbers = {"fewer": fewer, "alone": self._alone(criterion, value)}
-        return self._described(n, shares, reached, simulate, numbers)
+        alone = self._alone(criterion, value)
+        return self._described(n, shares, reached, simulate, fewer=fewer, alone=alone)
 
     def _alone(
         self, criterion: Determinant, value: float
@@ -450,26 +450,30 @@ class _Task:
             if p is None
         ]
         fewer = best.chi2 / on_grid.chi2 if on_grid.chi2 > 0 else math.inf
-        numbers: dict[str, Any] = {
-            "fewer": math.nan if warnings else fewer,
-            "chi2": best.chi2,
-            "chi2_grid": on_grid.chi2,
-            "probability": probable,
-            "probability_grid": probable_on_grid,
-            "rival_values": rival.named(best.u),
-        }
+        fewer = math.nan if warnings else fewer
         if result.unseen:
             warnings.append(
                 f"{name} has no response at {result.unseen} candidates with the values that come "
                 "nearest; they were not judged"
             )
-        numbers["warnings"] = warnings
         whole = result.criterion.least_efficiency(result.chi2_shares - best.chi2, best.chi2)
-        shares, other = result.shares, (fits, best.u)
+        shares = result.shares
         if probable is None:  # the bound holds only at a minimum
             shares = replace(shares, efficiency=0.0)
-        least = shares.efficiency * whole
-        return self._described(result.readings, shares, least, simulate, numbers, other)
+        return self._described(
+            result.readings,
+            shares,
+            shares.efficiency * whole,
+            simulate,
+            (fits, best.u),
+            warnings,
+            fewer=fewer,
+            chi2=best.chi2,
+            chi2_grid=on_grid.chi2,
+            probability=probable,
+            probability_grid=probable_on_grid,
+            rival_values=rival.named(best.u),
+        )
 
     def _determinant(self) -> Determinant:
         """The criterion at the expected values, or averaged over the draws."""
@@ -496,14 +500,17 @@ class _Task:
         shares: Shares,
         reached: float,
         simulate: int,
-        numbers: Mapping[str, Any],
         rival: tuple[RivalFit, Float] | None = None,
+        warnings: Sequence[str] = (),
+        *,
+        fewer: float,
+        **numbers: Any,
     ) -> Design:
+        """The design of whole readings; `numbers` are further fields of it."""
         candidates = self.candidates
         errors, correlation = self._errors(n.astype(float))
-        warnings = [*numbers.get("warnings", ()), *self._warnings(errors, shares)]
-        if any(math.isinf(errors[name].se) for name in self.plan.question.measure):
-            numbers = {**numbers, "fewer": math.nan}
+        warnings = [*warnings, *self._warnings(errors, shares)]
+        undetermined = any(math.isinf(errors[name].se) for name in self.plan.question.measure)
         simulation = None
         if simulate:
             simulation = self._simulated(n.astype(float), simulate, rival)
@@ -517,13 +524,15 @@ class _Task:
             efficiency_whole=reached,
             parameters=errors,
             correlation=correlation,
+            fewer=math.nan if undetermined else fewer,
             grid_levels=self.grid.levels,
             grid_usable=(self.grid.rows.size, self.grid.size),
             candidates=candidates.index.size,
             combinations=candidates.total,
             left_out=candidates.left_out,
             simulation=simulation,
-            **{**numbers, "warnings": tuple(warnings)},
+            warnings=tuple(warnings),
+            **numbers,
         )
 
     def _errors(self, n: Float) -> tuple[dict[str, ExpectedError], Float]:

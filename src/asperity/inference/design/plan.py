@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +30,7 @@ from asperity.materials import Material, load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.toml_file import toml_content
-from asperity.questions.design import MOST, Design, Noise, Range
+from asperity.questions.design import MOST, Design, Range
 from asperity.questions.record import require_unit as with_unit, units_required
 from asperity.units import to_radians, to_si
 
@@ -175,12 +174,15 @@ def _checked(question: Design, name: str) -> DesignPlan:
     # A table with the ends of all axes stands for the candidates.
     ends = {n: np.array([levels.min(), levels.max()]) for n, levels in axes.items()}
     table = LockInTable(name, ends, {}, {})
-    truth = _hypothesis(question, law, law, question.free, material, table)
+    rival_law = None if question.rival is None else _law(question.rival, "rival")
+    # Numbers of a plan may be of either law.
+    every = known if rival_law is None else {**_known(rival_law), **known}
+    truth = _hypothesis(question, law, every, question.free, material, table)
     rival = None
-    if question.rival is not None:
-        rival_law = _law(question.rival, "rival")
+    if rival_law is not None:
         free = question.rival_free or tuple(n for n in truth.names if n in _known(rival_law))
-        rival = _hypothesis(question, rival_law, law, free, material, table)
+        of_truth = () if rival_law is law else known
+        rival = _hypothesis(question, rival_law, every, free, material, table, of_truth)
         holds = rival_law is not law or not set(truth.names) <= set(rival.names)
         rule, got = "differ from the law", f"{law.name} with the same free parameters"
         require(holds, "rival", rule, got, "name another law, or leave one out in rival_free")
@@ -225,8 +227,7 @@ def _known(law: type[Law]) -> dict[str, Parameter]:
 
 def _quantity(value: Any, parameter: Parameter, label: str) -> float:
     """A value of a parameter in SI, checked by the rule of the parameter."""
-    with_unit(value, parameter.kind, label)
-    return float(parameter.check(to_si(value, parameter.kind, label), label))
+    return float(parameter.check(with_unit(value, parameter.kind, label), label))
 
 
 def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> dict[str, float]:
@@ -272,61 +273,59 @@ def _levels(name: str, given: Range, parameter: Parameter) -> Float:
 
 
 def _noise(question: Design) -> dict[str, NoiseLevel]:
-    """Standard uncertainties of a reading, by observable."""
+    """Standard uncertainties of a reading, by observable, in the order of `OBSERVABLES`."""
     for name in question.noise:
         if name not in OBSERVABLES:
             rule = "be of observables"
             raise InputError("noise", rule, f"'{name}'", closest(name, OBSERVABLES))
-    return {n: _level(n, question.noise[n]) for n in OBSERVABLES if n in question.noise}
-
-
-def _level(name: str, given: Noise) -> NoiseLevel:
-    """Standard uncertainty of one observable."""
-    label = f"noise.{name}"
-    phase = name.startswith("phase")
-    rule = "be absolute"
-    require(not phase or not given.relative, label, rule, "a relative part", "give an angle")
-    absolute = given.absolute
-    if phase and not isinstance(absolute, str) and absolute != 0:
-        rule = "be an angle in rad or deg, with its unit"
-        raise InputError(label, rule, repr(absolute), "write it like '1 deg' or '20 mrad'")
-    a = to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label)
-    r = to_si(given.relative, "dimensionless", f"{label}.relative")
-    a, r = float(a), float(r)
-    if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
-        worst = max(a, r) if min(a, r) >= 0 else min(a, r)
-        rule = "be positive"
-        raise InputError(label, rule, f"{worst:g}", "give the standard uncertainty of one reading")
-    return NoiseLevel(a, r)
+    levels = {}
+    for name in (name for name in OBSERVABLES if name in question.noise):
+        absolute, relative = question.noise[name].absolute, question.noise[name].relative
+        label, phase = f"noise.{name}", name.startswith("phase")
+        rule = "be absolute"
+        require(not phase or not relative, label, rule, "a relative part", "give an angle")
+        if phase and not isinstance(absolute, str) and absolute != 0:
+            rule = "be an angle in rad or deg, with its unit"
+            raise InputError(label, rule, repr(absolute), "write it like '1 deg' or '20 mrad'")
+        a = float(to_radians(absolute, label) if phase else to_si(absolute, "dimensionless", label))
+        r = float(to_si(relative, "dimensionless", f"{label}.relative"))
+        if a < 0 or r < 0 or (a == 0 and r == 0 and not phase):
+            worst = max(a, r) if min(a, r) >= 0 else min(a, r)
+            advice = "give the standard uncertainty of one reading"
+            raise InputError(label, "be positive", f"{worst:g}", advice)
+        levels[name] = NoiseLevel(a, r)
+    return levels
 
 
 def _hypothesis(
     question: Design,
     law: type[Law],
-    first: type[Law],
+    every: Mapping[str, Parameter],
     free: Sequence[str],
     material: Material | None,
     table: LockInTable,
+    of_truth: Collection[str] = (),
 ) -> Objective:
     """A law with its free and fixed parameters, without data.
 
-    `first` says whether this is the law of the plan, which has the values of the plan. `table`
-    stands for the candidates.
+    The numbers of the plan are of parameters in `every`. An expected value of a parameter that is
+    not free is a fixed number; but those of `of_truth`, the parameters of another law that the
+    readings follow, say nothing about this law. `table` stands for the candidates.
     """
     known = _known(law)
-    every = {**known, **_known(first)}
     given, fixed = (
         {n: v for n, v in _numbers(question, field, every).items() if n in known}
         for field in ("values", "fixed")
     )
-    for name, field in itertools.chain(((n, "fixed") for n in fixed), ((n, "free") for n in free)):
-        rule = "not have what ranges has"
-        advice = "drop one" if field == "fixed" else "it is set, not fitted"
-        require(name not in table.points, field, rule, f"'{name}'", advice)
+    rule = "not have what ranges has"
+    for name in fixed:
+        require(name not in table.points, "fixed", rule, f"'{name}'", "drop one")
+    for name in free:
+        require(name not in table.points, "free", rule, f"'{name}'", "it is set, not fitted")
     for name in given:
         rule = "be given once"
         require(name not in fixed or name in free, f"values.{name}", rule, "two", "drop one")
-        if name not in free and first is law:
+        if name not in free and name not in of_truth:
             fixed[name] = given[name]
     start = start_values(law, free, {n: v for n, v in given.items() if n in free}, material)
     if "eps_ratio" in free:

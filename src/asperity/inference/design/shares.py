@@ -22,7 +22,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,8 @@ from asperity.arrays import Float, Index
 
 #: Relative addition to the diagonal of an information matrix, which makes it invertible.
 _RIDGE = 1e-11
+#: Relative round-off of a sum of squares.
+_ROUND_OFF = 1e-15
 
 
 class Determinant:
@@ -97,15 +101,20 @@ class Determinant:
         """Lower bound of the efficiency, by the s-th root of the determinant: inverse variance."""
         return float(np.exp(-max(gap, 0.0) / len(self.interest)))
 
-    def restricted(self, rows: Index) -> Determinant:
+    def restricted(self, rows: Index) -> Self:
         """The criterion for some of the candidates."""
-        part = Determinant(self.information[:, rows], self.prior, self.interest)
-        part._ridge = self._ridge
+        part = copy(self)
+        part.information = self.information[:, rows]
         return part
 
 
-class Misfit:
+class Misfit(Determinant):
     """Smallest chi-squared of a rival law whose predictions are linear in its parameters.
+
+    The rival has one more column, its residuals. In the sum of the inner products of the columns,
+    the block of the residuals given that of the parameters (the Schur complement) is the
+    chi-squared of the refitted rival: the exponential of a `Determinant` with the residuals as the
+    parameter of interest.
 
     Parameters
     ----------
@@ -124,76 +133,39 @@ class Misfit:
     ) -> None:
         self.residual, self.jacobian = residual, jacobian
         self.prior_residual, self.prior_jacobian = prior_residual, prior_jacobian
-        self._square = np.einsum("im,im->i", residual, residual)
-        self._slope = np.einsum("imp,im->ip", jacobian, residual)
-        self._curvature = np.einsum("imp,imq->ipq", jacobian, jacobian)
-        self._prior = (
-            float(prior_residual @ prior_residual),
-            prior_jacobian.T @ prior_residual,
-            prior_jacobian.T @ prior_jacobian,
-        )
-        largest = np.einsum("iaa->a", self._curvature) + np.diag(self._prior[2])
-        self._ridge = np.diag(_RIDGE * np.where(largest > 0, largest, 1.0) / max(len(residual), 1))
-
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return len(self.residual)
-
-    def _sums(self, n: Float) -> tuple[float, Float, Float]:
-        square, slope, curvature = self._prior
-        return (
-            square + float(n @ self._square),
-            slope + n @ self._slope,
-            curvature + np.einsum("i,ipq->pq", n, self._curvature) + self._ridge,
-        )
-
-    def step(self, n: Float) -> Float:
-        """Change of the rival's coordinates that minimises chi-squared, shape (p,)."""
-        _, slope, curvature = self._sums(n)
-        return np.asarray(-np.linalg.solve(curvature, slope))
+        columns = np.concatenate([residual[..., None], jacobian], axis=-1)
+        prior = np.column_stack([prior_residual, prior_jacobian])
+        products = np.einsum("ima,imb->iab", columns, columns)
+        super().__init__(products[None], (prior.T @ prior)[None], [0])
+        # What is added to the squares of the residuals counts as chi-squared: only their round-off.
+        self._ridge[:, 0, 0] *= _ROUND_OFF / _RIDGE
 
     def value(self, n: Float) -> float:
         """chi-squared of the refitted rival."""
-        square, slope, curvature = self._sums(n)
-        return float(square - slope @ np.linalg.solve(curvature, slope))
+        return math.exp(super().value(n))
 
     def gradient(self, n: Float) -> Float:
         """chi-squared of the refitted rival at each candidate."""
-        refitted = self.residual + self.jacobian @ self.step(n)
-        return np.asarray(np.einsum("im,im->i", refitted, refitted))
+        return self.value(n) * super().gradient(n)
 
     def exchanged(self, n: Float) -> Float:
         """chi-squared with one more reading of each candidate."""
-        square, slope, curvature = self._sums(n)
-        slopes = slope + self._slope
-        steps = np.linalg.solve(curvature + self._curvature, slopes[..., None])[..., 0]
-        return np.asarray(square + self._square - np.einsum("ip,ip->i", slopes, steps))
+        return np.exp(super().exchanged(n))
 
     def least_efficiency(self, gap: float, value: float) -> float:
         """Lower bound of the efficiency, by chi-squared."""
         return float(value / (value + max(gap, 0.0))) if 0 < value < math.inf else 0.0
 
-    def restricted(self, rows: Index) -> Misfit:
-        """The criterion for some of the candidates."""
-        part = Misfit(
-            self.residual[rows], self.jacobian[rows], self.prior_residual, self.prior_jacobian
-        )
-        part._ridge = self._ridge
-        return part
-
 
 Whole = NDArray[np.int64]
-#: A concave, increasing function of the numbers of readings.
-Criterion = Determinant | Misfit
 
 #: Largest part of the information of the best design that may be missing.
 _TOLERANCE = 1e-3
 _ROUNDS = 200
 #: Smaller shares are set to zero.
 _NEGLIGIBLE = 1e-5
-#: Number of candidates that join the support in one round.
-_JOINING = 3
+#: Number of candidates of the first support, and of those that join it in one round.
+_FIRST, _JOINING = 60, 3
 #: Sweeps of exchanges of whole readings.
 _SWEEPS = 30
 
@@ -214,12 +186,12 @@ class Shares:
     efficiency: float
 
 
-def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = None) -> Shares:
+def optimal_shares(criterion: Determinant, readings: Float, start: Float | None = None) -> Shares:
     """Shares of the budget that maximise a criterion.
 
     Parameters
     ----------
-    criterion : Criterion
+    criterion : Determinant
     readings : array, shape (candidates,)
         Readings of each candidate if it gets the whole budget.
     start : array, shape (candidates,), optional
@@ -227,8 +199,7 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
     """
     shares = np.full(criterion.size, 1 / criterion.size) if start is None else start
     best, efficiency = shares, 0.0
-    reduced = False
-    for _ in range(_ROUNDS):
+    for round_ in range(_ROUNDS):
         slope = criterion.gradient(shares * readings) * readings
         gap = float(slope.max() - shares @ slope)
         value = criterion.value(shares * readings)
@@ -237,18 +208,11 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
             best, efficiency = shares, reached
         if efficiency >= 1 - _TOLERANCE:
             break
-        if not reduced:
-            # Start from the best candidates of the even shares; others can join the support later.
-            few = min(criterion.size, 60)
-            support = np.union1d(
-                np.argsort(-slope)[:few], np.flatnonzero(shares > 2 / criterion.size)
-            )
-            reduced = True
-        else:
-            support = np.flatnonzero(shares > _NEGLIGIBLE)
-            support = np.union1d(support, np.argsort(-slope)[:_JOINING])
-        on_support = np.where(shares[support] > 0, shares[support], 0.0)
-        on_support = 0.9 * on_support / max(on_support.sum(), 1e-300) + 0.1 / support.size
+        # The first support has the best candidates of the even shares; others can join it later.
+        least, joining = (2 / criterion.size, _FIRST) if round_ == 0 else (_NEGLIGIBLE, _JOINING)
+        support = np.union1d(np.flatnonzero(shares > least), np.argsort(-slope)[:joining])
+        on_support = shares[support]
+        on_support = 0.9 * on_support / on_support.sum() + 0.1 / support.size
         result = _on_support(criterion.restricted(support), readings[support], on_support)
         shares = np.zeros(criterion.size)
         shares[support] = np.where(result > _NEGLIGIBLE, result, 0.0)
@@ -256,7 +220,7 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
     return Shares(best, efficiency)
 
 
-def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
+def _on_support(criterion: Determinant, readings: Float, start: Float) -> Float:
     """Optimal shares of a few candidates."""
     result = minimize(
         lambda s: -criterion.value(s * readings),
@@ -274,12 +238,12 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     return max(start, improved, key=lambda s: criterion.value(s * readings))
 
 
-def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Float) -> Whole:
+def whole_readings(criterion: Determinant, cost: Float, total: float, shares: Float) -> Whole:
     """Whole numbers of readings within the budget, from optimal shares by exchanges.
 
     Parameters
     ----------
-    criterion : Criterion
+    criterion : Determinant
     cost : array, shape (candidates,)
         Cost of a reading.
     total : float
@@ -308,7 +272,7 @@ def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Floa
     return n.astype(np.int64)
 
 
-def _filled(criterion: Criterion, cost: Float, total: float, n: Float) -> Float:
+def _filled(criterion: Determinant, cost: Float, total: float, n: Float) -> Float:
     """Add readings one by one, each with the largest gain per cost, until the budget is spent."""
     n = n.copy()
     while True:
@@ -380,12 +344,12 @@ def even_grid(shape: tuple[int, ...], index: Index, cost: Float, total: float) -
     return best[1]
 
 
-def times_fewer(criterion: Criterion, readings: Float, target: float) -> float:
+def times_fewer(criterion: Determinant, readings: Float, target: float) -> float:
     """The factor by which readings must be multiplied to reach a value of the criterion.
 
     Parameters
     ----------
-    criterion : Criterion
+    criterion : Determinant
     readings : array, shape (candidates,)
     target : float
 

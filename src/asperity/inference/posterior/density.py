@@ -35,8 +35,8 @@ from asperity.inference.unknowns import Unknown
 #: further step would gain half its square, which is near the accuracy of orbits and motions. The
 #: second number is the largest number of steps.
 _REACHED, _STEPS = 0.05, 20
-#: Limits of the standard deviations of q.
-_NARROWEST, _WIDEST = 1e-9, 3.0
+#: Largest standard deviation of q.
+_WIDEST = 3.0
 
 
 class Coordinates(NamedTuple):
@@ -196,8 +196,7 @@ class Whitened:
         # At least a tenth of a standard deviation away from the bounds.
         step = 0.1 * np.minimum(sd, high - low)
         start = coordinates.to_q(np.clip(u, low + step, high - step))
-        near = cls(objective, coordinates, start, np.eye(len(u)))
-        near = near._rooted(start)
+        near = cls(objective, coordinates, start, np.eye(len(u)))._rooted(start)
         climbed = minimize(
             lambda z: -near.log_density(z)[0],
             np.zeros(len(u)),
@@ -264,11 +263,10 @@ class Whitened:
 
 
 def _root(information: Float) -> Float:
-    """Root of the inverse of an information matrix, with standard deviations within limits."""
+    """Root of the inverse of an information matrix, with limited standard deviations."""
     scale = np.sqrt(np.maximum(np.diag(information), _WIDEST**-2))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    sd = np.clip(1 / np.sqrt(np.maximum(values, 1e-30)), _NARROWEST, _WIDEST / np.min(1 / scale))
-    root = (vectors * sd) / scale[:, None]
+    root = vectors / np.sqrt(np.maximum(values, 1e-30)) / scale[:, None]
     # No direction moves a coordinate by more than the largest standard deviation.
     longest = np.sqrt((root**2).sum(0))
     return np.asarray(root * np.minimum(1.0, _WIDEST / longest))

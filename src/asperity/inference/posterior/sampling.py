@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, wait
 from functools import partial
 from importlib.util import find_spec
-from typing import Any
+from typing import Annotated, Any
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +25,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.outputs import Interrupted
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import at_least, counted, typed
 
 #: Logarithm of a density as a function of z and of arrays.
 LogDensity = Callable[[Array, Any], Array]
@@ -52,7 +52,7 @@ def sample_posterior(
     *,
     chains: int = 4,
     draws: int = 1000,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Posterior:
@@ -95,10 +95,9 @@ def sample_posterior(
     density, data = whitened.compiled()
     blocks = -(-draws // BLOCK)
     kept: list[list[Transitions]] = [[] for _ in range(chains)]
-    done, total = 0, chains * (WARM_UP + blocks * BLOCK)
-    report = progress or (lambda done, total: None)
+    report = counted(progress, chains * (WARM_UP + blocks * BLOCK))
     try:
-        report(done, total)
+        report(0)
         # One thread per process: the order of sums depends on the number of threads.
         with process_pool(min(jobs or available_cores(), chains), "jobs") as pool:
             waiting = {
@@ -109,15 +108,16 @@ def sample_posterior(
             }
             while waiting:
                 finished = wait(waiting, timeout=_REPORT_INTERVAL, return_when=FIRST_COMPLETED).done
+                drawn = 0
                 for future in finished:
                     chain = waiting.pop(future)
                     state, transitions = future.result()
                     if transitions is not None:
                         kept[chain].append(transitions)
-                    done += WARM_UP if transitions is None else BLOCK
+                    drawn += WARM_UP if transitions is None else BLOCK
                     if len(kept[chain]) < blocks:
                         waiting[pool.submit(next_block, density, data, state)] = chain
-                report(done, total)
+                report(drawn)
     except KeyboardInterrupt:
         raise Interrupted() from None
     return posterior_of(fit, whitened, kept, seed=seed)
