@@ -163,6 +163,20 @@ def require(
         raise InputError(field, rule, got, advice)
 
 
+def require_known(name: str, known: Iterable[str], field: str | Argument, rule: str) -> None:
+    """Raise an `InputError` about a name that is none of the known ones, with the nearest of them.
+
+    Parameters
+    ----------
+    name : str
+    known : iterable of str
+    field, rule : str
+        As in `InputError`.
+    """
+    if name not in known:
+        raise InputError(field, rule, f"'{name}'", closest(name, known))
+
+
 class InputTypeError(InputError, TypeError):
     """An argument of another type than its annotation says."""
 

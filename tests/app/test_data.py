@@ -453,6 +453,12 @@ def test_recordings_are_dropped_measured_and_restored_from_their_link(
     mu1 = float(parts.inner_text().split("\t")[8].split()[0])
     assert mu1 == pytest.approx(MU1, rel=0.01)
     assert parts.get_by_label("Use part 1 in fits").is_checked()
+    options = good.locator("summary", has_text="Channels")
+    options.click()
+    good.get_by_role("textbox", name="Harmonics").fill("6")
+    good.get_by_role("textbox", name="Harmonics").press("Enter")
+    good.locator(".panel.harmonics .bar").nth(5).wait_for()
+    options.click()
     assert "against the load" in good.get_by_role("region", name="good.csv: ").inner_text()
     sentence = events.locator(".sentence", has_text="Regular stick-slip: ")
     sentence.wait_for()
@@ -532,28 +538,30 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
     assert run.velocities == pytest.approx([1e-6, 1e-5], rel=1e-3)
 
 
-def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monkeypatch):
+def test_a_fit_of_the_page_is_copied_as_texts_that_ask_the_same(steps, monkeypatch):
     steps["question"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
     more = {
         "fit_rate": "2 Hz", "gauge": "50 Hz", "fixed": {"W0": "10 N"}, "drift": True,
         "prior": {"K": "0.2+-0.01 N/um"}, "trend": "quadratic",
     }  # fmt: skip
     page = fits.Fitted(**steps["question"], **more)
-    command = shlex.split(fits._fit_command(page, ["steps.csv"]))
+    texts = fits._texts(page, ["steps.csv"])
     asked = []
     monkeypatch.setattr(
         "asperity.inference.answers.answer_fit", lambda question, **_: asked.append(question)
     )
-    CliRunner().invoke(main, command[1:])
-    (question,) = asked
-    names = [*fits.FitOptions.model_fields]
-    assert question.model_dump(include=names) == page.model_dump(include=names)
-    assert question.law == "rice-ruina"
-    (data,) = question.data
-    run = page.runs[0]
-    assert data.window == tuple(run.window)
-    assert data.steps == tuple(run.steps)
-    assert data.source.units == run.source.units
+    CliRunner().invoke(main, shlex.split(texts["command"])[1:])
+    exec(texts["python"], {})
+    assert len(asked) == 2
+    for question in asked:
+        names = [*fits.FitOptions.model_fields]
+        assert question.model_dump(include=names) == page.model_dump(include=names)
+        assert question.law == "rice-ruina"
+        (data,) = question.data
+        run = page.runs[0]
+        assert data.window == tuple(run.window)
+        assert data.steps == tuple(run.steps)
+        assert data.source.units == run.source.units
 
 
 @pytest.mark.parametrize(

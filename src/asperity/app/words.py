@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from asperity.errors import Argument
 
-_LABELS: Mapping[str, str] = {
+#: Label of the page of each field.
+LABELS: Mapping[str, str] = {
     "window": "Window",
     "slice.start and slice.end": "Window",
     "detrend": "Drift",
@@ -33,6 +34,7 @@ _LABELS: Mapping[str, str] = {
     "free": "Free parameters",
     "fixed": "Fixed numbers",
     "laws": "Laws",
+    "material": "Other numbers from",
     "prior": "Published uncertainties as priors",
     "gauge": "Low-pass of the force gauge",
     "drift": "Friction also drifts over time",
@@ -53,13 +55,14 @@ _LABELS: Mapping[str, str] = {
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
-_ROLES: Mapping[str, str] = {
-    "time": "Time column",
-    "W": "Normal load",
-    "F": "Shear force",
-    "velocity": "Velocity",
-    "displacement": "Displacement",
-    "friction": "Friction",
+#: What a channel is, by its role.
+ROLES: Mapping[str, str] = {
+    "time": "time",
+    "W": "normal load",
+    "F": "shear force",
+    "velocity": "velocity",
+    "displacement": "displacement",
+    "friction": "friction",
 }
 
 
@@ -78,7 +81,7 @@ def in_labels(argument: Argument) -> str:
     elif name == "fixed" and key:
         label = f"Fixed numbers, {key}"
     elif name in ("columns", "Trace.channel") and key:
-        label = _ROLES.get(key, f"Role {key}")
+        label = LABELS.get(key) or ROLES.get(key, f"role {key}").capitalize()
     elif name == "units" and key:
         label = f"Unit of {key}"
     elif name == "channels" and key:
@@ -86,5 +89,5 @@ def in_labels(argument: Argument) -> str:
     elif name == "modulated":
         return f"What it is{': velocity steps and holds' if value == 'False' else ''}"
     else:
-        label = _LABELS.get(argument.whole) or _LABELS.get(name, name)
+        label = LABELS.get(argument.whole) or LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

@@ -156,7 +156,7 @@ def _question_options(*further: Decorator) -> Decorator:
                 of_run = {
                     "window": window,
                     "steps": None if steps is None else listed_times(steps, "--steps"),
-                    "velocities": None if velocities is None else velocities.split(","),
+                    "velocities": velocities,
                 }
                 fields = {
                     "data": [{"file": path, "source": source, **of_run} for path in data],

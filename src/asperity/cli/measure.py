@@ -236,7 +236,7 @@ def measure(
     fields |= {
         "modulated": False if no_modulation else None,
         "steps": None if steps is None else listed_times(steps, "--steps"),
-        "velocities": None if velocities is None else velocities.split(","),
+        "velocities": velocities,
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
     }

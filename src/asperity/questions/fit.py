@@ -22,13 +22,14 @@ from asperity.questions.record import (
     Names,
     Question,
     Record,
-    Seconds,
     Span,
+    Times,
     Whole,
+    listed,
     quantity,
     shown,
 )
-from asperity.questions.recording import Pulling, Source
+from asperity.questions.recording import Source, Velocities
 
 
 class Data(Record):
@@ -53,8 +54,8 @@ class Data(Record):
     name: str = ""
     source: Source = Field(default_factory=Source)
     window: Span | None = None
-    steps: tuple[Seconds, ...] | None = None
-    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
+    steps: Times | None = None
+    velocities: Velocities | None = None
 
 
 class NormalPrior(Record):
@@ -196,9 +197,7 @@ class _OfData(Question, FitOptions):
 
 
 def _auto_or_listed(value: Any, spans: Callable[[Any], Any]) -> Any:
-    if value == "auto":
-        return value
-    return spans(value.split(",") if isinstance(value, str) else value)
+    return value if value == "auto" else spans(listed(value))
 
 
 class Fit(_OfData):

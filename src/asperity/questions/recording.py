@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Seconds, Span, Whole, quantity, shown
+from asperity.questions.record import Question, Span, Times, Whole, listed, quantity, shown
 
 Column = str | int
 
@@ -23,6 +23,8 @@ def _hold(value: Any) -> Any:
 
 #: Velocity of the drive between two steps (m/s), 0 in a hold.
 Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]  # type: ignore[valid-type]
+#: Velocities between steps, one more than these; a text has commas between them.
+Velocities = Annotated[tuple[Pulling, ...], BeforeValidator(listed)]  # type: ignore[valid-type]
 
 
 class ReadingRecipe(Question):
@@ -147,8 +149,8 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
-    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
+    steps: Annotated[Times, AfterValidator(_in_order)] | None = None
+    velocities: Velocities | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: StrictBool | None = None
     stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]

@@ -67,7 +67,7 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
             return {"table": table}
         report(stage="reading")
         trace = read_source(path, Source(**argument["source"]))
-        report(recording=_described(trace, name, argument["source"]))
+        report(recording=_described(trace, name))
         return _measured(trace, argument, report)
 
 
@@ -82,7 +82,7 @@ def named(path: Path, name: str) -> Iterator[None]:
             raise InputError(printable(text, 900)) from None
 
 
-def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, Any]:
+def _described(trace: Any, name: str) -> dict[str, Any]:
     """Channels and units as understood, findings of the reader, and curves of the channels."""
     kinds = {n: c.kind for n, c in trace.channels.items()}
     roles = {role: trace.roles.get(role) for role in ROLES if role != "time"}
@@ -116,7 +116,6 @@ def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, An
         "candidates": fitting,
         "findings": [asdict(f) for f in trace.findings[:_MOST_LISTED]],
         "provenance": {**provenance, "file": name},
-        "python": _read_python(name, source),
     }  # fmt: skip
 
 
@@ -236,14 +235,10 @@ def _table_in(path: Path, name: str) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _read_python(name: str, source: Mapping[str, Any]) -> str:
-    arguments = "".join(f", {k}={v!r}" for k, v in Source(**source).arguments.items())
-    return f"trace = asp.read({name!r}{arguments})"
-
-
 def _python(name: str, source: Source, question: questions.Measurement, *, modulated: bool) -> str:
     """The same measurement as Python."""
-    lines = ["import asperity as asp", "", _read_python(name, source.model_dump())]
+    reading = "".join(f", {k}={v!r}" for k, v in source.arguments.items())
+    lines = ["import asperity as asp", "", f"trace = asp.read({name!r}{reading})"]
     if source.area:
         lines.insert(1, "from asperity.recording import stress_to_force")
         lines.append(f"trace = stress_to_force(trace, {source.area!r})")

@@ -148,6 +148,26 @@ export function tick(label, checked, onInput, title) {
   return { element, set: (value) => { box.checked = value; }, box };
 }
 
+/** The box that counts the mass of the slider among the numbers of a view. */
+export function inertiaTick(numbers, changed) {
+  return tick("With the mass of the slider (inertia)", Boolean(numbers.inertia), (on) => {
+    if (on) numbers.inertia = 1;
+    else delete numbers.inertia;
+    changed();
+  }).element;
+}
+
+/** A labelled text, taken without blanks around it when it is finished. */
+export function textField(label, value, onInput, placeholder = "") {
+  const id = fresh("field");
+  const field = el("input", {
+    type: "text", id, placeholder, spellcheck: "false", autocomplete: "off",
+    change: () => onInput(field.value.trim()),
+  });
+  field.value = value ?? "";
+  return el("div", { class: "choice" }, el("label", { for: id }, label), field);
+}
+
 /** A labelled list to choose from. */
 export function choice(label, options, value, onInput) {
   const id = fresh("choice");

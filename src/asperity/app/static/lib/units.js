@@ -62,6 +62,11 @@ export function parse(text, kind) {
   return step[1] < 0 ? number / 10 ** -step[1] : number * 10 ** step[1];
 }
 
+/** A number of the address in SI, or its text where it has a unit. */
+export function written(text) {
+  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
+}
+
 /** A value with the digits that its standard uncertainty leaves. */
 export function withDoubt(value, doubt) {
   if (value === null || value === undefined) return "–";

@@ -2,12 +2,12 @@
 
 import { Figure, key } from "../lib/charts.js";
 import { picture, stops } from "../lib/colours.js";
-import { choice, Entry, group, tick } from "../lib/controls.js";
+import { choice, Entry, group, inertiaTick, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
-import { copies, copyLink } from "../lib/save.js";
-import { ask, Refused, run } from "../lib/server.js";
-import { digits, quantity } from "../lib/units.js";
-import { capital, count, nameOf } from "../lib/words.js";
+import { copies, copyLink, textsOf } from "../lib/save.js";
+import { Work } from "../lib/server.js";
+import { digits, quantity, written } from "../lib/units.js";
+import { count, nameOf } from "../lib/words.js";
 
 export const name = "map";
 export const title = "Map";
@@ -25,7 +25,6 @@ export function create(page) {
   const view = fresh();
   let figure = null;
   let grid = null;
-  let running = null;
   let resting = 0;
   let shown = null;
   let marker = null;
@@ -68,9 +67,9 @@ export function create(page) {
     if (FINEST.includes(Number(parameters.get("count")))) view.count = Number(parameters.get("count"));
     for (const side of ["x", "y"]) {
       const [n, low, high, log] = (parameters.get(side) || "").split(",");
-      if (parameter(n)) view[side] = { name: n, low: number(low), high: number(high), log: log === "log" };
+      if (parameter(n)) view[side] = { name: n, low: written(low), high: written(high), log: log === "log" };
     }
-    for (const [n, text] of parameters) if (parameter(n) || n === "inertia") view.numbers[n] = number(text);
+    for (const [n, text] of parameters) if (parameter(n) || n === "inertia") view.numbers[n] = written(text);
   }
 
   // --- Asking ----------------------------------------------------------------------------------
@@ -99,42 +98,36 @@ export function create(page) {
 
   function stop() {
     clearTimeout(resting);
-    if (running) running.abort();
-    running = null;
+    solving.stop();
     progress.hidden = true;
     cancel.hidden = true;
   }
 
+  const solving = new Work((why) => {
+    stop();
+    status.textContent = "";
+    message.textContent = why;
+  });
+
   async function start() {
     const solved = question();
-    running = new AbortController();
-    const { signal } = running;
     message.textContent = "";
     progress.hidden = false;
     cancel.hidden = false;
     progress.removeAttribute("value");
     status.textContent = "Solving the first, coarse grid…";
-    try {
-      await run("map", solved, (part) => {
-        if (signal.aborted) return;
-        if (part.waiting) status.textContent = "Waiting for another map to be done…";
-        if (part.progress !== undefined) progress.value = part.progress;
-        if (!part.grid) return;
-        grid = part.grid;
-        shown = solved;
-        draw();
-        if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
-      }, signal);
-      if (signal.aborted) return;
-      status.textContent = `${grid.count} × ${grid.count} points.`;
-      stop();
-    } catch (error) {
-      if (error.name === "AbortError") return;
-      stop();
-      status.textContent = "";
-      if (!(error instanceof Refused)) throw error;
-      message.textContent = capital(error.message);
-    }
+    const done = await solving.run("map", solved, (part) => {
+      if (part.waiting) status.textContent = "Waiting for another map to be done…";
+      if (part.progress !== undefined) progress.value = part.progress;
+      if (!part.grid) return;
+      grid = part.grid;
+      shown = solved;
+      draw();
+      if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
+    });
+    if (!done) return;
+    status.textContent = `${grid.count} × ${grid.count} points.`;
+    stop();
   }
 
   // --- The figure ------------------------------------------------------------------------------
@@ -293,10 +286,7 @@ export function create(page) {
         choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }).element,
         choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); }).element),
       group("Other numbers", false,
-        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia), (on) => {
-          if (on) view.numbers.inertia = 1; else delete view.numbers.inertia;
-          changed();
-        }).element,
+        inertiaTick(view.numbers, changed),
         others.map((p) => new Entry({
           parameter: p, value: view.numbers[p.name] ?? sliderOf(p.name).value,
           onInput: (value) => { view.numbers[p.name] = value; changed(); },
@@ -304,8 +294,6 @@ export function create(page) {
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); marker = null; rebuild(); } }, "Start again")));
   }
-
-  const textAs = (kind) => () => ask("map/text", question()).then((texts) => texts[kind], (error) => { message.textContent = capital(error.message); });
 
   const results = el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Stability map"));
   const element = el("section", { class: "tab map", "aria-label": title }, controls, results);
@@ -333,7 +321,7 @@ export function create(page) {
         results.append(
           el("div", { class: "summary" }, el("p", { class: "hint" }, "A click takes the point to Explore; with the keyboard, arrow keys and Enter."),
             el("div", { class: "work" }, status, progress, cancel), message,
-            el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", textAs("python")], ["Copy as command", textAs("command")]))),
+            el("div", { class: "actions" }, copies(copyLink, ...textsOf("map/text", question, (why) => { message.textContent = why; })))),
           figure.element);
       }
       fromParameters(parameters);
@@ -342,9 +330,4 @@ export function create(page) {
     },
     hide: stop,
   };
-}
-
-/** A number of the address, or its text where it has a unit. */
-function number(text) {
-  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
 }
