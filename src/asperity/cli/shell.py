@@ -13,7 +13,7 @@ import click
 
 from asperity.cli.progress import INTERRUPTED, MESSAGE, ending_at_once
 from asperity.cli.words import in_options
-from asperity.errors import InputError, closest, naming, printable
+from asperity.errors import InputError, naming, printable, require_known
 
 _BAD_INPUT = 2
 #: What a missing option could be, by its metavar.
@@ -60,9 +60,7 @@ class Shell(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import a command; an unknown name is answered with the nearest one."""
-        if cmd_name not in self.modules:
-            rule = "be a known one"
-            raise InputError("command", rule, f"'{cmd_name}'", closest(cmd_name, self.modules))
+        require_known(cmd_name, self.modules, "command", "be a known one")
         command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
         return command
 

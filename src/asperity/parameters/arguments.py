@@ -20,32 +20,10 @@ from numpy.typing import ArrayLike
 
 from asperity.errors import InputError, InputTypeError, closest
 from asperity.parameters.parameter import obeying
+from asperity.units.kinds import shown as shown, with_article
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-
-def shown(value: Any) -> str:
-    """A value of any kind in a few words for a message."""
-    if value is None or isinstance(value, bool | int | float | np.generic):
-        if isinstance(value, int) and abs(value) > 10**30:
-            return "a huge integer"
-        return repr(value.item() if isinstance(value, np.generic) else value)
-    if isinstance(value, str):
-        return f"'{value}'" if len(value) < 60 else f"a text of {len(value)} characters"
-    if isinstance(value, type):
-        return f"the class {value.__name__}"
-    if isinstance(getattr(value, "shape", None), tuple):
-        return f"an array of shape {value.shape}"
-    if isinstance(value, list | tuple):
-        return f"a {type(value).__name__} of {len(value)}"
-    if callable(value):
-        return f"the function {getattr(value, '__name__', type(value).__name__)}"
-    return _with_article(type(value).__name__)
-
-
-def _with_article(name: str) -> str:
-    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
 def rising(span: tuple[float, float], label: str, advice: str = "write it like 10:60") -> None:
@@ -222,7 +200,7 @@ def _words(kind: Any) -> str:
         return " or ".join(dict.fromkeys(map(_words, parts)))
     if origin is Annotated:
         return _words(parts[0])
-    return _WORDS.get(origin) or _with_article(origin.__name__)
+    return _WORDS.get(origin) or with_article(origin.__name__)
 
 
 def at_least(least: int) -> Callable[[int, str], int]:

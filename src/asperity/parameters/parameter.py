@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, require_known
 from asperity.units import KINDS, format_si, to_radians, to_si
 from asperity.units.convert import is_traced
 
@@ -92,8 +92,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     InputError
         Naming the value, the rule, the first offending element and its unit.
     """
-    if rule not in RULES:
-        raise InputError("rule", "be a known rule", f"'{rule}'", closest(rule, RULES))
+    require_known(rule, RULES, "rule", "be a known rule")
     if is_traced(value):
         return value
     array = np.asarray(to_si(value, kind, label), dtype=float)
