@@ -60,28 +60,18 @@ class FileRows:
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; one row with the reason if it cannot be measured."""
-        from asperity.measurement.campaign import (
-            MACHINE_FIELDS,
-            failed_row,
-            modulated_rows,
-            sliding_rows,
-        )
+        from asperity.measurement.campaign import MACHINE_FIELDS, failed_row
         from asperity.measurement.from_file import measured_parts
-        from asperity.measurement.stick_slip.catalogue import stick_slip_row
-        from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+        from asperity.measurement.report import measured_rows
         from asperity.recording.readers.from_file import read_source
 
         with naming(in_options):
             try:
                 question = self.question_of(path)
                 result = measured_parts(read_source(path, self.source), question)
-                if isinstance(result, StickSlipMeasurement):
-                    return [stick_slip_row(path, result)]
-                modulated = isinstance(result, list)
-                rows: Any = modulated_rows if modulated else sliding_rows
                 known = {n: getattr(question, f) for n, f in MACHINE_FIELDS.items()}
                 known = {name: value for name, value in known.items() if value is not None}
-                return [{**known, **row} for row in rows(path, result)]
+                return [{**known, **row} for row in measured_rows(path, result)]
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
             except Exception as error:  # one damaged file must not cost the others
@@ -141,10 +131,7 @@ in place of numbers; 2: bad input.
 @click.command(epilog=_EPILOG, short_help="Friction in recordings: steps, holds, slips, harmonics.")
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @output_options(plot=True)
-@field_option(
-    _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
-    "START:END",
-)  # fmt: skip
+@field_option(_QUESTION, "window", "START:END")
 @option(
     "--steps",
     "TIMES|FILE",
@@ -157,15 +144,11 @@ in place of numbers; 2: bad input.
     "Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @source_options
-@field_option(
-    _QUESTION, "frequency",
-    'Where to look for the modulation, like "120 Hz", which is fitted; determined if not given.',
-    "VALUE", "-f",
-)  # fmt: skip
-@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
-@field_option(_QUESTION, "harmonics", "How many.", "N")
-@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
-@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
+@field_option(_QUESTION, "frequency", "VALUE", "-f")
+@field_option(_QUESTION, "exact_frequency")
+@field_option(_QUESTION, "harmonics", "N")
+@field_option(_QUESTION, "whole_periods")
+@field_option(_QUESTION, "detrend", "")
 @switch("--amplitudes", "Read every modulated stretch, and print them as a table.")
 @switch(
     "--no-modulation",
@@ -301,8 +284,7 @@ def _one(
     from asperity._version import __version__
     from asperity.cli.progress import waiting
     from asperity.measurement.from_file import answer_measurement
-    from asperity.measurement.record import modulated_record, sliding_record
-    from asperity.measurement.report import measured_sections
+    from asperity.measurement.report import measured_record, measured_sections
     from asperity.measurement.stick_slip import catalogue
     from asperity.outputs import output_files
     from asperity.recording.readers.from_file import read_source
@@ -321,16 +303,13 @@ def _one(
         and result.chosen_by == "program"
         and f"1 of {modulated} modulated stretches is read; --amplitudes reads each",
     )
-    record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
-    if hasattr(result, "regimes"):
-        record_of = catalogue.stick_slip_record
     if events is not None:
         slips, advice = hasattr(result, "regimes"), "leave it out, or add --stick-slip"
         require(slips, "--events", "go with a stick-slip recording", "another", advice)
         catalogue.write_catalogue(result, events)
     about = {"recording": str(recording), "version": __version__, **trace.provenance}
     output.answer(
-        lambda: {**record_of(result), "provenance": about},
+        lambda: {**measured_record(result), "provenance": about},
         lambda: measured_sections(result, recording.name, output.names),
     )
     output.draw(result)

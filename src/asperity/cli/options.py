@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable, Iterable
 from functools import reduce, wraps
 from pathlib import Path
@@ -76,7 +77,7 @@ class OnceOption(click.Option):
 
 
 class FieldOption(OnceOption):
-    """An option with the default and the choices of a field of a question, which its help shows.
+    """An option with the text, the default and the choices of a field of a question in its help.
 
     The record is imported for the help only; without the option the default of the record applies.
     """
@@ -88,7 +89,12 @@ class FieldOption(OnceOption):
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """Option and text, as click prints them."""
         module, _, name = self.record.partition(":")
-        about = getattr(importlib.import_module(module), name).model_fields[self.name]
+        record = getattr(importlib.import_module(module), name)
+        about = record.model_fields[self.name]
+        # The field and its type in a line, and the text below.
+        entry = re.compile(rf"^    {self.name} : .*\n((?:        .*\n)+)", re.MULTILINE)
+        entries = (entry.search(one.__doc__ or "") for one in record.__mro__)
+        self.help = next((" ".join(text[1].split()) for text in entries if text), "")
         if about.default is not None and not self.is_flag:
             self.default, self.show_default = about.default, True
         self.metavar = self.metavar or "|".join(map(str, get_args(about.annotation)))
@@ -119,17 +125,14 @@ def switch(names: str, about: str) -> Decorator:
     return click.option(*names.split(), is_flag=True, help=about)
 
 
-def field_option(
-    record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
-) -> Decorator:
-    """The option of a field of a question.
+def field_option(record: str, field: str, metavar: str | None = None, short: str = "") -> Decorator:
+    """The option of a field of a question, with the text of the record's docstring.
 
     Parameters
     ----------
     record : str
         Its place, as ``module:Name``.
     field : str
-    help_text : str
     metavar : str, optional
         What is given: empty for the choices of the field, "N" for a whole number; None for a
         switch.
@@ -140,7 +143,7 @@ def field_option(
     # With is_flag=False Click takes an option for one whose value may be left out.
     look: dict[str, Any] = {"is_flag": True} if metavar is None else {}
     kind = Count() if metavar == "N" else None
-    return option(names, metavar, help_text, kind, cls=FieldOption, record=record, **look)
+    return option(names, metavar, "", kind, cls=FieldOption, record=record, **look)
 
 
 def material_option() -> Decorator:

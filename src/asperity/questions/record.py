@@ -197,7 +197,7 @@ def _plain_integer(value: Any) -> Any:
 Whole = Annotated[StrictInt, BeforeValidator(_plain_integer)]
 
 
-def listed(value: Any) -> Any:
+def parts_of(value: Any) -> Any:
     """The parts of a text with commas or semicolons between them; anything else unchanged."""
     if isinstance(value, str):
         return tuple(part.strip() for part in re.split("[,;]", value) if part.strip())
@@ -205,7 +205,7 @@ def listed(value: Any) -> Any:
 
 
 #: Names; a text has commas between them.
-Names = Annotated[tuple[str, ...], BeforeValidator(listed)]
+Names = Annotated[tuple[str, ...], BeforeValidator(parts_of)]
 
 
 def _seconds(value: Any) -> float:
@@ -230,7 +230,7 @@ def _span(value: Any) -> tuple[float, float]:
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 #: Times (s); a text has commas between them.
-Times = Annotated[tuple[Seconds, ...], BeforeValidator(listed)]
+Times = Annotated[tuple[Seconds, ...], BeforeValidator(parts_of)]
 #: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
 Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
@@ -29,12 +29,15 @@ class Kind:
     ladder : tuple of (str, int)
         Units to display in, smallest first, each with its power of ten over the SI unit;
         `to_si` reads them without loading pint.
+    also : mapping of str to int
+        Further units that `to_si` reads without loading pint.
     """
 
     noun: str
     si: str
     example: str
     ladder: tuple[tuple[str, int], ...]
+    also: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
 
 
 _TABLE = tomllib.loads(files("asperity.units").joinpath("kinds.toml").read_text("utf-8"))

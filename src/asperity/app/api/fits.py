@@ -212,7 +212,8 @@ def _data(
         data.append({"file": path, "name": table.name})
     if question.rows:
         path = folder / "sent-rows.csv"
-        write_csv(path, [_row(row) for row in question.rows])
+        rows = [{n: math.nan if v is None else v for n, v in row.items()} for row in question.rows]
+        write_csv(path, rows)
         data.append({"file": path, "name": "the measured rows"})
     for run, file in zip(question.runs, files, strict=True):
         fields = run.model_dump(exclude={"recording"}, exclude_none=True)
@@ -280,10 +281,6 @@ def _report(result: Any, posterior: Any, names: Names) -> str:
             for path in sorted(target.iterdir()):
                 archive.write(path, f"report/{path.name}")
     return base64.b64encode(packed.getvalue()).decode()
-
-
-def _row(row: Mapping[str, Cell]) -> dict[str, Any]:
-    return {name: math.nan if value is None else value for name, value in row.items()}
 
 
 def _residuals(result: Any) -> dict[str, list[Any]]:

@@ -148,6 +148,13 @@ export function tick(label, checked, onInput, title) {
   return { element, set: (value) => { box.checked = value; }, box };
 }
 
+/** Numbers that laws need and a material does not have: the values at which their sliders start. */
+export function neededNumbers({ materials, laws }, material, names) {
+  const { numbers, sliders } = materials[material];
+  const needed = names.flatMap((law) => laws[law].required).filter((n) => !numbers[n]);
+  return Object.fromEntries(needed.map((n) => [n, sliders[n].value]));
+}
+
 /** The box that counts the mass of the slider among the numbers of a view. */
 export function inertiaTick(numbers, changed) {
   return tick("With the mass of the slider (inertia)", Boolean(numbers.inertia), (on) => {

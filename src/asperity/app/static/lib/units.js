@@ -12,7 +12,7 @@ const plain = (unit) => unit.replaceAll("µ", "u").replaceAll("μ", "u").replace
 
 /** A number with so many significant digits, without trailing zeros. */
 export function digits(value, count = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) {
@@ -69,7 +69,7 @@ export function written(text) {
 
 /** A value with the digits that its standard uncertainty leaves. */
 export function withDoubt(value, doubt) {
-  if (value === null || value === undefined) return "–";
+  if (!Number.isFinite(value)) return "–";
   if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
   const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
   if (places > 7 || Math.abs(value) >= 1e6) {

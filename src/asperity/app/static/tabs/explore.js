@@ -1,7 +1,7 @@
 // Explore: an operating point, whose response follows the sliders.
 
 import { Figure, key, series } from "../lib/charts.js";
-import { choice, Dock, group, inertiaTick, Quantity, tick } from "../lib/controls.js";
+import { choice, Dock, group, inertiaTick, neededNumbers, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
 import { copies, copyLink, textsOf } from "../lib/save.js";
 import { Latest, Work } from "../lib/server.js";
@@ -86,20 +86,9 @@ export function create(page) {
     const drive = Object.fromEntries(["V", "epsilon", "frequency"].map((n) => [n, sliders[n].value]));
     return {
       material: view.material, law: view.law, laws: view.laws,
-      numbers: { ...needed(), ...drive, ...view.numbers }, air: view.air,
+      numbers: { ...neededNumbers(catalogue, view.material, [view.law, ...view.laws]), ...drive, ...view.numbers },
+      air: view.air,
     };
-  }
-
-  /** Numbers that the chosen laws need and the material does not have: the values at which their sliders start. */
-  function needed() {
-    const { numbers, sliders } = catalogue.materials[view.material];
-    const values = {};
-    for (const law of [view.law, ...view.laws]) {
-      for (const n of catalogue.laws[law].required) {
-        if (!numbers[n]) values[n] = sliders[n].value;
-      }
-    }
-    return values;
   }
 
   function changed() {

@@ -2,7 +2,7 @@
 
 import { Figure, key } from "../lib/charts.js";
 import { picture, stops } from "../lib/colours.js";
-import { choice, Entry, group, inertiaTick, tick } from "../lib/controls.js";
+import { choice, Entry, group, inertiaTick, neededNumbers, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
 import { copies, copyLink, textsOf } from "../lib/save.js";
 import { Work } from "../lib/server.js";
@@ -75,14 +75,7 @@ export function create(page) {
   // --- Asking ----------------------------------------------------------------------------------
 
   function question() {
-    const numbers = {};
-    for (const p of parametersOf(view.law)) {
-      const published = catalogue.materials[view.material].numbers[p.name];
-      if (catalogue.laws[view.law].required.includes(p.name) && !published) {
-        numbers[p.name] = sliderOf(p.name).value;
-      }
-    }
-    Object.assign(numbers, view.numbers);
+    const numbers = { ...neededNumbers(catalogue, view.material, [view.law]), ...view.numbers };
     for (const side of ["x", "y"]) delete numbers[view[side].name];
     return {
       material: view.material, law: view.law, numbers, x: view.x, y: view.y, show: view.show,

@@ -171,8 +171,7 @@ export class FitPanel {
   /** Fit or compare; `start` has start values by parameter. */
   async start(start = {}) {
     const { settings } = this;
-    this.work.stop();
-    this.message.textContent = "";
+    this.#end("");
     fill(this.results);
     const fixed = {};
     for (const line of settings.fixed.split(/[\n;]+/).filter((l) => l.trim())) {
