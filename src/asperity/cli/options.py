@@ -57,7 +57,7 @@ class Count(click.ParamType):
 
 
 class OnceOption(click.Option):
-    """An option with a value, which is given once: the last of several would win without a word."""
+    """An option with a value that is given once; click alone would take the last of several."""
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
         """Let the parser keep every value; a switch has none."""

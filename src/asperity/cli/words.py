@@ -35,13 +35,13 @@ _OPTIONS: Mapping[str, str] = {
 
 
 def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> str:
-    """The words of the command line: ``--load``, ``--column "velocity=speed"``.
+    """An argument as the command line writes it: ``--load``, ``--column "velocity=speed"``.
 
     Parameters
     ----------
     argument : Argument
     options : mapping of str to str, optional
-        Option of each field of a question, which other commands mean otherwise.
+        Options of the current command by field, where other commands have other options for it.
     """
     from asperity.questions.options import (
         COLUMN_OPTIONS,
@@ -83,7 +83,7 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
 
 @contextmanager
 def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Name fields of a question, which other commands mean otherwise, by this command's options.
+    """Let sentences name the fields of a question by the options of the current command.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
-    """What the annotations of a function's arguments stand for, by name."""
+    """Types of a function's arguments by name, from its annotations."""
     kinds = {}
     for name, one in inspect.signature(function).parameters.items():
         if one.annotation is not one.empty:
@@ -102,7 +102,7 @@ def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def of_type(value: Any, kind: Any, name: str) -> Any:
-    """A value as an annotation has it.
+    """A value converted to the type of an annotation, with numbers of NumPy as those of Python.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def of_type(value: Any, kind: Any, name: str) -> Any:
         As `typed`.
     """
     try:
-        return _taken(value, kind, name)
+        return _converted(value, kind, name)
     except _OtherTypeError:
         raise InputTypeError(name, f"be {_words(kind)}", shown(value)) from None
 
@@ -125,7 +125,7 @@ def _origin_and_parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
     return get_origin(kind) or kind, get_args(kind)
 
 
-def _taken(value: Any, kind: Any, name: str) -> Any:
+def _converted(value: Any, kind: Any, name: str) -> Any:
     origin, parts = _origin_and_parts(kind)
     # Of ArrayLike, alone or among others: who converts it to SI knows what may stand.
     if kind is Any or kind is ArrayLike or complex in parts:
@@ -133,11 +133,11 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
     if origin in (Union, UnionType):
         for part in parts:
             try:
-                return _taken(value, part, name)
+                return _converted(value, part, name)
             except _OtherTypeError:
                 continue
     elif origin is Annotated:
-        return parts[1](_taken(value, parts[0], name), name)
+        return parts[1](_converted(value, parts[0], name), name)
     elif origin is Literal:
         if isinstance(value, type(parts[0])):
             return one_of(value, parts, name)
@@ -171,7 +171,7 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
 
 
 def _is_one_number(value: Any) -> bool:
-    """Whether it is an array of one number, which may stand for the number."""
+    """Whether a value is an array of one number, which is accepted as that number."""
     shape, kind = getattr(value, "shape", None), getattr(getattr(value, "dtype", None), "kind", "")
     return shape in ((), (1,)) and kind in "iuf"
 

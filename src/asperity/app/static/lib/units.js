@@ -29,7 +29,7 @@ function superscript(power) {
 }
 
 /** The unit in which a value reads best, and its power of ten. */
-export function rung(value, kind) {
+function rung(value, kind) {
   const { ladder, si } = kinds[kind];
   const size = Math.abs(value) * (1 + 1e-9);
   if (!size) return [pretty(si), ladder.some(([u]) => u === si) ? 0 : ladder[0][1]];

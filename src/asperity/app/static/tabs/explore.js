@@ -185,7 +185,7 @@ export function create(page) {
       }),
       amplitude: new Figure({
         name: "amplitude", title: "Against the amplitude", height: 400, columns: amplitudeColumns,
-        options: phases.element,
+        options: phases,
         caption: "Modulation lowers the mean friction; the laws differ most in the harmonics.",
       }),
       harmonics: new Figure({
@@ -386,15 +386,15 @@ export function create(page) {
     const rebuild = () => { buildControls(); changed(); };
     fill(controls,
       choice("Material", Object.entries(catalogue.materials).map(([n, m]) => [n, `${n} – ${m.title}`]), view.material,
-        (value) => { view.material = value; view.numbers = {}; rebuild(); }).element,
-      choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
+        (value) => { view.material = value; view.numbers = {}; rebuild(); }),
+      choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }),
       group("Drive and machine", false,
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
         inertiaTick(view.numbers, changed)),
       group("Law", false, ofLaw.map(sliderOf)),
       group("Air layer", false,
         tick("Air between the surfaces", view.air !== null, (on) => { view.air = on ? {} : null; rebuild(); },
-          "ε is then the amplitude of the load, of which the contacts bear a share").element,
+          "ε is then the amplitude of the load, of which the contacts bear a share"),
         view.air === null ? [] : material.air.map((p) => slider({
           parameter: p,
           slider: { ...p.slider, value: view.air[p.name] ?? p.value },
@@ -404,7 +404,7 @@ export function create(page) {
         laws.filter((n) => n !== view.law).map((n) => tick(n, view.laws.includes(n), (on) => {
           view.laws = laws.filter((m) => (m === n ? on : view.laws.includes(m)));
           changed();
-        }, catalogue.laws[n].title).element)),
+        }, catalogue.laws[n].title))),
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); rebuild(); } }, "Start again")),
     );
@@ -439,7 +439,7 @@ export function create(page) {
           el("section", { class: "law", tabindex: "0", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
-      phases.set(view.phases);
+      phases.querySelector("input").checked = view.phases;
       buildControls();
       changed();
     },

@@ -2,7 +2,7 @@
 
 import { Figure, key } from "../lib/charts.js";
 import { picture, stops } from "../lib/colours.js";
-import { choice, Entry, group, inertiaTick, neededNumbers, tick } from "../lib/controls.js";
+import { choice, entry, group, inertiaTick, neededNumbers, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
 import { copies, copyLink, textsOf } from "../lib/save.js";
 import { Work } from "../lib/server.js";
@@ -249,19 +249,19 @@ export function create(page) {
     const rebuild = () => { buildControls(); changed(); };
     const axisControls = (side, label) => {
       const p = parameter(view[side].name);
-      const entry = (end, text) => new Entry({
+      const field = (end, text) => entry({
         parameter: { ...p, meaning: `${text} of ${label}` }, label: text, value: view[side][end],
         onInput: (value) => { view[side][end] = value; changed(); },
-      }).element;
+      });
       return group(label, true,
         choice("Number", names, view[side].name, (value) => {
           const { low, high, log } = sliderOf(value);
           view[side] = { name: value, low, high, log };
           marker = null;
           rebuild();
-        }).element,
-        el("div", { class: "ends" }, entry("low", "from"), entry("high", "to")),
-        tick("At equal ratios (logarithmic)", view[side].log, (on) => { view[side].log = on; changed(); }).element);
+        }),
+        el("div", { class: "ends" }, field("low", "from"), field("high", "to")),
+        tick("At equal ratios (logarithmic)", view[side].log, (on) => { view[side].log = on; changed(); }));
     };
     const others = parametersOf(view.law).filter((p) => ![view.x.name, view.y.name].includes(p.name));
     fill(controls,
@@ -272,18 +272,18 @@ export function create(page) {
         }
         marker = null;
         rebuild();
-      }).element,
+      }),
       axisControls("x", "Across"),
       axisControls("y", "Up"),
       group("Picture", false,
-        choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }).element,
-        choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); }).element),
+        choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }),
+        choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); })),
       group("Other numbers", false,
         inertiaTick(view.numbers, changed),
-        others.map((p) => new Entry({
+        others.map((p) => entry({
           parameter: p, value: view.numbers[p.name] ?? sliderOf(p.name).value,
           onInput: (value) => { view.numbers[p.name] = value; changed(); },
-        }).element)),
+        }))),
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); marker = null; rebuild(); } }, "Start again")));
   }

@@ -227,7 +227,7 @@ export function create(page) {
         view.numbers = Object.fromEntries(Object.entries(view.numbers).filter(([n]) => kept.includes(n)));
         buildControls();
         changed();
-      }).element,
+      }),
       group("Numbers of the paper", false, sliders.map((q) => q.element)),
       el("div", { class: "actions" }, el("button", {
         type: "button", click: () => { view.numbers = {}; buildControls(); changed(); },
@@ -253,7 +253,7 @@ export function create(page) {
     filters.search = el("input", { type: "search", id, value: view.search, input: () => changedFilter("search")(filters.search.value) });
     fill(ledgerView,
       el("form", { class: "filters", role: "search", "aria-label": "Claims", submit: (e) => e.preventDefault() },
-        filters.status.element, filters.kind.element, filters.section.element,
+        filters.status, filters.kind, filters.section,
         el("div", { class: "choice" }, el("label", { for: id }, "Text"), filters.search)),
       el("div", { class: "summary" }, count, ledgerMessage, el("div", { class: "actions" },
         copies(copyLink, ["Copy as Python", ledgerPython], ["Copy as command", () => `asperity reproduce ${paper.paper.name} --out report`]),
@@ -319,7 +319,7 @@ export function create(page) {
       Object.assign(view, { paper: value, figure: "", numbers: {} });
       await open(new URLSearchParams());
       link();
-    }).element);
+    }));
   }
 
   /** Ask for the words of the chosen paper, and show them. */

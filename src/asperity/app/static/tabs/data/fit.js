@@ -119,31 +119,31 @@ export class FitPanel {
     fixed.value = settings.fixed;
     this.freeHolder = el("div", { class: "ticks" });
     const text = (key, placeholder) => textField(labels[key], settings[key], set(key), placeholder);
-    const flag = (key, explanation) => tick(labels[key], settings[key], set(key), explanation).element;
+    const flag = (key, explanation) => tick(labels[key], settings[key], set(key), explanation);
     this.sampling = el("div", { class: "filters" }, text("draws", "1000"), text("chains", "4"));
     this.sampling.hidden = !settings.posterior;
     this.runOptions = el("fieldset", {}, el("legend", {}, "Whole recordings"),
       el("p", { class: "note" }, "The law's motion over the whole recording is fitted; K is free for each recording, and the noise is estimated."),
       el("div", { class: "filters" },
-        choice(labels.trend, ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")).element,
-        choice(labels.initial, [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
+        choice(labels.trend, ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")),
+        choice(labels.initial, [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")),
         text("gauge", "none, or 50 Hz"),
         text("fit_rate", "chosen, or 100 Hz, or full"),
         flag("drift")));
     fill(this.form,
       el("fieldset", {}, el("legend", {}, `${labels.laws}: tick one to fit it, several to compare them`),
-        el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
+        el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title)))),
       el("fieldset", {}, el("legend", {}, `${labels.free}; if none is ticked, all that the data can determine`), this.freeHolder),
       el("div", { class: "fit-more" },
-        choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")).element,
+        choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")),
         el("div", { class: "choice" }, el("label", { for: id }, `${labels.fixed}, one per line; V is the pulling velocity`), fixed),
         el("div", { class: "ticks" },
           flag("prior"),
           flag("profile"),
           tick(labels.posterior, settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
-            "As asperity fit --posterior; it takes a minute or more").element,
-          tick("With the inertia of the slider", settings.inertia, set("inertia")).element,
-          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element),
+            "As asperity fit --posterior; it takes a minute or more"),
+          tick("With the inertia of the slider", settings.inertia, set("inertia")),
+          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it")),
         this.sampling),
       this.runOptions);
     this.runOptions.hidden = !this.runs().length;
@@ -158,7 +158,7 @@ export class FitPanel {
     fill(this.freeHolder, names.map((n) => tick(nameOf(n), this.settings.free.includes(n), (on) => {
       this.settings.free = names.filter((m) => (m === n ? on : this.settings.free.includes(m)));
       this.changed();
-    }).element));
+    })));
     this.names = names;
   }
 

@@ -64,7 +64,7 @@ export class ProtocolPanel {
       this.text.value = this.protocols[n];
       this.#check();
       this.changed();
-    }).element);
+    }));
   }
 
   save(parameters) {

@@ -141,7 +141,7 @@ export class RecordingCard {
       const parts = value.split(/[,;]/).map((part) => part.trim()).filter(Boolean);
       set(options, key)(parts.length ? parts : null);
     }, placeholder);
-    const flag = (key) => tick(labels[key], Boolean(options[key]), set(options, key)).element;
+    const flag = (key) => tick(labels[key], Boolean(options[key]), set(options, key));
     const { recording } = this;
     const channels = recording ? [this.#channelTable(recording, again)] : [];
     const mode = options.mode || "auto";
@@ -150,13 +150,13 @@ export class RecordingCard {
       ...channels,
       el("form", { class: "filters", submit: (e) => e.preventDefault() },
         choice("What it is", [["auto", "recognised by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"], ["stick-slip", "stick-slip"]],
-          mode, set(options, "mode")).element,
+          mode, set(options, "mode")),
         text(options, "frequency", "measured, or 120 Hz"),
         flag("exact_frequency"),
         text(options, "harmonics", "4"),
         text(options, "window", "chosen, or 10:60", " (s)"),
         flag("whole_periods"),
-        choice(labels.detrend, ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", set(options, "detrend")).element,
+        choice(labels.detrend, ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", set(options, "detrend")),
         texts("steps", "detected, or 12.5, 60", " (s)"),
         texts("velocities", "measured, or 1 um/s, 10 um/s"),
         texts("holds", "detected, or 100:110", " (s)"),
@@ -229,7 +229,7 @@ export class RecordingCard {
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
       record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
-        "The fit below uses it, with the window, the velocity steps and the velocities above").element,
+        "The fit below uses it, with the window, the velocity steps and the velocities above"),
       measured.amplitudes && this.#amplitudes(measured),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
       ...sections(measured.sections, ` of ${this.state.name}`),
