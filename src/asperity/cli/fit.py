@@ -241,7 +241,7 @@ def fit(
     if report is not None and result.converged:
         _say_written(report)
     if result.converged:
-        output.draw(result)
+        output.draw(result.plot)
     return 0 if result.converged and (sampled is None or sampled.converged) else 1
 
 
@@ -343,5 +343,5 @@ def compare(
         write_comparison(report, comparison, output.names)
         _say_written(report)
     if comparison.best:
-        output.draw(comparison)
+        output.draw(comparison.plot)
     return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

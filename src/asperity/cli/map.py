@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import option, output_options, point_options, switch
-from asperity.cli.report import Output, save_figure, say
+from asperity.cli.report import Output, say
 from asperity.errors import InputError, require
 from asperity.parameters.arguments import one_of
 
@@ -97,8 +97,7 @@ def map(
         result = write_map(
             out, point.law, numbers, x=along_x, y=along_y, resume=resume, progress=update
         )
-    if output.plot is not None:
-        save_figure(lambda: draw_map(result, show or _SHOWN), output.plot, output.names)
+    output.draw(lambda: draw_map(result, show or _SHOWN))
     record = _record(result, out)
     rows = tuple((name, str(record[name])) for name in ("points", "stable", "unstable", "failed"))
     boundaries = []

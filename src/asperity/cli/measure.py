@@ -23,11 +23,13 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.recording import listed_times, source_options, velocities_option
-from asperity.cli.report import Output, save_figure, say
+from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.questions.recording import Measurement as Question, Source
 
@@ -270,11 +272,13 @@ def _amplitudes(recording: Path, source: Source, question: Question, output: Out
         lambda: {"recording": str(recording), "amplitudes": rows},
         lambda: amplitude_sections(rows, recording.name),
     )
-    if output.plot is not None:
+
+    def draw() -> Figure:
         from asperity.figures.recording import draw_amplitudes
 
-        save_figure(lambda: draw_amplitudes(rows), output.plot, output.names)
-        say(f"the figure is {output.plot}")
+        return draw_amplitudes(rows)
+
+    output.draw(draw)
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 
@@ -312,7 +316,7 @@ def _one(
         lambda: {**measured_record(result), "provenance": about},
         lambda: measured_sections(result, recording.name, output.names),
     )
-    output.draw(result)
+    output.draw(result.plot)
     bad = [check for check in result.checks if check.verdict == "bad"]
     say(*(f"{check.name} is bad: {check.sentence}" for check in bad))
     return int(bool(bad))
@@ -440,8 +444,7 @@ def _campaign(
             *([healing_section(campaign, output.names)] if campaign.series else []),
         ],
     )
-    if output.plot is not None:
-        output.draw(with_cycles(campaign))
+    output.draw(lambda: with_cycles(campaign).plot())
     unknown = []
     if thresholds is not None:
         ends = ends_of_stick_slip(done.table)
