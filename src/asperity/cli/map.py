@@ -97,7 +97,6 @@ def map(
         result = write_map(
             out, point.law, numbers, x=along_x, y=along_y, resume=resume, progress=update
         )
-    output.draw(lambda: draw_map(result, show or _SHOWN))
     record = _record(result, out)
     rows = tuple((name, str(record[name])) for name in ("points", "stable", "unstable", "failed"))
     boundaries = []
@@ -112,6 +111,7 @@ def map(
         boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
     table = [Section("", rows=rows), Section("", tuple(boundaries))]
     output.answer(lambda: record, lambda: table, point.law, "")
+    output.draw(lambda: draw_map(result, show or _SHOWN))
     unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
     say(
         unresolved
