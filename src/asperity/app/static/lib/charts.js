@@ -57,9 +57,9 @@ export class Figure {
     });
     this.plot.style.minHeight = `${height}px`; // nothing moves when the picture comes
     if (ownLabel) this.plot.setAttribute("aria-label", ownLabel);
-    // The first drawing may come before the panels beside it.
+    // A chart may be drawn before its figure, or the panels beside it, are on the page.
     new ResizeObserver(() => {
-      if (this.frames && !printing && this.plot.clientWidth !== this.width) this.#paint();
+      if (this.chart && !printing && this.plot.clientWidth !== this.width) this.#paint();
     }).observe(this.plot);
     this.note = el("div", { class: "note" });
     const label = fresh("figure");

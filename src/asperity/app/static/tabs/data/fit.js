@@ -232,7 +232,6 @@ export class FitPanel {
   }
 
   #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, python, command }) {
-    this.figures = [];
     const record = fit || comparison;
     const buttons = el("div", { class: "actions" },
       copies(["Copy as Python", () => python], ["Copy as command", () => command]),
@@ -246,7 +245,6 @@ export class FitPanel {
     const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw.map((s) => ({ ...s, title: s.title === n ? "" : s.title })), ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
-    for (const draw of this.figures) draw();
   }
 
   /** Densities of the draws. */
@@ -258,10 +256,10 @@ export class FitPanel {
       const figure = new Figure({ name: `posterior-${n}`, title: `Posterior of ${n}`, height: 230, columns: () => ({ [n]: x, density: y }) });
       figure.note.textContent = `Dotted: the ends of the 95 % interval. ${priorText(p.prior)}`;
       const [low, high] = [x[0], x.at(-1)];
-      this.figures.push(() => figure.draw({
+      figure.draw({
         x: { label: p.unit ? `${n} (${p.unit})` : n, range: [Math.min(low, p.interval_95[0]), Math.max(high, p.interval_95[1])] },
         rows: [{ y: { label: "density", range: [0, 1.05 * Math.max(...y)] }, marks: p.interval_95, bars: [{ x, y, cls: series(0), title: (i) => `${n} about ${digits(x[i], 4)}` }] }],
-      }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`));
+      }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`);
       return figure.element;
     });
     return [el("div", { class: "panels" }, shown)];
@@ -280,7 +278,7 @@ export class FitPanel {
         rows[0].series.slice(0, 12).map(({ label }, i) => key(series(i), label)),
         many > 12 && el("p", {}, `and ${many - 12} more series`),
         el("p", {}, "Points: readings with two standard errors. Lines: the law, with its 95 % band between the thin ones."));
-      this.figures.push(() => figure.draw({
+      figure.draw({
         x: { label: "ε as applied" },
         rows: rows.map(({ name, series: curves }) => ({
           y: { label: LABELS[name] || name },
@@ -291,7 +289,7 @@ export class FitPanel {
           ]),
           points: curves.map((v, i) => ({ x: v.at, y: v.value, cls: series(i), size: 4, title: (j) => `${name} ${digits(v.value[j])} ± ${digits(v.error[j], 2)} at ε ${digits(v.at[j], 3)}` })),
         })),
-      }, "Readings and what the fitted law predicts between them."));
+      }, "Readings and what the fitted law predicts between them.");
       return figure.element;
     });
   }
@@ -302,14 +300,14 @@ export class FitPanel {
       const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y, time_of_fitted: fitted.x, fitted: fitted.y }) });
       fill(figure.note, key("s6", "recorded"), key("s2", "fitted"));
       const both = (of) => [{ ...of.recorded, cls: "s6", name: "recorded" }, { ...of.fitted, cls: "s2", name: "fitted", thick: true }];
-      this.figures.push(() => figure.draw({ x: { label: "time (s)" }, rows: [
+      figure.draw({ x: { label: "time (s)" }, rows: [
         { y: { label: "F/W" }, marks: transients.map((t) => t.time), lines: both({ recorded, fitted }) },
         { y: { label: "recorded − fitted" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
-      ] }, `Friction of ${name} as recorded and as fitted.`));
+      ] }, `Friction of ${name} as recorded and as fitted.`);
       const enlarged = transients.map((transient) => {
         const title = `After ${digits(transient.time, 6)} s`;
         const near = new Figure({ name: "transient", title, height: 250, columns: () => ({ time: transient.recorded.x, friction: transient.recorded.y }) });
-        this.figures.push(() => near.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`));
+        near.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`);
         return near.element;
       });
       return el("div", { class: "panels" }, figure.element, enlarged);
@@ -322,16 +320,14 @@ export class FitPanel {
     const names = [...new Set(observable)];
     const figure = new Figure({ name: "residuals", title: "Residuals in standard deviations", height: 230, columns: () => ({ observable, residual: value }) });
     fill(figure.note, names.map((n, k) => key(`point ${series(k)}`, n)));
-    this.figures.push(() => {
-      const at = value.map((_, i) => i + 1);
-      const of = (n) => at.filter((_, i) => observable[i] === n);
-      const far = 1.1 * Math.max(3, ...value.map(Math.abs));
-      figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
-        y: { label: "residual", range: [-far, far] },
-        lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
-        points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
-      }] }, `Residuals of ${names.join(", ")}.`);
-    });
+    const at = value.map((_, i) => i + 1);
+    const of = (n) => at.filter((_, i) => observable[i] === n);
+    const far = 1.1 * Math.max(3, ...value.map(Math.abs));
+    figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
+      y: { label: "residual", range: [-far, far] },
+      lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
+      points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
+    }] }, `Residuals of ${names.join(", ")}.`);
     return figure.element;
   }
 

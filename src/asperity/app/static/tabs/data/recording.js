@@ -218,11 +218,13 @@ export class RecordingCard {
   // --- Results ---------------------------------------------------------------------------------
 
   #draw() {
-    if (this.result.table) return this.#drawTable();
+    if (this.result.table) {
+      this.#drawTable();
+      return;
+    }
     const { measured } = this.result;
     const { record } = measured;
     this.#says(this.#sentence(record, measured.note), record.verdict === "ok" ? "stable" : "unstable");
-    const figures = this.#figures(measured);
     fill(this.body,
       el("div", { class: "actions" },
         copies(["Copy as Python", () => this.result.python], ["Copy as command", () => this.result.command]),
@@ -231,12 +233,10 @@ export class RecordingCard {
       record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
         "The fit below uses it, with the window, the velocity steps and the velocities above"),
       measured.amplitudes && this.#amplitudes(measured),
-      el("div", { class: "panels" }, figures.list.map((f) => f.element)),
+      el("div", { class: "panels" }, this.#figures(measured).map((f) => f.element)),
       ...sections(measured.sections, ` of ${this.state.name}`),
       record.mode === "stick-slip" && catalogue(record, this.state.name),
       this.#findings());
-    for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
-    return undefined;
   }
 
   #sentence(record, note) {
@@ -263,29 +263,26 @@ export class RecordingCard {
     const amplitudes = record.harmonics.map(([a, b]) => Math.hypot(a, b));
     const bars = this.#figure("harmonics", "Harmonics", { x: amplitudes.map((_, i) => i + 1), y: amplitudes }, ["harmonic", "amplitude"]);
     const { start, end } = record.window;
-    return {
-      list: [whole, cycle, bars, spectrum],
-      charts: [
-        [whole, { x: { label: "time (s)" }, rows: [
-          { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
-          { y: { label: "F/W₀" }, marks: [start, end], lines: [{ ...curves.force, cls: series(0), name: "force" }] },
-        ] }, `Load and force; read from ${digits(start, 6)} s to ${digits(end, 6)} s.`],
-        [cycle, { x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
-          y: { label: "F/W₀ − mean" },
-          lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
-          points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0), size: 3 }],
-        }] }, "Mean cycle with the fitted harmonics."],
-        [bars, { x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: amplitudes.map((_, i) => i + 1) }, rows: [{
-          y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
-          bars: [{ x: amplitudes.map((_, i) => i + 1), y: amplitudes, cls: series(0), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])} ± ${digits(record.uncertainties[`mu${i + 1}`], 2)}` }],
-        }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", ")],
-        [spectrum, { x: { label: "frequency (Hz)" }, rows: [{
-          y: { label: "amplitude of F/W₀", log: true },
-          lines: [{ ...curves.spectrum, cls: series(5), name: "residual" }],
-          points: [{ x: amplitudes.map((_, i) => (i + 1) * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
-        }] }, "Spectrum of the residual, and the harmonics as points."],
-      ],
-    };
+    const order = amplitudes.map((_, i) => i + 1);
+    whole.draw({ x: { label: "time (s)" }, rows: [
+      { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
+      { y: { label: "F/W₀" }, marks: [start, end], lines: [{ ...curves.force, cls: series(0), name: "force" }] },
+    ] }, `Load and force; read from ${digits(start, 6)} s to ${digits(end, 6)} s.`);
+    cycle.draw({ x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
+      y: { label: "F/W₀ − mean" },
+      lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
+      points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0), size: 3 }],
+    }] }, "Mean cycle with the fitted harmonics.");
+    bars.draw({ x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: order }, rows: [{
+      y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
+      bars: [{ x: order, y: amplitudes, cls: series(0), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])} ± ${digits(record.uncertainties[`mu${i + 1}`], 2)}` }],
+    }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", "));
+    spectrum.draw({ x: { label: "frequency (Hz)" }, rows: [{
+      y: { label: "amplitude of F/W₀", log: true },
+      lines: [{ ...curves.spectrum, cls: series(5), name: "residual" }],
+      points: [{ x: order.map((n) => n * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
+    }] }, "Spectrum of the residual, and the harmonics as points.");
+    return [whole, cycle, bars, spectrum];
   }
 
   #sliding({ record, curves }) {
@@ -296,25 +293,30 @@ export class RecordingCard {
       const line = (from, to, style) => ({ x: [from, to], y: [at(from), at(to)], cls: series(1), name: `steady level and drift at ${quantity(s.velocity ?? 0, "velocity", 3)}`, ...style });
       return [line(s.start, s.steady.start, { dashed: true }), line(s.steady.start, s.end, { thick: true })];
     });
-    const rate = this.#figure("rates", "Rate dependence A − B", { x: record.steps.map((s) => s.velocity_after), y: record.steps.map((s) => s.rate_dependence) }, ["velocity after", "rate dependence"]);
-    const healing = this.#figure("healing", "Healing after holds", { x: record.holds.map((h) => h.hold_time), y: record.holds.map((h) => h.healing) }, ["hold time", "healing"]);
-    const charts = [[whole, { x: { label: "time (s)" }, rows: [{
+    whole.draw({ x: { label: "time (s)" }, rows: [{
       y: { label: "friction F/W" }, marks: record.segments.slice(1).map((s) => s.start),
       lines: [{ ...curves.friction, cls: series(5), name: "friction" }, ...levels],
       points: [{ x: record.holds.map((h) => h.peak_time), y: record.holds.map((h) => h.peak), cls: series(0), title: (i) => `peak after ${digits(record.holds[i].hold_time, 3)} s: ${digits(record.holds[i].peak, 4)}` }],
-    }] }, `Friction over time: ${count(record.steps.length, "step")}, ${count(record.holds.length, "hold")}.`]];
-    const list = [whole];
+    }] }, `Friction over time: ${count(record.steps.length, "step")}, ${count(record.holds.length, "hold")}.`);
+    const figures = [whole];
+    const dots = (figure, x, label, at, values, doubts, description) => {
+      figures.push(figure);
+      const range = [Math.min(...at) / 1.6, Math.max(...at) * 1.6];
+      figure.draw({ x: { ...x, log: true, range }, rows: [{ y: { label }, ...errorBars(at, values, doubts) }] }, description);
+    };
     if (record.steps.length) {
-      list.push(rate);
-      const at = record.steps.map((s) => Math.abs(s.velocity_after));
-      charts.push([rate, { x: { label: "velocity after the step", log: true, range: [Math.min(...at) / 1.6, Math.max(...at) * 1.6], format: (v) => quantity(v, "velocity", 3) }, rows: [{ y: { label: "A − B" }, ...errorBars(at, record.steps.map((s) => s.rate_dependence), record.steps.map((s) => s.rate_uncertainty)) }] }, "A − B of each velocity step."]);
+      const [after, rates] = ["velocity_after", "rate_dependence"].map((n) => record.steps.map((s) => s[n]));
+      dots(this.#figure("rates", "Rate dependence A − B", { x: after, y: rates }, ["velocity after", "rate dependence"]),
+        { label: "velocity after the step", format: (v) => quantity(v, "velocity", 3) }, "A − B",
+        after.map(Math.abs), rates, record.steps.map((s) => s.rate_uncertainty), "A − B of each velocity step.");
     }
     if (record.holds.length) {
-      list.push(healing);
-      const held = record.holds.map((h) => h.hold_time);
-      charts.push([healing, { x: { label: "hold time (s)", log: true, range: [Math.min(...held) / 1.6, Math.max(...held) * 1.6] }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
+      const [held, healing] = ["hold_time", "healing"].map((n) => record.holds.map((h) => h[n]));
+      dots(this.#figure("healing", "Healing after holds", { x: held, y: healing }, ["hold time", "healing"]),
+        { label: "hold time (s)" }, "healing",
+        held, healing, record.holds.map((h) => h.healing_uncertainty), "Healing against the time of each hold.");
     }
-    return { list, charts };
+    return figures;
   }
 
   #figure(kind, title, curve, [x, y]) {
