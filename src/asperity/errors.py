@@ -174,7 +174,7 @@ def require_known(name: str, known: Iterable[str], field: str | Argument, rule: 
         As in `InputError`.
     """
     if name not in known:
-        raise InputError(field, rule, f"'{name}'", closest(name, known))
+        raise InputError(field, rule, f"'{printable(name, 80)}'", closest(name, known))
 
 
 class InputTypeError(InputError, TypeError):

@@ -80,8 +80,10 @@ def in_labels(argument: Argument) -> str:
         label = key
     elif name == "fixed" and key:
         label = f"Fixed numbers, {key}"
+    elif name in ("columns", "Trace.channel") and key == "time":
+        label = LABELS["time"]
     elif name in ("columns", "Trace.channel") and key:
-        label = LABELS.get(key) or ROLES.get(key, f"role {key}").capitalize()
+        label = ROLES[key].capitalize() if key in ROLES else f"Role {key}"
     elif name == "units" and key:
         label = f"Unit of {key}"
     elif name == "channels" and key:
