@@ -34,7 +34,6 @@ LABELS: Mapping[str, str] = {
     "free": "Free parameters",
     "fixed": "Fixed numbers",
     "laws": "Laws",
-    "material": "Other numbers from",
     "prior": "Published uncertainties as priors",
     "gauge": "Low-pass of the force gauge",
     "drift": "Friction also drifts over time",
