@@ -13,8 +13,10 @@ from pathlib import Path
 from types import ModuleType
 
 
-def lazy_names(package: str, file: str) -> tuple[Callable[[str], object], list[str]]:
-    """The ``__getattr__`` and the ``__all__`` of a package.
+def lazy_names(
+    package: str, file: str
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """The ``__getattr__``, the ``__dir__`` and the ``__all__`` of a package.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def lazy_names(package: str, file: str) -> tuple[Callable[[str], object], list[s
             return import_module(f"{package}.{there}")
         return getattr(import_module(module), there)
 
-    return get, public
+    return get, lambda: sorted(public), public
 
 
 def public_names(names: Mapping[str, object]) -> list[str]:

@@ -16,10 +16,10 @@ from typing import ClassVar, NamedTuple
 
 
 class Argument(NamedTuple):
-    """An argument of the library, which is an option or a field elsewhere.
+    """An argument of the library, which the command line and the page call by other names.
 
-    As a text it has the words of the current door: ``columns['W']`` or ``columns={'W': 'Fn'}`` in
-    Python, ``--load`` or ``--load Fn`` on the command line.
+    Its text is that of the door in use: ``columns['W']`` or ``columns={'W': 'Fn'}`` in Python,
+    ``--load`` or ``--load Fn`` on the command line.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Argument(NamedTuple):
     key : str
         Key of an argument that is a mapping.
     value : str
-        To be given; empty where the argument alone is named.
+        Value that the sentence advises to give; empty where it only names the argument.
     """
 
     name: str
@@ -57,7 +57,7 @@ _IN_PYTHON = {
 
 
 def in_python(argument: Argument) -> str:
-    """The words of the library."""
+    """An argument as Python writes it."""
     name, key, value = argument
     name = _IN_PYTHON.get(name, name)
     if not value:
@@ -71,7 +71,7 @@ def in_python(argument: Argument) -> str:
 
 
 def in_files(argument: Argument) -> str:
-    """The words of a TOML file: ``fixed.D0``, ``fixed.D0 = '0.4 um'``."""
+    """An argument as a TOML file writes it: ``fixed.D0``, ``fixed.D0 = '0.4 um'``."""
     place = ".".join(filter(None, argument[:2]))
     value = {"True": "true", "False": "false"}.get(argument.value, argument.value)
     plain = value in ("true", "false") or value.isdigit()
@@ -161,6 +161,20 @@ def require(
     """
     if not holds:
         raise InputError(field, rule, got, advice)
+
+
+def require_known(name: str, known: Iterable[str], field: str | Argument, rule: str) -> None:
+    """Raise an `InputError` about a name that is none of the known ones, with the nearest of them.
+
+    Parameters
+    ----------
+    name : str
+    known : iterable of str
+    field, rule : str
+        As in `InputError`.
+    """
+    if name not in known:
+        raise InputError(field, rule, f"'{printable(name, 80)}'", closest(name, known))
 
 
 class InputTypeError(InputError, TypeError):

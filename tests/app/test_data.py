@@ -318,9 +318,9 @@ TABLE = """V,epsilon,frequency,mean_friction,mean_friction_err
 
 
 def test_the_report_of_a_fit_is_packed_whole(monkeypatch):
-    def written(folder, found, posterior, names):
+    def written(folder, fit, posterior, names):
         folder.mkdir()
-        (folder / "fit.json").write_text(f"{found} fitted")
+        (folder / "fit.json").write_text(f"{fit} fitted")
 
     monkeypatch.setattr("asperity.fit_report.write_report", written)
     packed = fits._report("a law", None, "friction")
@@ -334,9 +334,9 @@ class Drawn:
 
     log_density = np.zeros((2, 100))
 
-    def __init__(self, found, seed):
+    def __init__(self, fit, seed):
         quantiles = [NormalDist().inv_cdf((k + 0.5) / 200) for k in range(200)]
-        p = found.parameters["mu0"]
+        p = fit.parameters["mu0"]
         self.draws = {"mu0": p.value + p.se * np.reshape(quantiles, (2, 100))}
         self.seed = seed
 
@@ -361,15 +361,15 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
     table = measured_here(TABLE.encode(), "readings.csv")[-1]["result"]["table"]
     assert table["count"] == 3
 
-    def sampled(found, *, chains, draws, seed, progress):
+    def sampled(fit, *, chains, draws, seed, progress):
         assert (chains, draws, seed) == (2, 100, 7)
         progress(50, 800)
-        return Drawn(found, seed)
+        return Drawn(fit, seed)
 
     monkeypatch.setattr("asperity.inference.sample_posterior", sampled)
     monkeypatch.setattr(
         "asperity.fit_report.write_report",
-        lambda folder, found, posterior, names: (
+        lambda folder, fit, posterior, names: (
             folder.mkdir() or posterior.to_netcdf(folder / "a.nc")
         ),
     )
@@ -453,6 +453,12 @@ def test_recordings_are_dropped_measured_and_restored_from_their_link(
     mu1 = float(parts.inner_text().split("\t")[8].split()[0])
     assert mu1 == pytest.approx(MU1, rel=0.01)
     assert parts.get_by_label("Use part 1 in fits").is_checked()
+    options = good.locator("summary", has_text="Channels")
+    options.click()
+    good.get_by_role("textbox", name="Harmonics").fill("6")
+    good.get_by_role("textbox", name="Harmonics").press("Enter")
+    good.locator(".panel.harmonics .bar").nth(5).wait_for()
+    options.click()
     assert "against the load" in good.get_by_role("region", name="good.csv: ").inner_text()
     sentence = events.locator(".sentence", has_text="Regular stick-slip: ")
     sentence.wait_for()
@@ -532,28 +538,30 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
     assert run.velocities == pytest.approx([1e-6, 1e-5], rel=1e-3)
 
 
-def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monkeypatch):
+def test_a_fit_of_the_page_is_copied_as_texts_that_ask_the_same(steps, monkeypatch):
     steps["question"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
     more = {
         "fit_rate": "2 Hz", "gauge": "50 Hz", "fixed": {"W0": "10 N"}, "drift": True,
         "prior": {"K": "0.2+-0.01 N/um"}, "trend": "quadratic",
     }  # fmt: skip
     page = fits.Fitted(**steps["question"], **more)
-    command = shlex.split(fits._fit_command(page, ["steps.csv"]))
+    texts = fits._texts(page, ["steps.csv"])
     asked = []
     monkeypatch.setattr(
         "asperity.inference.answers.answer_fit", lambda question, **_: asked.append(question)
     )
-    CliRunner().invoke(main, command[1:])
-    (question,) = asked
-    names = [*fits.FitOptions.model_fields]
-    assert question.model_dump(include=names) == page.model_dump(include=names)
-    assert question.law == "rice-ruina"
-    (data,) = question.data
-    run = page.runs[0]
-    assert data.window == tuple(run.window)
-    assert data.steps == tuple(run.steps)
-    assert data.source.units == run.source.units
+    CliRunner().invoke(main, shlex.split(texts["command"])[1:])
+    exec(texts["python"], {})
+    assert len(asked) == 2
+    for question in asked:
+        names = [*fits.FitOptions.model_fields]
+        assert question.model_dump(include=names) == page.model_dump(include=names)
+        assert question.law == "rice-ruina"
+        (data,) = question.data
+        run = page.runs[0]
+        assert data.window == tuple(run.window)
+        assert data.steps == tuple(run.steps)
+        assert data.source.units == run.source.units
 
 
 @pytest.mark.parametrize(
@@ -598,12 +606,12 @@ def test_a_recording_is_fitted_on_the_page_and_a_second_fit_cancelled(visit, bar
     table = fit.get_by_role("region", name="Parameters")
     table.wait_for()
     rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
-    found = {name: number(rows[name]) for name in PLANTED}
+    estimates = {name: number(rows[name]) for name in PLANTED}
     assert "nm" in table.get_by_role("row", name="D0").inner_text()
-    found["D0"] *= 1e-9
+    estimates["D0"] *= 1e-9
     # 200 samples of a noise of 3e-4 leave standard errors of A, B and D0 of 0.8, 0.5 and 0.7 %.
-    assert found == pytest.approx(PLANTED, rel=0.03)
-    assert found["A"] - found["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
+    assert estimates == pytest.approx(PLANTED, rel=0.03)
+    assert estimates["A"] - estimates["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
     assert fit.locator(".panel.run-1 .plot path.line").count() == 3
     assert not fit.get_by_role("button", name="Cancel").is_visible()
     # The numbers of the fit are moved by hand, and the link restores them.
@@ -653,8 +661,8 @@ def test_velocities_are_given_where_no_channel_has_the_motion(visit, barriers, s
     table = fit.get_by_role("region", name="Parameters")
     table.wait_for()
     rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
-    found = {name: number(rows[name]) * (1e-9 if name == "D0" else 1) for name in PLANTED}
-    assert found == pytest.approx(PLANTED, rel=0.03)
+    estimates = {name: number(rows[name]) * (1e-9 if name == "D0" else 1) for name in PLANTED}
+    assert estimates == pytest.approx(PLANTED, rel=0.03)
     again = visit("#" + page.url.split("#", 1)[1])
     again.locator(".sentence", has_text="2 velocity steps").wait_for()
     again.locator("summary", has_text="Channels").click()

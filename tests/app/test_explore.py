@@ -18,13 +18,13 @@ def test_numbers_are_those_of_the_package(explored):
     answer = explored({"law": "rice-ruina", "numbers": POINT})
     material = asp.materials.load("bureau2000")
     slider = asp.Slider(material.law("rice-ruina"), spring=material.K, load=material.W0)
-    found = asp.periodic_response(slider, velocity=1e-6, epsilon=0.12, frequency=120.0)
+    response = asp.periodic_response(slider, velocity=1e-6, epsilon=0.12, frequency=120.0)
     for name in ("mean_friction", "mu1", "mu2", "phase1", "phase2", "growth_rate"):
-        assert answer["point"][name] == pytest.approx(float(getattr(found, name)), rel=1e-7)
-    assert answer["point"]["stable"] == bool(found.stable)
+        assert answer["point"][name] == pytest.approx(float(getattr(response, name)), rel=1e-7)
+    assert answer["point"]["stable"] == bool(response.stable)
     curve = answer["curves"]["rice-ruina"]
     mean = np.interp(0.12, answer["amplitudes"], np.array(curve["mean_friction"], dtype=float))
-    assert mean == pytest.approx(float(found.mean_friction), rel=1e-3)
+    assert mean == pytest.approx(float(response.mean_friction), rel=1e-3)
 
 
 @pytest.mark.parametrize("inertia", [0, 1])
@@ -44,11 +44,11 @@ def test_the_motion_below_the_threshold_is_stick_slip(ask):
     numbers = {"V": 1e-5, "epsilon": 0.0, "frequency": 120.0, "K": 5e4, "W0": 7.0}
     question = {"law": "rice-ruina", "numbers": numbers, "growth_rate": 10.0}
     motion = ask("explore/motion", question).lines[-1]["result"]
-    found = motion["stick_slip"]
+    cycles = motion["stick_slip"]
     assert motion["inertia"]
-    assert found["cycles"] > 3
-    assert found["slip"] / found["period"] == pytest.approx(1e-5, rel=0.15)
-    assert found["drop"] * 7.0 / 5e4 == pytest.approx(found["slip"], rel=0.15)
+    assert cycles["cycles"] > 3
+    assert cycles["slip"] / cycles["period"] == pytest.approx(1e-5, rel=0.15)
+    assert cycles["drop"] * 7.0 / 5e4 == pytest.approx(cycles["slip"], rel=0.15)
     assert len(motion["frames"]["place"]) == len(motion["frames"]["force"])
 
 
@@ -60,9 +60,9 @@ def test_stick_slip_that_grows_is_told_by_its_last_cycle(ask):
     pmma = asp.materials.load("bureau2000")
     slider = asp.Slider(pmma.law("rice-ruina"), spring=2e5, mass=pmma.M, load=7.0)
     limit = stick_slip_response(slider, velocity=1e-6)
-    found = motion["stick_slip"]
-    assert found["period"] == pytest.approx(float(limit.period), rel=0.05)
-    assert found["drop"] == pytest.approx(float(limit.drop), rel=0.05)
+    cycles = motion["stick_slip"]
+    assert cycles["period"] == pytest.approx(float(limit.period), rel=0.05)
+    assert cycles["drop"] == pytest.approx(float(limit.drop), rel=0.05)
 
 
 def test_the_motion_above_the_threshold_settles_to_the_orbit(ask, explored):
@@ -122,10 +122,10 @@ def test_the_grid_is_that_of_the_package(ask):
     text = ask("map/text", ASKED).json["python"]
     namespace = {}
     exec(text.replace('print(result["growth_rate"])', ""), namespace)
-    found = namespace["result"]
+    result = namespace["result"]
     # The page's numbers have five digits.
-    assert np.array(grid["values"]) == pytest.approx(found["growth_rate"].values, rel=1e-4)
-    assert np.array_equal(np.array(grid["stable"], dtype=bool), found["stable"].values)
+    assert np.array(grid["values"]) == pytest.approx(result["growth_rate"].values, rel=1e-4)
+    assert np.array_equal(np.array(grid["stable"], dtype=bool), result["stable"].values)
     assert grid["x"] == pytest.approx(Axis("epsilon", 0.01, 0.4, 2).values)
     assert {k for line in grid["boundaries"] for k in line["kind"]} == {"Neimark-Sacker"}
 

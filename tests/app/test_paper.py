@@ -87,6 +87,11 @@ def test_curves_with_the_mass_follow_the_numbers():
     assert curve["values"]["mu2"][20:] == pytest.approx(point.mu2, rel=1e-6)
 
 
+def test_an_unknown_paper_is_told_in_a_sentence(visit):
+    page = visit("#paper?paper=nothing2000")
+    page.locator(".message", has_text="must be").wait_for()
+
+
 def test_the_ledger_can_be_searched(visit):
     page = visit("#paper?show=ledger&kind=test&search=Rice")
     claims = page.locator(".claim")

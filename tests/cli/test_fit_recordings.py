@@ -29,9 +29,9 @@ def run_fit(*arguments):
 def test_a_recording_is_fitted(recording):
     # At the rate of the other fits of this file, for one program.
     options = ["--free", "A,B,D0,K", "--fit-rate", "5 Hz", "--json"]
-    found = run_fit(recording, "--law", "rice-ruina", *options)
-    assert found.exit_code == 0, found.output
-    record = json.loads(found.stdout)
+    result = run_fit(recording, "--law", "rice-ruina", *options)
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
     K = record["parameters"]["K"]
     assert K["unit"] == "1/m"
     # The stiffness over the load that the recording was computed with.
@@ -41,8 +41,8 @@ def test_a_recording_is_fitted(recording):
 
 
 def test_priors_of_a_material_want_the_free_parameters(recording):
-    found = run_fit(recording, "--law", "rice-ruina", "--prior", "bureau2000")
-    assert "--prior bureau2000 must go with --free" in found.output + str(found.exception)
+    result = run_fit(recording, "--law", "rice-ruina", "--prior", "bureau2000")
+    assert "--prior bureau2000 must go with --free" in result.output + str(result.exception)
 
 
 KNOWN = ["--fix", "B=0.01", "--fix", "D0=1 um"]
@@ -70,25 +70,25 @@ KNOWN = ["--fix", "B=0.01", "--fix", "D0=1 um"]
     ],
 )
 def test_bad_options_are_refused(recording, more, said):
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
-    assert said in found.output + str(found.exception)
-    assert "Traceback" not in found.output
+    result = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert said in result.output + str(result.exception)
+    assert "Traceback" not in result.output
 
 
 @pytest.mark.long
 def test_the_choice_of_the_window_is_an_uncertainty(recording):
     options = ["--windows", "auto", "--fit-rate", "5 Hz"]
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", *options)
-    assert found.exit_code == 0, found.output
-    assert "1400 samples are compared as 700 means over blocks of 2" in found.output
-    assert "over 4 windows (0 to 139.9, " in found.output
-    assert "of the window" in found.output
+    result = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", *options)
+    assert result.exit_code == 0, result.output
+    assert "1400 samples are compared as 700 means over blocks of 2" in result.output
+    assert "over 4 windows (0 to 139.9, " in result.output
+    assert "of the window" in result.output
 
 
 def test_windows_and_a_window_are_refused(recording):
     more = ["--windows", "0:100,0:140", "--window", "0:100"]
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
-    assert "--windows must stand alone" in found.output + str(found.exception)
+    result = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert "--windows must stand alone" in result.output + str(result.exception)
 
 
 @pytest.fixture(scope="module")
@@ -113,9 +113,9 @@ def fit_of_steps(path, *more):
 
 def test_the_slope_of_unloading_is_the_prior_of_the_stiffness(with_unloading):
     more = ["--window", "0:140", "--stiffness-from", "-10:-0.05", "--fit-rate", "5 Hz", "--json"]
-    found = fit_of_steps(with_unloading, *more)
-    assert found.exit_code == 0, found.output
-    K = json.loads(found.stdout)["parameters"]["K"]
+    result = fit_of_steps(with_unloading, *more)
+    assert result.exit_code == 0, result.output
+    K = json.loads(result.stdout)["parameters"]["K"]
     prior = K["prior"]
     assert prior["source"] == "slope of the force from -10 to -0.05 s"
     assert abs(prior["mean"] - 4e3) < 3 * prior["sd"] < 200
@@ -133,15 +133,15 @@ def test_the_slope_of_unloading_is_the_prior_of_the_stiffness(with_unloading):
     ],
 )
 def test_spans_that_give_no_prior_are_refused(with_unloading, more, said):
-    found = fit_of_steps(with_unloading, *more)
-    assert said in found.output + str(found.exception)
-    assert "Traceback" not in found.output
+    result = fit_of_steps(with_unloading, *more)
+    assert said in result.output + str(result.exception)
+    assert "Traceback" not in result.output
 
 
 def test_a_slope_by_a_gauge_of_unknown_gain_is_refused(with_unloading):
     more = ["--stiffness-from", "-10:-0.05", "--window", "0:140", "--prior", "gain=1+-0.02"]
-    found = fit_of_steps(with_unloading, *more)
-    assert "must be without a prior of gain" in found.output + str(found.exception)
+    result = fit_of_steps(with_unloading, *more)
+    assert "must be without a prior of gain" in result.output + str(result.exception)
 
 
 @pytest.fixture(scope="module")
@@ -162,9 +162,9 @@ def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
     common += ["--start", "D0=6.5 um", "--fit-rate", "5 Hz"]
 
     def record(*more):
-        found = run_fit(*common, *more, "--json")
-        assert found.exit_code == 0, found.output
-        return json.loads(found.stdout)
+        result = run_fit(*common, *more, "--json")
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout)
 
     free = record("--report", tmp_path / "report")
     K, over = free["parameters"]["K"], free["over_load"]["K/W0"]
@@ -202,9 +202,9 @@ def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
 )
 def test_what_would_not_end_is_refused_before_computing(recording, more, said, monkeypatch):
     monkeypatch.setattr("asperity.inference.fit", lambda *_, **__: pytest.fail("it is computed"))
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
-    assert found.exit_code == 2 or isinstance(found.exception, InputError)
-    assert said in found.output + str(found.exception)
+    result = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert result.exit_code == 2 or isinstance(result.exception, InputError)
+    assert said in result.output + str(result.exception)
 
 
 @pytest.mark.parametrize("command", ["fit", "response"])
@@ -213,6 +213,6 @@ def test_a_pipe_is_no_table(tmp_path, command):
     pipe = tmp_path / "pipe.csv"
     os.mkfifo(pipe)
     where = [pipe] if command == "fit" else ["--table", pipe, "--out", tmp_path / "out.csv"]
-    found = CliRunner().invoke(main, [command, *map(str, where), "--law", "rice-ruina"])
-    assert "must be a regular file, got" in found.output + str(found.exception)
-    assert "a pipe" in found.output + str(found.exception)
+    result = CliRunner().invoke(main, [command, *map(str, where), "--law", "rice-ruina"])
+    assert "must be a regular file, got" in result.output + str(result.exception)
+    assert "a pipe" in result.output + str(result.exception)

@@ -56,20 +56,22 @@ def test_json_has_the_planted_numbers(asperity, recording) -> None:
     result = asperity("measure", recording, "--json")
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
-    found = record(result)
-    doubt = found["uncertainties"]
+    measurement = record(result)
+    doubt = measurement["uncertainties"]
     truth = {"epsilon": EPSILON, "frequency": F, "mu1": MU1, "phase1": PHASE1, "delta_mu": -0.06}
     for name, true in truth.items():
-        assert abs(found[name] - true) < 5 * doubt[name], name
+        assert abs(measurement[name] - true) < 5 * doubt[name], name
         assert doubt[name] > 0
-    assert 1.9 < found["intervals_95"]["delta_mu"] / doubt["delta_mu"] < 13
-    assert found["verdict"] == "ok"
-    assert found["unit"] == "N"
-    assert found["channels"] == {"W": "normal force", "F": "shear force"}
-    assert found["window"]["chosen_by"] == "program"
-    assert 2 < found["window"]["start"] < found["window"]["end"] < 10
-    assert {"name", "number", "suspicious", "bad", "verdict", "sentence"} == set(found["checks"][0])
-    assert found["provenance"]["recording"] == str(recording)
+    assert 1.9 < measurement["intervals_95"]["delta_mu"] / doubt["delta_mu"] < 13
+    assert measurement["verdict"] == "ok"
+    assert measurement["unit"] == "N"
+    assert measurement["channels"] == {"W": "normal force", "F": "shear force"}
+    assert measurement["window"]["chosen_by"] == "program"
+    assert 2 < measurement["window"]["start"] < measurement["window"]["end"] < 10
+    assert {"name", "number", "suspicious", "bad", "verdict", "sentence"} == set(
+        measurement["checks"][0]
+    )
+    assert measurement["provenance"]["recording"] == str(recording)
 
 
 def test_text_says_the_same(asperity, recording) -> None:
@@ -90,12 +92,12 @@ def test_text_says_the_same(asperity, recording) -> None:
 def test_options_reach_the_reading(asperity, recording) -> None:
     options = ("--load", "normal force", "--force", "shear force", "--time", "time")
     reading = ("--window", "3:9.5", "--detrend", "none", "--whole-periods", "-f", "41 Hz")
-    found = record(asperity("measure", recording, *options, *reading, "--json"))
-    window = found["window"]
+    measurement = record(asperity("measure", recording, *options, *reading, "--json"))
+    window = measurement["window"]
     assert window["start"] == pytest.approx(3)
     assert 9.5 - 1 / F - 2e-3 < window["end"] <= 9.5
     assert window["chosen_by"] == "user"
-    assert abs(found["frequency"] - F) < 5 * found["uncertainties"]["frequency"]
+    assert abs(measurement["frequency"] - F) < 5 * measurement["uncertainties"]["frequency"]
 
 
 def test_columns_and_units_that_the_file_leaves_open(asperity, recording, tmp_path) -> None:
@@ -103,22 +105,22 @@ def test_columns_and_units_that_the_file_leaves_open(asperity, recording, tmp_pa
     rows = recording.read_text().splitlines()[1:]
     bare.write_text("t,a,b\n" + "\n".join(rows))
     options = ("--load", "a", "--force", "b", "--unit", "a=N", "--unit", "b=N", "--time", "t")
-    found = record(asperity("measure", bare, *options, "--unit", "t=s", "--json"))
-    assert found["unit"] == "N"
-    assert abs(found["mu1"] - MU1) < 5 * found["uncertainties"]["mu1"]
+    measurement = record(asperity("measure", bare, *options, "--unit", "t=s", "--json"))
+    assert measurement["unit"] == "N"
+    assert abs(measurement["mu1"] - MU1) < 5 * measurement["uncertainties"]["mu1"]
 
 
 def test_windows_as_people_write_them(asperity, recording) -> None:
-    found = record(asperity("measure", recording, "--window", "4000 ms: 9", "--json"))
-    assert found["window"]["start"] == pytest.approx(4, abs=1e-6)
-    assert found["window"]["end"] == pytest.approx(9, abs=1e-6)
+    measurement = record(asperity("measure", recording, "--window", "4000 ms: 9", "--json"))
+    assert measurement["window"]["start"] == pytest.approx(4, abs=1e-6)
+    assert measurement["window"]["end"] == pytest.approx(9, abs=1e-6)
 
 
 def test_an_exact_frequency_is_not_fitted(asperity, recording) -> None:
     result = asperity("measure", recording, "-f", f"{F} Hz", "--exact-frequency", "--json")
-    found = record(result)
-    assert found["frequency"] == pytest.approx(F, rel=1e-12)
-    assert found["uncertainties"]["frequency"] == 0
+    measurement = record(result)
+    assert measurement["frequency"] == pytest.approx(F, rel=1e-12)
+    assert measurement["uncertainties"]["frequency"] == 0
 
 
 def test_a_bad_verdict_is_exit_code_1_with_its_sentence(asperity, recording, tmp_path) -> None:
@@ -148,16 +150,16 @@ def test_plots_are_pictures(asperity, recording, step, tmp_path) -> None:
 def test_a_velocity_step(asperity, step) -> None:
     result = asperity("measure", step, "--no-modulation", "--json")
     assert result.exit_code == 0, result.output
-    found = record(result)
-    first, second = found["segments"]
+    measurement = record(result)
+    first, second = measurement["segments"]
     assert second["start"] == pytest.approx(70, abs=0.2)
     assert first["velocity"] == pytest.approx(3e-6, rel=1e-2)
     assert second["velocity"] == pytest.approx(10e-6, rel=1e-2)
-    (change,) = found["steps"]
+    (change,) = measurement["steps"]
     assert abs(change["change"] + 0.003) < 5 * change["uncertainty"]
     assert change["rate_dependence"] == pytest.approx(-0.003 / np.log(10 / 3), abs=3e-4)
-    assert found["load"]["value"] == pytest.approx(20e6, rel=1e-3)
-    assert [rate["rate"] for rate in found["rates"]] == pytest.approx([50, 10])
+    assert measurement["load"]["value"] == pytest.approx(20e6, rel=1e-3)
+    assert [rate["rate"] for rate in measurement["rates"]] == pytest.approx([50, 10])
     text = asperity("measure", step, "--no-modulation", "--window", ":119").stdout
     assert "A - B" in text
     assert "um/s" in text
@@ -260,10 +262,10 @@ def test_a_file_cut_in_the_middle_is_measured_and_the_cut_is_bad(
     path.write_bytes(whole[: int(part * len(whole)) // 7 * 7 + 3])
     result = asperity("measure", path, "--window", f"2.2:{11 * part}", "--json")
     assert result.exit_code == 1
-    found = record(result)
+    measurement = record(result)
     assert "asperity: truncated is bad" in result.stderr
-    assert found["verdict"] == "bad"
-    assert abs(found["mu1"] - MU1) < 5 * found["uncertainties"]["mu1"]
+    assert measurement["verdict"] == "bad"
+    assert abs(measurement["mu1"] - MU1) < 5 * measurement["uncertainties"]["mu1"]
 
 
 def test_steps_and_holds_of_the_user(asperity, step, tmp_path) -> None:
@@ -272,15 +274,15 @@ def test_steps_and_holds_of_the_user(asperity, step, tmp_path) -> None:
     for given in ("69.5", "69.5 s", listed):
         result = asperity("measure", step, "--no-modulation", "--steps", given, "--json")
         assert result.exit_code == 0, result.output
-        found = record(result)
-        assert [s["time"] for s in found["steps"]] == [69.5]
-        assert found["chosen_by"] == "user"
+        measurement = record(result)
+        assert [s["time"] for s in measurement["steps"]] == [69.5]
+        assert measurement["chosen_by"] == "user"
     spans = tmp_path / "holds.txt"
     spans.write_text("20 30\n40, 45\n", encoding="utf-8")
     for given in ("20:30,40:45", spans):
         result = asperity("measure", step, "--no-modulation", "--holds", given, "--json")
-        found = record(result)
-        assert [(h["start"], h["end"]) for h in found["holds"]] == [(20, 30), (40, 45)]
+        measurement = record(result)
+        assert [(h["start"], h["end"]) for h in measurement["holds"]] == [(20, 30), (40, 45)]
 
 
 def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:

@@ -164,11 +164,11 @@ def test_a_map_as_file_picture_and_json(asperity, tmp_path: Path) -> None:
     assert unmodulated == pytest.approx(KC, rel=2e-6)
     assert set(line["kind"]) == {"Neimark-Sacker"}
     assert plot.read_bytes().startswith(b"\x89PNG")
-    with xarray.open_dataset(out) as found:
-        assert found["mu1"].dims == ("K", "epsilon")
-        assert found["A"].attrs["origin"] == "bureau2000"
-        assert found["V"].attrs["origin"] == "command line"
-        assert int(found["stable"].sum()) == record["stable"]
+    with xarray.open_dataset(out) as dataset:
+        assert dataset["mu1"].dims == ("K", "epsilon")
+        assert dataset["A"].attrs["origin"] == "bureau2000"
+        assert dataset["V"].attrs["origin"] == "command line"
+        assert int(dataset["stable"].sum()) == record["stable"]
 
 
 def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
@@ -178,9 +178,9 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     assert result.stdout.split()[:2] == ["points", "9"]
     assert "boundary  Neimark-Sacker" in result.stdout
-    with xarray.open_dataset(out) as found:
-        np.testing.assert_allclose(found["epsilon"], [1e-3, 1e-2, 1e-1], rtol=1e-12)
-        np.testing.assert_allclose(found["K"], [1e5, 2e5, 4e5], rtol=1e-12)
+    with xarray.open_dataset(out) as dataset:
+        np.testing.assert_allclose(dataset["epsilon"], [1e-3, 1e-2, 1e-1], rtol=1e-12)
+        np.testing.assert_allclose(dataset["K"], [1e5, 2e5, 4e5], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

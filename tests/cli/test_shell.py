@@ -2,12 +2,14 @@
 
 import importlib
 import os
+import re
 import signal
 import subprocess
 import sys
 import types
 import warnings
 
+import click
 import pytest
 
 import asperity.cli.response
@@ -91,6 +93,17 @@ def test_options_come_in_one_order(command: str) -> None:
     if command in ("compare", "fit", "map", "response"):
         assert listed.index("--law") < listed.index("--plot")
     assert ("--json" in listed) == ("--names" in listed)
+
+
+@pytest.mark.parametrize("command", sorted(main.modules))
+def test_every_option_says_what_it_does(command: str) -> None:
+    called = getattr(importlib.import_module(main.modules[command]), command)
+    context = click.Context(called)
+    for option in called.params:
+        shown = option.get_help_record(context)
+        if isinstance(option, click.Option) and not option.hidden:
+            assert shown is not None
+            assert re.search(r"[A-Za-z]{2}", shown[1].split("[default")[0]), option.opts
 
 
 def test_an_unknown_command_names_the_nearest(asperity) -> None:

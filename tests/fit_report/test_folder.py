@@ -18,7 +18,7 @@ from asperity.orbit import response_function
 
 
 @pytest.fixture(scope="module")
-def found():
+def fitted():
     pmma = materials.load("bureau2000")
     # More rows than eight: the programs of tables with 16 rows, which tests of fits use too.
     epsilon = np.linspace(0.1, 0.5, 9)
@@ -32,11 +32,11 @@ def found():
     return fit(table, "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
 
 
-def test_the_folder_has_page_json_and_material(found, tmp_path):
+def test_the_folder_has_page_json_and_material(fitted, tmp_path):
     folder = tmp_path / "report"
-    write_report(folder, found)
+    write_report(folder, fitted)
     assert sorted(p.name for p in folder.iterdir()) == ["fit.json", "material.toml", "report.html"]
-    estimate = found.parameters["lambda"]
+    estimate = fitted.parameters["lambda"]
     material = materials.load(folder / "material.toml")
     assert material.lambda_ == estimate.value
     assert material["lambda"].si_uncertainty == pytest.approx(estimate.se)
@@ -54,10 +54,10 @@ def test_the_folder_has_page_json_and_material(found, tmp_path):
     assert "@import" not in page
 
 
-def test_a_folder_that_cannot_be_written_stays_as_it_was(found, tmp_path):
+def test_a_folder_that_cannot_be_written_stays_as_it_was(fitted, tmp_path):
     (tmp_path / "report").write_text("a file", encoding="utf-8")
     with pytest.raises(ValueError, match="folder"):
-        write_report(tmp_path / "report", found)
+        write_report(tmp_path / "report", fitted)
     assert (tmp_path / "report").read_text(encoding="utf-8") == "a file"
 
 
@@ -77,12 +77,12 @@ def test_each_frequency_has_a_curve_that_reaches_its_readings(monkeypatch):
     columns |= {"mean_friction": exact.mean_friction, "mean_friction_err": 1e-3}
     fixed = {n: v for n, v in (numbers | machine).items() if n != "mu0"}
     # A fit that turns to the search by itself, from the given start.
-    found = fit(
+    fitted = fit(
         table_of(columns), "rice-ruina", ("mu0",), fixed=fixed, start={"mu0": 0.52}, starts=0
     )
-    term = found.objective.terms[0]
+    term = fitted.objective.terms[0]
     assert term.searches
-    slow, fast = bands.bands_of(found, term, None)
+    slow, fast = bands.bands_of(fitted, term, None)
     assert [slow.label, fast.label] == ["40 µm/s, 0.3 Hz", "40 µm/s, 3 Hz"]
     for one, rows in ((slow, slice(0, each)), (fast, slice(each, 2 * each))):
         assert np.flatnonzero(one.rows).tolist() == list(range(2 * each))[rows]
@@ -90,7 +90,7 @@ def test_each_frequency_has_a_curve_that_reaches_its_readings(monkeypatch):
         between = np.interp(epsilon[rows], band.epsilon, band.middle)
         np.testing.assert_allclose(between, exact.mean_friction[rows], atol=2e-3)
         # Nearly without modulation mean friction follows mu0, with it less.
-        width = np.ptp([band.low, band.high], axis=0) / found.parameters["mu0"].se
+        width = np.ptp([band.low, band.high], axis=0) / fitted.parameters["mu0"].se
         assert width[0] == pytest.approx(3.92, rel=0.25)
         assert (np.diff(width) < 0).all()
 
@@ -99,9 +99,9 @@ def nothing_is_fetched(page):
     return not re.findall(r'(?:src|href)="(?!#)[^"]*"', page) and "@import" not in page
 
 
-def test_a_comparison_has_a_page_of_all_laws(found, tmp_path):
-    worse = replace(found, aicc=found.aicc + 50, law="another law")
-    compared = judge({"elasto-plastic": found, "another law": worse})
+def test_a_comparison_has_a_page_of_all_laws(fitted, tmp_path):
+    worse = replace(fitted, aicc=fitted.aicc + 50, law="another law")
+    compared = judge({"elasto-plastic": fitted, "another law": worse})
     # Not sampled, as of an excluded law.
     compared.laws["another law"] = replace(
         compared.laws["another law"], evidence=Evidence(-12.5, np.nan, np.nan, -12.5, 0, {})
@@ -147,7 +147,7 @@ def test_recordings_are_shown_with_the_motion(tmp_path):
     assert "[numbers.K]" not in material
 
 
-def test_a_comparison_without_a_fit_is_refused(found, tmp_path):
-    none = judge({n: replace(found, converged=False, message="no orbit") for n in ("a", "b")})
+def test_a_comparison_without_a_fit_is_refused(fitted, tmp_path):
+    none = judge({n: replace(fitted, converged=False, message="no orbit") for n in ("a", "b")})
     with pytest.raises(InputError, match="must have a converged fit"):
         write_comparison(tmp_path / "report", none)

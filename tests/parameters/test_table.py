@@ -144,14 +144,19 @@ def test_values_are_read_and_set_where_the_equations_have_them(inertia: bool, et
     known = equation_parameters(*problem)
     assert ("M" in known) == inertia
     assert ("eta" in known) == (inertia or eta is not None)
-    found = {name: float(value_of(problem, p)) for name, p in known.items()}
-    assert found["frequency"] == pytest.approx(120.0, rel=1e-15)
-    assert (found["V"], found["K"], found["epsilon"], found["lambda"]) == (1e-6, 2e5, 0.24, 7e-7)
+    values = {name: float(value_of(problem, p)) for name, p in known.items()}
+    assert values["frequency"] == pytest.approx(120.0, rel=1e-15)
+    assert (values["V"], values["K"], values["epsilon"], values["lambda"]) == (
+        1e-6,
+        2e5,
+        0.24,
+        7e-7,
+    )
     for name, p in known.items():
         changed = with_value(problem, p, 3.0)
         assert float(value_of(changed, p)) == pytest.approx(3.0, rel=1e-15)
         others = {n: float(value_of(changed, q)) for n, q in known.items() if n != name}
-        assert others == {n: value for n, value in found.items() if n != name}
+        assert others == {n: value for n, value in values.items() if n != name}
 
 
 def test_the_table_is_read_without_jax() -> None:

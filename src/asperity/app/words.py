@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from asperity.errors import Argument
 
-_LABELS: Mapping[str, str] = {
+#: Label of the page of each field.
+LABELS: Mapping[str, str] = {
     "window": "Window",
     "slice.start and slice.end": "Window",
     "detrend": "Drift",
@@ -53,13 +54,14 @@ _LABELS: Mapping[str, str] = {
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
-_ROLES: Mapping[str, str] = {
-    "time": "Time column",
-    "W": "Normal load",
-    "F": "Shear force",
-    "velocity": "Velocity",
-    "displacement": "Displacement",
-    "friction": "Friction",
+#: What a channel is, by its role.
+ROLES: Mapping[str, str] = {
+    "time": "time",
+    "W": "normal load",
+    "F": "shear force",
+    "velocity": "velocity",
+    "displacement": "displacement",
+    "friction": "friction",
 }
 
 
@@ -77,8 +79,10 @@ def in_labels(argument: Argument) -> str:
         label = key
     elif name == "fixed" and key:
         label = f"Fixed numbers, {key}"
+    elif name in ("columns", "Trace.channel") and key == "time":
+        label = LABELS["time"]
     elif name in ("columns", "Trace.channel") and key:
-        label = _ROLES.get(key, f"Role {key}")
+        label = ROLES[key].capitalize() if key in ROLES else f"Role {key}"
     elif name == "units" and key:
         label = f"Unit of {key}"
     elif name == "channels" and key:
@@ -86,5 +90,5 @@ def in_labels(argument: Argument) -> str:
     elif name == "modulated":
         return f"What it is{': velocity steps and holds' if value == 'False' else ''}"
     else:
-        label = _LABELS.get(argument.whole) or _LABELS.get(name, name)
+        label = LABELS.get(argument.whole) or LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

@@ -66,39 +66,26 @@ More than 20,000 samples are compared as means over blocks (--fit-rate).
 
 #: Options of the sampling, with their defaults.
 _SAMPLING = {"chains": 4, "draws": 1000, "seed": 0}
-#: Options that are fields of the question, by the name of the field: text, and name of the value.
-_FIELDS: dict[str, tuple[str, ...]] = {
-    "free": (
-        "Free parameters: a,b,c; by default all of the law that the data may show.",
-        "NAMES",
-    ),
-    "material": ("Fixes what is given nowhere else.", "NAME"),
-    "windows": (
-        "Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
-        "SPANS|auto",
-    ),
-    "stiffness_from": (
-        "Seconds of unloading and reloading whose slope is the prior of K; outside --window.",
-        "START:END",
-    ),
-    "trend": ("Trend of the friction of a recording over slip.", ""),
-    "drift": ("Add a linear drift of the friction over time.",),
-    "initial": ("State at the beginning of a recording.", ""),
-    "gauge": ('Low-pass of the force gauge, like "50 Hz".', "HZ"),
-    "gauge_order": ("Its order.", "N"),
-    "fit_rate": (
-        'Means a second that stand for the samples of a recording, like "100 Hz"; by default '
-        "as many as it needs where it has more than 20,000 samples.",
-        "HZ|full",
-    ),
-    "profile": ("Intervals by profile likelihood.",),
-    "inertia": ("Include the inertia of the slider.",),
-    "radiation_damping": ("Include the radiation damping eta.",),
+#: Options that are fields of the question: what is given, as of `field_option`.
+_FIELDS = {
+    "free": "NAMES",
+    "material": "NAME",
+    "windows": "SPANS|auto",
+    "stiffness_from": "START:END",
+    "trend": "",
+    "drift": None,
+    "initial": "",
+    "gauge": "HZ",
+    "gauge_order": "N",
+    "fit_rate": "HZ|full",
+    "profile": None,
+    "inertia": None,
+    "radiation_damping": None,
 }
 
 
 def _field(name: str) -> Any:
-    return field_option("asperity.questions.fit:Fit", name, *_FIELDS[name])
+    return field_option("asperity.questions.fit:Fit", name, _FIELDS[name])
 
 
 #: Options of the data and of what is estimated, what is needed first before the others.
@@ -156,7 +143,7 @@ def _question_options(*further: Decorator) -> Decorator:
                 of_run = {
                     "window": window,
                     "steps": None if steps is None else listed_times(steps, "--steps"),
-                    "velocities": None if velocities is None else velocities.split(","),
+                    "velocities": velocities,
                 }
                 fields = {
                     "data": [{"file": path, "source": source, **of_run} for path in data],
@@ -254,7 +241,7 @@ def fit(
     if report is not None and result.converged:
         _say_written(report)
     if result.converged:
-        output.draw(result)
+        output.draw(result.plot)
     return 0 if result.converged and (sampled is None or sampled.converged) else 1
 
 
@@ -356,5 +343,5 @@ def compare(
         write_comparison(report, comparison, output.names)
         _say_written(report)
     if comparison.best:
-        output.draw(comparison)
+        output.draw(comparison.plot)
     return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

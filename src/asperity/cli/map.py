@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import option, output_options, point_options, switch
-from asperity.cli.report import Output, save_figure, say
+from asperity.cli.report import Output, say
 from asperity.errors import InputError, require
 from asperity.parameters.arguments import one_of
 
@@ -39,11 +39,11 @@ _SHOWN = "growth_rate"
 
 
 @click.command(epilog=_EPILOG, short_help="Response and stability over any two numbers.")
-@option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".')
-@option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".')
+@option("--x x", "AXIS", 'Number along x, like "epsilon=0.01:0.5:200".', required=True)
+@option("--y y", "AXIS", 'Number along y, like "K=0.05:0.5:200 N/um".', required=True)
 @point_options
 @output_options(plot=True)
-@option("--out", "NC", "Where the map goes, as NetCDF.", Path)
+@option("--out", "NC", "Where the map goes, as NetCDF.", Path, required=True)
 @option(
     "--show",
     "QUANTITY",
@@ -53,12 +53,12 @@ _SHOWN = "growth_rate"
 @switch("--log-y", "Points along y at equal ratios.")
 @switch("--resume", "Go on with an interrupted map.")
 def map(
-    x: str | None,
-    y: str | None,
+    x: str,
+    y: str,
     log_x: bool,
     log_y: bool,
     point: Point,
-    out: Path | None,
+    out: Path,
     output: Output,
     show: str | None,
     resume: bool,
@@ -81,17 +81,10 @@ def map(
     pictured = show is None or output.plot is not None
     advice = "add --plot map.png or leave it out"
     require(pictured, "--show", "go with --plot", "no picture", advice)
-    for name, text, example in (
-        ("--out", out, "map.nc"),
-        ("--x", x, "'epsilon=0.01:0.5:200'"),
-        ("--y", y, "'K=0.05:0.5:200 N/um'"),
-    ):
-        require(text, name, "be given", "nothing", f"write it like {name} {example}")
-    assert out is not None
     output.require_picture()
     output_files({"--out": out, "--plot": output.plot})
     require_netcdf(out, "--out", "map.nc")
-    along_x, along_y = _axis(str(x), log_x, "--x"), _axis(str(y), log_y, "--y")
+    along_x, along_y = _axis(x, log_x, "--x"), _axis(y, log_y, "--y")
     # A material's number gives way to an axis; one that was given for this map does not.
     axes = (along_x.name, along_y.name)
     numbers = {
@@ -104,8 +97,6 @@ def map(
         result = write_map(
             out, point.law, numbers, x=along_x, y=along_y, resume=resume, progress=update
         )
-    if output.plot is not None:
-        save_figure(lambda: draw_map(result, show or _SHOWN), output.plot, output.names)
     record = _record(result, out)
     rows = tuple((name, str(record[name])) for name in ("points", "stable", "unstable", "failed"))
     boundaries = []
@@ -120,6 +111,7 @@ def map(
         boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
     table = [Section("", rows=rows), Section("", tuple(boundaries))]
     output.answer(lambda: record, lambda: table, point.law, "")
+    output.draw(lambda: draw_map(result, show or _SHOWN))
     unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
     say(
         unresolved
@@ -142,7 +134,7 @@ def _axis(text: str, log: bool, option: str) -> Axis:
         raise error.about(option) from None
 
 
-def _record(dataset: xarray.Dataset, out: Path | None) -> dict[str, Any]:
+def _record(dataset: xarray.Dataset, out: Path) -> dict[str, Any]:
     from asperity.study.map.dataset import boundary_lines
 
     converged = dataset["converged"].values

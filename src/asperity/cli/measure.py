@@ -23,11 +23,13 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.recording import listed_times, source_options, velocities_option
-from asperity.cli.report import Output, save_figure, say
+from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming, require
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.questions.recording import Measurement as Question, Source
 
@@ -60,28 +62,18 @@ class FileRows:
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; one row with the reason if it cannot be measured."""
-        from asperity.measurement.campaign import (
-            MACHINE_FIELDS,
-            failed_row,
-            modulated_rows,
-            sliding_rows,
-        )
+        from asperity.measurement.campaign import MACHINE_FIELDS, failed_row
         from asperity.measurement.from_file import measured_parts
-        from asperity.measurement.stick_slip.catalogue import stick_slip_row
-        from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+        from asperity.measurement.report import measured_rows
         from asperity.recording.readers.from_file import read_source
 
         with naming(in_options):
             try:
                 question = self.question_of(path)
                 result = measured_parts(read_source(path, self.source), question)
-                if isinstance(result, StickSlipMeasurement):
-                    return [stick_slip_row(path, result)]
-                modulated = isinstance(result, list)
-                rows: Any = modulated_rows if modulated else sliding_rows
                 known = {n: getattr(question, f) for n, f in MACHINE_FIELDS.items()}
                 known = {name: value for name, value in known.items() if value is not None}
-                return [{**known, **row} for row in rows(path, result)]
+                return [{**known, **row} for row in measured_rows(path, result)]
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
             except Exception as error:  # one damaged file must not cost the others
@@ -141,10 +133,7 @@ in place of numbers; 2: bad input.
 @click.command(epilog=_EPILOG, short_help="Friction in recordings: steps, holds, slips, harmonics.")
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @output_options(plot=True)
-@field_option(
-    _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
-    "START:END",
-)  # fmt: skip
+@field_option(_QUESTION, "window", "START:END")
 @option(
     "--steps",
     "TIMES|FILE",
@@ -157,15 +146,11 @@ in place of numbers; 2: bad input.
     "Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @source_options
-@field_option(
-    _QUESTION, "frequency",
-    'Where to look for the modulation, like "120 Hz", which is fitted; determined if not given.',
-    "VALUE", "-f",
-)  # fmt: skip
-@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
-@field_option(_QUESTION, "harmonics", "How many.", "N")
-@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
-@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
+@field_option(_QUESTION, "frequency", "VALUE", "-f")
+@field_option(_QUESTION, "exact_frequency")
+@field_option(_QUESTION, "harmonics", "N")
+@field_option(_QUESTION, "whole_periods")
+@field_option(_QUESTION, "detrend", "")
 @switch("--amplitudes", "Read every modulated stretch, and print them as a table.")
 @switch(
     "--no-modulation",
@@ -236,7 +221,7 @@ def measure(
     fields |= {
         "modulated": False if no_modulation else None,
         "steps": None if steps is None else listed_times(steps, "--steps"),
-        "velocities": None if velocities is None else velocities.split(","),
+        "velocities": velocities,
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
     }
@@ -287,11 +272,13 @@ def _amplitudes(recording: Path, source: Source, question: Question, output: Out
         lambda: {"recording": str(recording), "amplitudes": rows},
         lambda: amplitude_sections(rows, recording.name),
     )
-    if output.plot is not None:
+
+    def draw() -> Figure:
         from asperity.figures.recording import draw_amplitudes
 
-        save_figure(lambda: draw_amplitudes(rows), output.plot, output.names)
-        say(f"the figure is {output.plot}")
+        return draw_amplitudes(rows)
+
+    output.draw(draw)
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 
@@ -301,8 +288,7 @@ def _one(
     from asperity._version import __version__
     from asperity.cli.progress import waiting
     from asperity.measurement.from_file import answer_measurement
-    from asperity.measurement.record import modulated_record, sliding_record
-    from asperity.measurement.report import measured_sections
+    from asperity.measurement.report import measured_record, measured_sections
     from asperity.measurement.stick_slip import catalogue
     from asperity.outputs import output_files
     from asperity.recording.readers.from_file import read_source
@@ -321,19 +307,16 @@ def _one(
         and result.chosen_by == "program"
         and f"1 of {modulated} modulated stretches is read; --amplitudes reads each",
     )
-    record_of: Any = modulated_record if hasattr(result, "reading") else sliding_record
-    if hasattr(result, "regimes"):
-        record_of = catalogue.stick_slip_record
     if events is not None:
         slips, advice = hasattr(result, "regimes"), "leave it out, or add --stick-slip"
         require(slips, "--events", "go with a stick-slip recording", "another", advice)
         catalogue.write_catalogue(result, events)
     about = {"recording": str(recording), "version": __version__, **trace.provenance}
     output.answer(
-        lambda: {**record_of(result), "provenance": about},
+        lambda: {**measured_record(result), "provenance": about},
         lambda: measured_sections(result, recording.name, output.names),
     )
-    output.draw(result)
+    output.draw(result.plot)
     bad = [check for check in result.checks if check.verdict == "bad"]
     say(*(f"{check.name} is bad: {check.sentence}" for check in bad))
     return int(bool(bad))
@@ -461,8 +444,7 @@ def _campaign(
             *([healing_section(campaign, output.names)] if campaign.series else []),
         ],
     )
-    if output.plot is not None:
-        output.draw(with_cycles(campaign))
+    output.draw(lambda: with_cycles(campaign).plot())
     unknown = []
     if thresholds is not None:
         ends = ends_of_stick_slip(done.table)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable
 from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -56,7 +57,7 @@ class Count(click.ParamType):
 
 
 class OnceOption(click.Option):
-    """An option with a value, which is given once: the last of several would win without a word."""
+    """An option with a value that is given once; click alone would take the last of several."""
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
         """Let the parser keep every value; a switch has none."""
@@ -76,7 +77,7 @@ class OnceOption(click.Option):
 
 
 class FieldOption(OnceOption):
-    """An option with the default and the choices of a field of a question, which its help shows.
+    """An option with the text, the default and the choices of a field of a question in its help.
 
     The record is imported for the help only; without the option the default of the record applies.
     """
@@ -88,7 +89,12 @@ class FieldOption(OnceOption):
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """Option and text, as click prints them."""
         module, _, name = self.record.partition(":")
-        about = getattr(importlib.import_module(module), name).model_fields[self.name]
+        record = getattr(importlib.import_module(module), name)
+        about = record.model_fields[self.name]
+        # The field and its type in a line, and the text below.
+        entry = re.compile(rf"^    {self.name} : .*\n((?:        .*\n)+)", re.MULTILINE)
+        entries = (entry.search(one.__doc__ or "") for one in record.__mro__)
+        self.help = next((" ".join(text[1].split()) for text in entries if text), "")
         if about.default is not None and not self.is_flag:
             self.default, self.show_default = about.default, True
         self.metavar = self.metavar or "|".join(map(str, get_args(about.annotation)))
@@ -110,8 +116,8 @@ def option(names: str, metavar: str | None, about: str, kind: Any = None, **more
     **more
         As in `click.option`.
     """
-    cls = click.Option if more.get("multiple") else OnceOption
-    return click.option(*names.split(), cls=cls, metavar=metavar, help=about, type=kind, **more)
+    more = {"cls": click.Option if more.get("multiple") else OnceOption, **more}
+    return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
 
 
 def switch(names: str, about: str) -> Decorator:
@@ -119,28 +125,25 @@ def switch(names: str, about: str) -> Decorator:
     return click.option(*names.split(), is_flag=True, help=about)
 
 
-def field_option(
-    record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
-) -> Decorator:
-    """The option of a field of a question.
+def field_option(record: str, field: str, metavar: str | None = None, short: str = "") -> Decorator:
+    """The option of a field of a question, with the text of the record's docstring.
 
     Parameters
     ----------
     record : str
         Its place, as ``module:Name``.
     field : str
-    help_text : str
     metavar : str, optional
         What is given: empty for the choices of the field, "N" for a whole number; None for a
         switch.
     short : str
         A second name of the option.
     """
-    names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
+    names = f"{short} --{field.replace('_', '-')} {field}"
     # With is_flag=False Click takes an option for one whose value may be left out.
-    look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
+    look: dict[str, Any] = {"is_flag": True} if metavar is None else {}
     kind = Count() if metavar == "N" else None
-    return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)
+    return option(names, metavar, "", kind, cls=FieldOption, record=record, **look)
 
 
 def material_option() -> Decorator:
@@ -156,13 +159,8 @@ def set_option(
     example: str, meaning: str = "A number with its unit, instead of the material's"
 ) -> Decorator:
     """``--set``, to be repeated."""
-    return click.option(
-        "--set",
-        "settings",
-        metavar="NAME=VALUE",
-        multiple=True,
-        help=f"{meaning}; repeatable. Example: {example}",
-    )
+    about = f"{meaning}; repeatable. Example: {example}"
+    return option("--set settings", "NAME=VALUE", about, multiple=True)
 
 
 def output_options(*, plot: bool = False) -> Decorator:
@@ -227,12 +225,11 @@ def law_option(
     ),
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
-    return click.option(
+    return option(
         "--law",
-        cls=OnceOption,
-        metavar="NAME",
+        "NAME",
+        help_text,
         callback=lambda context, option, text: None if text is None else known_place(text),
-        help=help_text,
     )
 
 
@@ -265,24 +262,17 @@ def known_place(text: str) -> str:
 
 def _option(parameter: Parameter) -> Decorator:
     """The option of a parameter, which the command gets under the name of its argument."""
+    names = " ".join((*parameter.options, parameter.argument))
     meaning = parameter.meaning[0].upper() + parameter.meaning[1:]
     if parameter.rule == "switch":
-        return click.option(
-            *parameter.options, parameter.argument, is_flag=True, help=f"{meaning}."
-        )
-    return click.option(
-        *parameter.options,
-        parameter.argument,
-        cls=OnceOption,
-        metavar="VALUE",
-        help=f'{meaning}, like "{parameter.example}".',
-    )
+        return switch(names, f"{meaning}.")
+    return option(names, "VALUE", f'{meaning}, like "{parameter.example}".')
 
 
 def pairs_of(
     texts: Iterable[str], option: str, like: str, form: str = "VALUE", *, at_last: bool = False
-) -> Iterator[tuple[str, str]]:
-    """Split ``NAME=VALUE`` texts of an option that may be repeated.
+) -> dict[str, str]:
+    """Values by name, from ``NAME=VALUE`` texts of an option that may be repeated.
 
     Parameters
     ----------
@@ -298,28 +288,24 @@ def pairs_of(
     Raises
     ------
     InputError
-        If one has no name or value.
+        If one has no name or value, or a name is given twice.
     """
+    pairs: dict[str, str] = {}
     for text in texts:
         split = text.rpartition("=") if at_last else text.partition("=")
         name, _, value = map(str.strip, split)
         advice = f"write it like {option} {like}"
         require(name and value, option, f"be NAME={form}", f"'{text}'", advice)
-        yield name, value
+        add_setting(pairs, name, value, option)
+    return pairs
 
 
-def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
-    """Parameters by their names, from ``NAME=VALUE`` texts.
-
-    Raises
-    ------
-    InputError
-        If one has no name or value, or a name is given twice.
-    """
-    result: dict[str, str] = {}
-    for name, value in pairs_of(pairs, option, '"K=0.2 N/um"'):
-        add_setting(result, parameter_name(name), value)
-    return result
+def settings_of(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
+    """Parameters by their one names, from texts as of `pairs_of`."""
+    settings: dict[str, str] = {}
+    for name, value in pairs_of(texts, option, '"K=0.2 N/um"').items():
+        add_setting(settings, parameter_name(name), value, option)
+    return settings
 
 
 def parameter_name(name: str) -> str:

@@ -90,26 +90,18 @@ def source_options(command: Command) -> Command:
         from asperity.questions.options import COLUMN_OPTIONS
         from asperity.questions.recording import Source
 
-        roles: dict[str, str] = {}
+        roles = pairs_of(columns, "--column", "velocity=speed", at_last=True)
         for role, chosen in COLUMN_OPTIONS.items():
-            add_setting(roles, role, others.pop(chosen.lstrip("-")))
-        for role, name in pairs_of(columns, "--column", "velocity=speed", at_last=True):
-            add_setting(roles, role, name, "--column")
-        unit_of: dict[str, str] = {}
-        for name, unit in pairs_of(units, "--unit", "Fn=N", at_last=True):
-            add_setting(unit_of, name, unit, "--unit")
-        made: dict[str, str] = {}
+            add_setting(roles, role, others.pop(chosen.lstrip("-")), "--column")
         like = '"force = 2.4 N/V * Gauge"'
-        for name, expression in pairs_of(channels, "--channel", like, "EXPRESSION"):
-            add_setting(made, name, expression, "--channel")
         source = Source(
             # Columns of files without headers are chosen by number, in the digits 0 to 9.
             columns={
                 role: int(name) if re.fullmatch(r"[0-9]{1,9}", name) else name
                 for role, name in roles.items()
             },
-            units=unit_of,
-            channels=made,
+            units=pairs_of(units, "--unit", "Fn=N", at_last=True),
+            channels=pairs_of(channels, "--channel", like, "EXPRESSION"),
             **{name: others.pop(name) for name in _FIELDS},
         )
         return command(source=source, **others)

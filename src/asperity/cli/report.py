@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from asperity.outputs.tables import Section
-    from asperity.parameters.parameter import Drawn
 
 #: Where click's context keeps the set of names that the user has chosen.
 CHOSEN_NAMES = "asperity.names"
@@ -84,11 +83,11 @@ class Output:
             )
             output_files({"--plot": self.plot}, inputs={f"the file {p}": p for p in inputs})
 
-    def draw(self, drawn: Drawn) -> None:
-        """Draw an answer where ``--plot`` was given."""
+    def draw(self, draw: Callable[[], Figure]) -> None:
+        """Draw a figure where ``--plot`` was given."""
         if self.plot is not None:
-            save_figure(lambda: drawn.plot(self.names), self.plot)
-            click.echo(f"asperity: the figure is {self.plot}", err=True)
+            save_figure(draw, self.plot, self.names)
+            say(f"the figure is {self.plot}")
 
 
 def say(*sentences: object) -> None:

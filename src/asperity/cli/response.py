@@ -120,7 +120,7 @@ def _point(point: Point, output: Output) -> int:
         lambda: _sections(point.law, numbers, "response", rows, output),
         point.law,
     )
-    output.draw(result)
+    output.draw(result.plot)
     if not result.stable:
         say(
             "the response is unstable: the slider leaves it for another motion, whose mean and "
@@ -191,7 +191,7 @@ def _stick_slip(point: Point, output: Output) -> int:
         law.name,
     )
     if result.slips:
-        output.draw(result)
+        output.draw(result.plot)
     return 0 if result.slips or result.steady else 1
 
 

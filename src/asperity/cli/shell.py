@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,10 +14,10 @@ import click
 
 from asperity.cli.progress import INTERRUPTED, MESSAGE, ending_at_once
 from asperity.cli.words import in_options
-from asperity.errors import InputError, closest, naming, printable
+from asperity.errors import InputError, naming, printable, require_known
 
 _BAD_INPUT = 2
-#: What a missing option could be, by its metavar.
+#: What a missing option could be, by its metavar, where its help has no example.
 _EXAMPLES = {
     "CSV": "table.csv",
     "NC": "motion.nc",
@@ -24,8 +25,8 @@ _EXAMPLES = {
     "DIR": "folder",
     "OUTPUT": "delta_mu",
     "AXIS": "V",
-    "VALUE": '"120 Hz"',
 }
+_EXAMPLE_IN_HELP = re.compile(r'like ("[^"]+")')
 #: What an argument could be, by its name.
 _ARGUMENTS = {
     "data": "recording.csv",
@@ -60,9 +61,7 @@ class Shell(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """Import a command; an unknown name is answered with the nearest one."""
-        if cmd_name not in self.modules:
-            rule = "be a known one"
-            raise InputError("command", rule, f"'{cmd_name}'", closest(cmd_name, self.modules))
+        require_known(cmd_name, self.modules, "command", "be a known one")
         command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
         return command
 
@@ -116,7 +115,8 @@ def _in_our_words(error: click.ClickException) -> InputError:
             like = f"{command} {_ARGUMENTS[name]}" if name in _ARGUMENTS else ""
             name = name.upper()
         else:
-            like = f"{name} {_EXAMPLES[metavar]}" if metavar in _EXAMPLES else ""
+            in_help = _EXAMPLE_IN_HELP.search(getattr(error.param, "help", None) or "")
+            like = f"{name} {in_help[1] if in_help else _EXAMPLES.get(metavar, metavar)}"
         advice = f"add it, like {like}" if like else "add it"
         return InputError(name, "be given", "nothing", advice)
     if isinstance(error, click.NoSuchOption):

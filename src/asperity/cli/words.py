@@ -35,57 +35,55 @@ _OPTIONS: Mapping[str, str] = {
 
 
 def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> str:
-    """The words of the command line: ``--load``, ``--column "velocity=speed"``.
+    """An argument as the command line writes it: ``--load``, ``--column "velocity=speed"``.
 
     Parameters
     ----------
     argument : Argument
     options : mapping of str to str, optional
-        Option of each field of a question, which other commands mean otherwise.
+        Options of the current command by field, where other commands have other options for it.
     """
-    from asperity.parameters import DRIVE, MACHINE
-    from asperity.questions.options import COLUMN_OPTIONS, MEASURE_OPTIONS, SOURCE_OPTIONS
+    from asperity.questions.options import (
+        COLUMN_OPTIONS,
+        MEASURE_OPTIONS,
+        SOURCE_OPTIONS,
+        number_option,
+        quoted,
+    )
 
+    options = options or {}
     # A part of a list has the option of the list.
     name, key, value = argument.whole, argument.key, argument.value
     if name in ("columns", "Trace.channel") and key:
         if key in COLUMN_OPTIONS:
-            return f"{COLUMN_OPTIONS[key]} {_quoted(value)}".rstrip()
+            return f"{COLUMN_OPTIONS[key]} {quoted(value)}".rstrip()
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
     if name == "numbers":
-        named = {**DRIVE, **MACHINE}.get(key)
-        if named and named.options and f"numbers.{key}" not in (options or {}):
-            value = "" if named.rule == "switch" else value
-            return f"{named.options[0]} {_quoted(value) if value else ''}".rstrip()
-        pair = _quoted(f"{key}={value}", also="=") if value else key
-        return f"{(options or {}).get(name, '--set')} {pair}".rstrip()
+        own = f"numbers.{key}" not in options
+        return number_option(key, value, options.get(name, "--set"), own=own).rstrip()
     if name == "channels" and value:
         return f'--channel "{key} = {value}"'
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
-    known = {**_OPTIONS, **SOURCE_OPTIONS, **(options or {})}
+    known = {**_OPTIONS, **SOURCE_OPTIONS, **options}
     known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
     known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
     option = known.get(name)
     if option is None:
         whole, _, part = name.partition(".")
         option = name
-        if whole in _PAIRS and whole in (options or {}):
+        if whole in _PAIRS and whole in options:
             option, key = known[whole], part
     if name in _PAIRS and key and value:
-        return f"{option} {_quoted(f'{key}={value}', also='=')}"
+        return f"{option} {quoted(f'{key}={value}', also='=')}"
     # A switch says yes or no by itself.
     value = "" if value in ("True", "False") else value
-    return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
-
-
-def _quoted(value: str, also: str = "") -> str:
-    return value if all(c.isalnum() or c in "_." + also for c in value) else f'"{value}"'
+    return " ".join([option, *([key] if key else []), *([quoted(value)] if value else [])])
 
 
 @contextmanager
 def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Name fields of a question, which other commands mean otherwise, by this command's options.
+    """Let sentences name the fields of a question by the options of the current command.
 
     Parameters
     ----------

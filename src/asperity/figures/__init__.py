@@ -5,8 +5,4 @@ Each name below is imported when first used: Matplotlib takes its time.
 
 from asperity._lazy import lazy_names
 
-__getattr__, __all__ = lazy_names(__name__, __file__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field
 
-from asperity.errors import InputError, closest
+from asperity.errors import require_known
 from asperity.figures.style import COLOURS, DASHES, STATED, STATED_FILL, new_figure
 
 if TYPE_CHECKING:
@@ -237,9 +237,7 @@ class _Drawing:
             return float(value)
         of_curve = panel.curve.replace("{}", value)
         name = of_curve if of_curve in self.numbers else value
-        if name not in self.numbers:
-            rule = "be computed"
-            raise InputError("a figure's numbers", rule, f"'{value}'", closest(value, self.numbers))
+        require_known(name, self.numbers, "a figure's numbers", "be computed")
         return float(self.numbers[name])
 
     def ends(self, values: Value | tuple[Value, ...], panel: Panel) -> list[float]:
@@ -254,11 +252,9 @@ class _Drawing:
 
     def curve(self, name: str, panel: Panel) -> pd.DataFrame:
         full = panel.curve.replace("{}", name)
-        rows = self.data[self.data["curve"] == full]
-        if rows.empty:
-            names = [str(one) for one in self.data["curve"].unique()]
-            raise InputError("a figure's curves", "be computed", f"'{full}'", closest(full, names))
-        return rows
+        names = [str(one) for one in self.data["curve"].unique()]
+        require_known(full, names, "a figure's curves", "be computed")
+        return self.data[self.data["curve"] == full]
 
     # --- Items -----------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import numpy as np
 from cmcrameri import cm
 from matplotlib.figure import Figure
 
-from asperity.errors import Argument, InputError, closest, require
+from asperity.errors import Argument, InputError, closest, require, require_known
 from asperity.figures.style import new_figure
 from asperity.parameters.arguments import number
 from asperity.study import open_store
@@ -46,13 +46,12 @@ def plot_slice(
     """
     result = open_store(store)
     outputs = [str(n) for n, v in result.data_vars.items() if x in v.dims or len(v.dims) > 0]
-    if show not in outputs:
-        raise InputError("show", "be an output", f"'{show}'", closest(show, outputs))
+    require_known(show, outputs, "show", "be an output")
     part = result[show]
     dims = [str(d) for d in part.dims]
     for name, side in (("x", x), ("y", y)):
-        if side is not None and side not in dims:
-            raise InputError(name, "be an axis of the store", f"'{side}'", closest(side, dims))
+        if side is not None:
+            require_known(side, dims, name, "be an axis of the store")
     require(x != y, "y", "be another axis than x", f"'{y}' for both", "leave it out for a curve")
     chosen = dict(at or {})
     others = [dim for dim in dims if dim not in (x, y)]

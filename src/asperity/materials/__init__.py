@@ -6,8 +6,4 @@ pydantic, importing this package does not.
 
 from asperity._lazy import lazy_names
 
-__getattr__, __all__ = lazy_names(__name__, __file__)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

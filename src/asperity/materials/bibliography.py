@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
-from asperity.errors import InputError, closest
+from asperity.errors import require_known
 from asperity.parameters.arguments import typed
 
 _ENTRY = re.compile(r"^@\w+\{(?P<key>[^,\s]+),.*?^\}", re.MULTILINE | re.DOTALL)
@@ -22,12 +22,8 @@ def citation(key: str) -> str:
     InputError
         If no source has that key; the message gives the nearest one.
     """
-    entries = _entries()
-    try:
-        return entries[key]
-    except KeyError:
-        rule = "be a known source"
-        raise InputError("citation", rule, f"'{key}'", closest(key, entries)) from None
+    require_known(key, _entries(), "citation", "be a known source")
+    return _entries()[key]
 
 
 @typed

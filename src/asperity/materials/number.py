@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, require_known
 from asperity.questions.record import Record
 from asperity.units import KINDS, to_si
 
@@ -49,9 +49,7 @@ class Number(Record):
     @field_validator("dimension")
     @classmethod
     def _dimension_is_known(cls, dimension: str) -> str:
-        if dimension not in KINDS:
-            rule = "be a kind of quantity"
-            raise InputError("", rule, f"'{dimension}'", closest(dimension, KINDS))
+        require_known(dimension, KINDS, "", "be a kind of quantity")
         return dimension
 
     @model_validator(mode="after")
@@ -90,9 +88,8 @@ class Number(Record):
     @property
     def si_range(self) -> tuple[float, float] | None:
         """The range in SI, None where the paper gives none."""
-        return (
-            None if self.range is None else (self._to_si(self.range[0]), self._to_si(self.range[1]))
-        )
+        low, high = self.range or (None, None)
+        return None if low is None or high is None else (self._to_si(low), self._to_si(high))
 
     @property
     def si_values(self) -> tuple[float, ...] | None:

@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import field_validator
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, closest, require, require_known
 from asperity.materials.number import Number
-from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
-from asperity.parameters.arguments import file_path, shown, typed
+from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters
+from asperity.parameters.arguments import file_path, typed
 from asperity.parameters.toml_file import parsed_toml, toml_content
 from asperity.questions.record import Question
-from asperity.units import to_si
 
 if TYPE_CHECKING:
     from asperity.laws import Law
@@ -56,16 +55,17 @@ class Material(Question):
             rule = "have names that are Python attributes and not in use"
             require(holds, "numbers", rule, f"'{name}'", "rename that number")
             if number.value is not None:
-                _check_rule(name, number.si, number.dimension, "numbers")
+                # A number that is no known parameter may have any value.
+                known = {**INTERFACE, **EXPERIMENT}.get(name)
+                if known is not None and known.kind == number.dimension:
+                    known.check(number.si, f"numbers.{name}")
         return numbers
 
     @typed
     def __getitem__(self, name: str) -> Number:
-        try:
-            return self.numbers[_plain(name)]
-        except KeyError:
-            rule = "have the number"
-            raise InputError(self.name, rule, shown(name), closest(name, self.numbers)) from None
+        plain = _plain(name)
+        require_known(plain, self.numbers, self.name, "have the number")
+        return self.numbers[plain]
 
     def __getattr__(self, name: str) -> float:
         # Python and pydantic probe for names with underscores.
@@ -115,45 +115,24 @@ class Material(Question):
         wanted = law_parameters(law)
         given = {_plain(parameter): value for parameter, value in overrides.items()}
         for parameter in given:
-            if parameter not in wanted:
-                rule = "be given its own parameters"
-                raise InputError(name, rule, f"'{parameter}'", closest(parameter, wanted))
-        values = {p: self._parameter(p, name, given) for p in wanted}
-        return law(**{_field(p, law): value for p, value in values.items()})
-
-    def _parameter(self, parameter: str, owner: str, given: Mapping[str, Any]) -> Any:
-        number = self.numbers.get(parameter)
-        if parameter not in given:
-            if number is None:
-                got = f"nothing and '{self.name}' has no such number"
-                advice = f"write {parameter}=... after the law's name"
-                raise InputError(f"{owner}.{parameter}", "be given", got, advice)
-            return number.si
-        if number is None:  # the declaration of the law's field checks unit and rule
-            return given[parameter]
-        value = to_si(given[parameter], number.dimension, f"{owner}.{parameter}")
-        _check_rule(parameter, value, number.dimension, owner)
-        return value
-
-
-def _check_rule(name: str, value: Any, dimension: str, owner: str) -> None:
-    """Refuse a value that breaks the rule of the parameter of that name and dimension.
-
-    A number that is no known parameter may have any value.
-    """
-    known = {**INTERFACE, **EXPERIMENT}.get(name)
-    if known is not None and known.kind == dimension:
-        obeying(value, f"{owner}.{name}", dimension, known.rule)
+            require_known(parameter, wanted, name, "be given its own parameters")
+        values = {}
+        for parameter, about in wanted.items():
+            label = f"{name}.{parameter}"
+            got = f"nothing and '{self.name}' has no such number"
+            advice = f"write {parameter}=... after the law's name"
+            require(parameter in {**self.numbers, **given}, label, "be given", got, advice)
+            values[about.path.rpartition(".")[2]] = (
+                about.check(given[parameter], label)
+                if parameter in given
+                else self.numbers[parameter].si
+            )
+        return law(**values)
 
 
 def _plain(name: str) -> str:
     """`lambda_` is how Python has to write `lambda`."""
     return name.removesuffix("_") if keyword.iskeyword(name.removesuffix("_")) else name
-
-
-def _field(parameter: str, law: type[Law]) -> str:
-    """The law's field of a parameter: with the underscore that a word of Python needs."""
-    return parameter if parameter in law.__dataclass_fields__ else f"{parameter}_"
 
 
 @cache
@@ -204,7 +183,5 @@ def load(name: str | PathLike[str]) -> Material:
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
         file, content = toml_content(text, "material")
         return Material.of_content({"name": file.stem, **content}, text)
-    if text not in packaged():
-        rule = "be a known material or the path of a .toml file"
-        raise InputError("material", rule, f"'{text}'", closest(text, packaged()))
+    require_known(text, packaged(), "material", "be a known material or the path of a .toml file")
     return Material.of_content({"name": text, **_packaged_content(text)}, text)

@@ -1,11 +1,15 @@
-"""Measurements as sections of a report, which terminal and page render."""
+"""Measurements of any kind as sections of a report, records for JSON, and rows of tables."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from asperity.measurement.campaign import Row, modulated_rows, sliding_rows
+from asperity.measurement.record import modulated_record, sliding_record
+from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
 from asperity.outputs.tables import Section, rounded
 from asperity.parameters import Names
 
@@ -20,6 +24,31 @@ if TYPE_CHECKING:
 
 #: A velocity (m/s) below this, a tenth of a nanometre a day, is rounding.
 _STILL = 1e-15
+
+
+def measured_record(measurement: Any) -> dict[str, Any]:
+    """A measurement of any kind for JSON."""
+    if hasattr(measurement, "reading"):
+        return modulated_record(measurement)
+    if hasattr(measurement, "regimes"):
+        return stick_slip_record(measurement)
+    return sliding_record(measurement)
+
+
+def measured_rows(path: Path, measurement: Any) -> list[Row]:
+    """Rows of a recording in a table.
+
+    Parameters
+    ----------
+    path : Path
+    measurement : SlidingMeasurement, StickSlipMeasurement, or list of Measurement or InputError
+        A list holds the modulated stretches.
+    """
+    if isinstance(measurement, list):
+        return modulated_rows(path, measurement)
+    if hasattr(measurement, "regimes"):
+        return [stick_slip_row(path, measurement)]
+    return sliding_rows(path, measurement)
 
 
 def measured_sections(measurement: Any, name: str, names: Names = "friction") -> list[Section]:

@@ -20,32 +20,10 @@ from numpy.typing import ArrayLike
 
 from asperity.errors import InputError, InputTypeError, closest
 from asperity.parameters.parameter import obeying
+from asperity.units.kinds import shown as shown, with_article
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-
-def shown(value: Any) -> str:
-    """A value of any kind in a few words for a message."""
-    if value is None or isinstance(value, bool | int | float | np.generic):
-        if isinstance(value, int) and abs(value) > 10**30:
-            return "a huge integer"
-        return repr(value.item() if isinstance(value, np.generic) else value)
-    if isinstance(value, str):
-        return f"'{value}'" if len(value) < 60 else f"a text of {len(value)} characters"
-    if isinstance(value, type):
-        return f"the class {value.__name__}"
-    if isinstance(getattr(value, "shape", None), tuple):
-        return f"an array of shape {value.shape}"
-    if isinstance(value, list | tuple):
-        return f"a {type(value).__name__} of {len(value)}"
-    if callable(value):
-        return f"the function {getattr(value, '__name__', type(value).__name__)}"
-    return _with_article(type(value).__name__)
-
-
-def _with_article(name: str) -> str:
-    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
 def rising(span: tuple[float, float], label: str, advice: str = "write it like 10:60") -> None:
@@ -112,7 +90,7 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
-    """What the annotations of a function's arguments stand for, by name."""
+    """Types of a function's arguments by name, from its annotations."""
     kinds = {}
     for name, one in inspect.signature(function).parameters.items():
         if one.annotation is not one.empty:
@@ -124,7 +102,7 @@ def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def of_type(value: Any, kind: Any, name: str) -> Any:
-    """A value as an annotation has it.
+    """A value converted to the type of an annotation, with numbers of NumPy as those of Python.
 
     Raises
     ------
@@ -132,7 +110,7 @@ def of_type(value: Any, kind: Any, name: str) -> Any:
         As `typed`.
     """
     try:
-        return _taken(value, kind, name)
+        return _converted(value, kind, name)
     except _OtherTypeError:
         raise InputTypeError(name, f"be {_words(kind)}", shown(value)) from None
 
@@ -147,7 +125,7 @@ def _origin_and_parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
     return get_origin(kind) or kind, get_args(kind)
 
 
-def _taken(value: Any, kind: Any, name: str) -> Any:
+def _converted(value: Any, kind: Any, name: str) -> Any:
     origin, parts = _origin_and_parts(kind)
     # Of ArrayLike, alone or among others: who converts it to SI knows what may stand.
     if kind is Any or kind is ArrayLike or complex in parts:
@@ -155,11 +133,11 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
     if origin in (Union, UnionType):
         for part in parts:
             try:
-                return _taken(value, part, name)
+                return _converted(value, part, name)
             except _OtherTypeError:
                 continue
     elif origin is Annotated:
-        return parts[1](_taken(value, parts[0], name), name)
+        return parts[1](_converted(value, parts[0], name), name)
     elif origin is Literal:
         if isinstance(value, type(parts[0])):
             return one_of(value, parts, name)
@@ -193,7 +171,7 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
 
 
 def _is_one_number(value: Any) -> bool:
-    """Whether it is an array of one number, which may stand for the number."""
+    """Whether a value is an array of one number, which is accepted as that number."""
     shape, kind = getattr(value, "shape", None), getattr(getattr(value, "dtype", None), "kind", "")
     return shape in ((), (1,)) and kind in "iuf"
 
@@ -222,7 +200,7 @@ def _words(kind: Any) -> str:
         return " or ".join(dict.fromkeys(map(_words, parts)))
     if origin is Annotated:
         return _words(parts[0])
-    return _WORDS.get(origin) or _with_article(origin.__name__)
+    return _WORDS.get(origin) or with_article(origin.__name__)
 
 
 def at_least(least: int) -> Callable[[int, str], int]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, require_known
 from asperity.units import KINDS, format_si, to_radians, to_si
 from asperity.units.convert import is_traced
 
@@ -92,8 +92,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     InputError
         Naming the value, the rule, the first offending element and its unit.
     """
-    if rule not in RULES:
-        raise InputError("rule", "be a known rule", f"'{rule}'", closest(rule, RULES))
+    require_known(rule, RULES, "rule", "be a known rule")
     if is_traced(value):
         return value
     array = np.asarray(to_si(value, kind, label), dtype=float)
@@ -349,22 +348,19 @@ def labelled(figure: Figure, names: Names) -> Figure:
 
 
 def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:
-    """A parameter with its value in a unit that reads well; of an array the range and the shape."""
-    return SummaryLine(
-        parameter.name, value_text(value, parameter.kind), plain_text(parameter.meaning)
-    )
-
-
-def value_text(value: Any, kind: str) -> str:
-    """A value of a kind of quantity in a few words.
+    """A parameter with its value in a unit that reads well; of an array the range and the shape.
 
     Parameters
     ----------
+    parameter : Parameter
     value : float or array
         In SI, or traced by JAX.
-    kind : str
-        A key of `asperity.units.KINDS`.
     """
+    text = _value_text(value, parameter.kind)
+    return SummaryLine(parameter.name, text, plain_text(parameter.meaning))
+
+
+def _value_text(value: Any, kind: str) -> str:
     if is_traced(value) or (not hasattr(value, "__array__") and not np.isscalar(value)):
         return "traced"
     array = np.asarray(value)

@@ -15,13 +15,14 @@ from asperity.questions.record import (
     Names,
     Question,
     Record,
-    Seconds,
     Span,
+    Times,
     Whole,
+    parts_of,
     quantity,
     shown,
 )
-from asperity.questions.recording import Pulling, Source
+from asperity.questions.recording import Source, Velocities
 
 
 class Data(Record):
@@ -46,8 +47,8 @@ class Data(Record):
     name: str = ""
     source: Source = Field(default_factory=Source)
     window: Span | None = None
-    steps: tuple[Seconds, ...] | None = None
-    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
+    steps: Times | None = None
+    velocities: Velocities | None = None
 
 
 class NormalPrior(Record):
@@ -104,10 +105,10 @@ class Estimation(Record):
     Attributes
     ----------
     free : tuple of str, optional
-        Free parameters, also as a text with commas; by default all that the data may determine.
+        Free parameters, also as a text like "A,B,D0"; by default all that the data may determine.
     prior : dict of str to NormalPrior
     profile : bool
-        Whether intervals are by profile likelihood.
+        Intervals by profile likelihood.
     starts, seed : int
         Number of random starts in addition to the first one, and their seed.
     """
@@ -127,22 +128,27 @@ class FitOptions(Estimation):
     fixed, start : dict of str to float or str
         Numbers in SI, or texts with units.
     material : str, optional
-        A material whose numbers apply where no other field has a number.
-    inertia, radiation_damping : bool
-        Whether the mass M and the damping eta count.
+        Material whose numbers apply where no other number is given.
+    inertia : bool
+        Include the inertia of the slider.
+    radiation_damping : bool
+        Include the radiation damping eta.
     trend : {"none", "linear", "quadratic"}
         Trend of the friction of a recording over slip.
     drift : bool
-        Whether its friction may drift over time too.
+        Add a linear drift of the friction over time.
     initial : {"steady", "free"}
         State at the beginning of a recording.
     gauge : float or str, optional
-        Corner frequency (Hz) of the low-pass of the force gauge, and its order.
+        Corner frequency of the low-pass of the force gauge, like "50 Hz".
     gauge_order : int
+        Order of the low-pass of the force gauge.
     fit_rate : float or str, optional
-        Means a second (Hz) that stand for the samples of a recording, or "full".
+        Means a second that stand for the samples of a recording, like "100 Hz", or "full"; by
+        default as many as it needs where it has more than 20,000 samples.
     stiffness_from : (float, float), optional
-        Stretch (s) of unloading and reloading of the one recording, whose slope is the prior of K.
+        Seconds of unloading and reloading of the one recording, outside the window, whose slope is
+        the prior of K.
     """
 
     fixed: dict[str, Given] = Field(default_factory=dict)
@@ -189,9 +195,7 @@ class _OfData(Question, FitOptions):
 
 
 def _auto_or_listed(value: Any, spans: Callable[[Any], Any]) -> Any:
-    if value == "auto":
-        return value
-    return spans(value.split(",") if isinstance(value, str) else value)
+    return value if value == "auto" else spans(parts_of(value))
 
 
 class Fit(_OfData):
@@ -202,7 +206,7 @@ class Fit(_OfData):
     law : str, optional
         Registered, or a place such as ``file.py:Name``; by default that of the kind of data.
     windows : "auto" or tuple of (float, float), optional
-        Several windows of the one recording; their spread is reported.
+        Several windows of the one recording, like 100:400,120:380; their spread is reported.
     """
 
     law: str | None = None

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from asperity.parameters import DRIVE, MACHINE
 from asperity.questions.fit import Fit
 from asperity.questions.record import Record
 from asperity.questions.recording import OF_MODULATION, Measurement, Source
@@ -103,6 +104,31 @@ def _text(value: Any, unit: str) -> str:
     if len(value) == len(numbers) == 2 and not unit:
         return ":".join("" if math.isinf(end) else f"{end:.15g}" for end in value)
     return ",".join(_text(float(v) if v in numbers else v, unit) for v in value)
+
+
+def number_option(name: str, value: str = "", pairs: str = "--set", *, own: bool = True) -> str:
+    """The option of a number of a point: ``-V "1 um/s"``, ``--inertia``, ``--set "K=0.3 N/um"``.
+
+    Parameters
+    ----------
+    name : str
+    value : str
+        With its unit; empty for the option alone.
+    pairs : str
+        Option that takes NAME=VALUE.
+    own : bool
+        Whether the command has the options of `Parameter.options`.
+    """
+    parameter = {**DRIVE, **MACHINE}.get(name)
+    if own and parameter is not None and parameter.options:
+        value = "" if parameter.rule == "switch" else value
+        return f"{parameter.options[0]} {quoted(value) if value else ''}".rstrip()
+    return f"{pairs} {quoted(f'{name}={value}', also='=') if value else name}"
+
+
+def quoted(value: str, also: str = "") -> str:
+    """A value as a person writes it in a shell: quoted unless it is a word or a plain number."""
+    return value if all(c.isalnum() or c in "_." + also for c in value) else f'"{value}"'
 
 
 def source_options(source: Source) -> list[str]:

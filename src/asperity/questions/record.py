@@ -7,6 +7,7 @@ record. A quantity is a number in SI or a text with its unit; in a file it must 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -196,14 +197,15 @@ def _plain_integer(value: Any) -> Any:
 Whole = Annotated[StrictInt, BeforeValidator(_plain_integer)]
 
 
-def _one_or_several(value: Any) -> Any:
+def parts_of(value: Any) -> Any:
+    """The parts of a text with commas or semicolons between them; anything else unchanged."""
     if isinstance(value, str):
-        return tuple(part.strip() for part in value.split(",") if part.strip())
+        return tuple(part.strip() for part in re.split("[,;]", value) if part.strip())
     return value
 
 
 #: Names; a text has commas between them.
-Names = Annotated[tuple[str, ...], BeforeValidator(_one_or_several)]
+Names = Annotated[tuple[str, ...], BeforeValidator(parts_of)]
 
 
 def _seconds(value: Any) -> float:
@@ -227,6 +229,8 @@ def _span(value: Any) -> tuple[float, float]:
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]
+#: Times (s); a text has commas between them.
+Times = Annotated[tuple[Seconds, ...], BeforeValidator(parts_of)]
 #: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
 Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
 
 from asperity.errors import Argument, require
-from asperity.questions.record import Question, Seconds, Span, Whole, quantity, shown
+from asperity.questions.record import Question, Span, Times, Whole, parts_of, quantity, shown
 
 Column = str | int
 
@@ -23,6 +23,8 @@ def _hold(value: Any) -> Any:
 
 #: Velocity of the drive between two steps (m/s), 0 in a hold.
 Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]  # type: ignore[valid-type]
+#: Velocities between steps, one more than these; a text has commas between them.
+Velocities = Annotated[tuple[Pulling, ...], BeforeValidator(parts_of)]  # type: ignore[valid-type]
 
 
 class ReadingRecipe(Question):
@@ -114,15 +116,18 @@ class Measurement(Question):
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
-        Frequency (Hz) near which the modulation is searched; by default the whole spectrum.
+        Frequency near which the modulation is searched, like "120 Hz", and which is fitted; by
+        default the whole spectrum is searched.
     exact_frequency : bool
-        Whether the frequency is taken as it is, not fitted.
+        Take the frequency as it is, not fitted.
     harmonics : int
+        Number of harmonics that are fitted.
     window : (float, float), optional
-        First and last time (s); chosen by default.
+        Seconds to read, like 10:60; by default chosen by the program.
     whole_periods : bool
-        Whether the window is cut to whole periods.
+        Cut the window to whole periods.
     detrend : {"none", "linear", "quadratic"}
+        Drift that is fitted together with the harmonics.
     steps : tuple of float, optional
         Times (s) of the velocity steps of a recording without modulation.
     velocities : tuple of float, optional
@@ -147,8 +152,8 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: StrictBool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
-    velocities: tuple[Pulling, ...] | None = None  # type: ignore[valid-type]
+    steps: Annotated[Times, AfterValidator(_in_order)] | None = None
+    velocities: Velocities | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
     stick_slip: StrictBool | None = None
     stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]

@@ -10,7 +10,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from asperity.errors import InputError, InputTypeError
+from asperity.errors import InputError, InputTypeError, printable
 from asperity.units.kinds import KINDS, Kind, kind_of, require_text, shown
 from asperity.units.scale import EXACT, normalised, unit_factor
 
@@ -18,7 +18,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])
 #: Larger powers of ten overflow a double in any unit.
 _LARGEST_POWER = 5000
 #: Largest length of a user's text in a message.
-_SHOWN = 60
+_SHOWN = 63
 
 #: Radians in each unit; a text without one is in radians.
 _RADIANS = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "degrees": math.pi / 180}
@@ -205,15 +205,15 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     match = _NUMBER.fullmatch(text)
     if match is None:
         rule = f"be a finite number{' with a unit' if spec.si else ''}"
-        raise InputError(name, rule, f"'{shortened(text)}'", f"write it like '{spec.example}'")
+        raise InputError(name, rule, _quoted(text), f"write it like '{spec.example}'")
     if re.match(r",\d", match[3]):
         advice = f"write it like '{spec.example}', without commas"
-        raise InputError(name, "have a decimal point", f"'{shortened(text)}'", advice)
+        raise InputError(name, "have a decimal point", _quoted(text), advice)
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
         rule = "carry a unit"
-        raise InputError(name, rule, f"'{shortened(text)}'", f"write it like '{spec.example}'")
-    factor = unit_factor(unit, kind, name, shortened(text))
+        raise InputError(name, rule, _quoted(text), f"write it like '{spec.example}'")
+    factor = unit_factor(unit, kind, name, printable(text, _SHOWN))
     power = _power_of_ten(match[2] or "0")
     # `Decimal` has a largest exponent; beyond it only zero is a number.
     if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
@@ -235,14 +235,13 @@ def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
     return InputError(
         name,
         "lie within the range of double precision",
-        f"'{shortened(text)}'",
+        _quoted(text),
         f"write it like '{spec.example}'",
     )
 
 
-def shortened(text: str) -> str:
-    """A user's text, shortened for a message."""
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+def _quoted(text: str) -> str:
+    return f"'{printable(text, _SHOWN)}'"
 
 
 def to_radians(value: Any, name: str) -> Any:
@@ -269,5 +268,5 @@ def to_radians(value: Any, name: str) -> Any:
         angle = math.nan
     if not math.isfinite(angle):
         rule = "be an angle in rad or deg"
-        raise InputError(name, rule, f"'{shortened(value)}'", "write it like '5 deg'")
+        raise InputError(name, rule, _quoted(value), "write it like '5 deg'")
     return angle

@@ -18,16 +18,6 @@ from asperity.units.kinds import KINDS
 #: More digits than any double needs, so that only the final rounding to a double is inexact.
 EXACT = Context(prec=60)
 
-#: Spellings that are known without pint, by kind, in addition to the display units.
-_ALSO_KNOWN = {
-    "dimensionless": {"%": -2, "percent": -2},
-    "angular_frequency": {"1/s": 0, "s^-1": 0},
-    "length": {"cm": -2},
-    "pressure": {"mbar": 2, "bar": 5},
-    "stress_per_length": {"GPa/m": 9, "MPa/um": 12},
-    "per_length": {"1/m": 0, "1/mm": 3},
-}
-
 #: Characters of a unit; texts with other characters are not given to pint's expression parser.
 _UNIT = re.compile(r"[A-Za-zΩµμ%°][A-Za-z0-9Ωµμ%°²³⁻¹·_ */^.()+-]*|1 ?/[A-Za-z0-9_ */^.()+-]+")
 _LONGEST_UNIT = 60
@@ -50,7 +40,7 @@ def normalised(unit: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _known(kind: str) -> Mapping[str, Decimal]:
-    powers = dict(KINDS[kind].ladder) | _ALSO_KNOWN.get(kind, {})
+    powers = {**dict(KINDS[kind].ladder), **KINDS[kind].also}
     return {unit: Decimal(1).scaleb(power) for unit, power in powers.items()}
 
 

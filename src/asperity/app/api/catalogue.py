@@ -13,7 +13,8 @@ from latex2mathml.converter import convert
 
 from asperity import materials
 from asperity._version import __version__
-from asperity.errors import closest, require
+from asperity.app.words import LABELS
+from asperity.errors import require_known
 from asperity.laws import registered
 from asperity.materials import Material
 from asperity.materials.record import packaged
@@ -56,6 +57,7 @@ def as_json() -> str:
         {
             "version": __version__,
             "docs": DOCS.is_dir(),
+            "labels": LABELS,
             "kinds": {
                 name: {"si": kind.si, "ladder": kind.ladder, "example": kind.example}
                 for name, kind in KINDS.items()
@@ -78,8 +80,7 @@ def as_json() -> str:
 @cache
 def package_material(name: str, field: str = "material") -> Material:
     """A material that comes with the package: no other file is read for a request."""
-    rule, advice = "be a known material", closest(name, packaged())
-    require(name in packaged(), field, rule, f"'{name}'", advice)
+    require_known(name, packaged(), field, "be a known material")
     return materials.load(name)
 
 

@@ -15,13 +15,13 @@ from asperity.app.api import fits
 from asperity.app.api.recordings import LIMITS, Source
 from asperity.app.endpoints import Answer, Job, Question, Upload
 from asperity.app.uploads import LARGEST, Uploads
+from asperity.app.words import ROLES
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require
 from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
 from asperity.parameters import NAMES, Names, known_name, law_parameters
 from asperity.questions.recording import Measurement
-from asperity.recording.roles import ROLES
 from asperity.slider.named import slider_from
 from asperity.transients import transient
 
@@ -110,10 +110,10 @@ class Nothing(Question):
 
 
 def overview(question: Nothing) -> dict[str, Any]:
-    """Roles of channels, example protocols, and the largest size of a file."""
+    """Words for the roles of channels, example protocols, and the largest size of a file."""
     folder = Path(__file__).parents[1] / "protocols"
     return {
-        "roles": {role: sorted(spec.kinds) for role, spec in ROLES.items()},
+        "roles": ROLES,
         "largest": LARGEST,
         "protocols": {
             path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.toml"))

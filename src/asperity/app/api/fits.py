@@ -29,7 +29,8 @@ from asperity.outputs.tables import Section
 from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
-from asperity.questions.record import Seconds, Span, Whole
+from asperity.questions.record import Span, Times, Whole
+from asperity.questions.recording import Velocities
 from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 
@@ -62,8 +63,8 @@ class Run(Question):
     recording: str
     source: Source = Field(default_factory=Source)
     window: Span | None = None
-    steps: tuple[Seconds, ...] | None = None
-    velocities: tuple[Any, ...] | None = None
+    steps: Times | None = None
+    velocities: Velocities | None = None
 
 
 Cell = str | float | int | None
@@ -194,8 +195,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
         if question.report:
             report(stage="report")
             record["report"] = _report(whole, posterior, question.names)
-    command = _fit_command(question, [file["name"] for file in files])
-    return {**record, "runs": pictures, "command": command}
+    return {**record, "runs": pictures, **_texts(question, [file["name"] for file in files])}
 
 
 def _data(
@@ -212,7 +212,8 @@ def _data(
         data.append({"file": path, "name": table.name})
     if question.rows:
         path = folder / "sent-rows.csv"
-        write_csv(path, [_row(row) for row in question.rows])
+        rows = [{n: math.nan if v is None else v for n, v in row.items()} for row in question.rows]
+        write_csv(path, rows)
         data.append({"file": path, "name": "the measured rows"})
     for run, file in zip(question.runs, files, strict=True):
         fields = run.model_dump(exclude={"recording"}, exclude_none=True)
@@ -282,10 +283,6 @@ def _report(result: Any, posterior: Any, names: Names) -> str:
     return base64.b64encode(packed.getvalue()).decode()
 
 
-def _row(row: Mapping[str, Cell]) -> dict[str, Any]:
-    return {name: math.nan if value is None else value for name, value in row.items()}
-
-
 def _residuals(result: Any) -> dict[str, list[Any]]:
     """Whitened residuals of the readings, with the observable of each."""
     from asperity.inference.tables.term import LockInTerm
@@ -336,9 +333,50 @@ def _around(time: Float, fitted: Float, begin: float, end: float) -> slice:
     return slice(*np.searchsorted(time, (begin - length / 3, min(begin + length, end))))
 
 
-def _fit_command(question: Fitted, recordings: list[str]) -> str:
-    """The same fit as a command; ``campaign.csv`` stands for rows measured on the page."""
-    files = [t.name for t in question.tables] + ["campaign.csv"] * bool(question.rows) + recordings
+#: Stands for the rows that were measured on the page.
+_ROWS = "campaign.csv"
+
+
+def _texts(question: Fitted, recordings: list[str]) -> dict[str, str]:
+    """The same fit as Python and as a command."""
+    chosen = question.model_dump(include={*FitOptions.model_fields}, exclude_defaults=True)
+    tables = [table.name for table in question.tables] + [_ROWS] * bool(question.rows)
+    return {
+        "python": _python(question, chosen, tables, recordings),
+        "command": _command(question, chosen, tables + recordings),
+    }
+
+
+def _python(
+    question: Fitted, chosen: Mapping[str, Any], tables: list[str], recordings: list[str]
+) -> str:
+    one = len(question.laws) == 1
+    kind, answer = ("Fit", "answer_fit") if one else ("Comparison", "answer_comparison")
+    data: list[dict[str, Any]] = [{"file": name} for name in tables]
+    for name, run in zip(recordings, question.runs, strict=True):
+        data.append({"file": name, **run.model_dump(exclude={"recording"}, exclude_defaults=True)})
+    laws = {"law": question.laws[0]} if one else {"laws": question.laws}
+    fields = {**laws, "data": data, **chosen}
+    lines = [
+        "from math import inf",
+        "",
+        "from asperity.inference import sample_posterior",
+        f"from asperity.inference.answers import {answer}",
+        f"from asperity.questions.fit import {kind}",
+        "",
+        f"question = {kind}(",
+        *(f"    {name}={value!r}," for name, value in fields.items()),
+        ")",
+        f"result = {answer}(question)",
+        "print(result)",
+    ]
+    if question.posterior:
+        sizes = f"chains={question.chains}, draws={question.draws}, seed={question.seed}"
+        lines.append(f"print(sample_posterior(result, {sizes}))")
+    return "\n".join(lines) + "\n"
+
+
+def _command(question: Fitted, chosen: Mapping[str, Any], files: list[str]) -> str:
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
     parts += [f"--law {law}" for law in question.laws]
@@ -348,7 +386,6 @@ def _fit_command(question: Fitted, recordings: list[str]) -> str:
         run = question.runs[0]
         parts += source_options(run.source)
         of_run = {name: getattr(run, name) for name in ("window", "steps", "velocities")}
-    chosen = question.model_dump(include={*FitOptions.model_fields}, exclude_defaults=True)
     parts += as_options({**chosen, **of_run}, FIT_OPTIONS)
     if question.posterior:
         parts.append("--posterior")

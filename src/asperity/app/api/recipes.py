@@ -10,6 +10,7 @@ from asperity.laws import get_law
 from asperity.materials import Material
 from asperity.operating_point import lacking
 from asperity.parameters import law_parameters, point_parameters
+from asperity.questions.options import number_option
 from asperity.study.map import Axis
 from asperity.units import format_si, to_si
 
@@ -133,17 +134,9 @@ def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> lis
     material = point.chosen_material()
     known = point_parameters(get_law(point.law))
     parts = [f"--law {point.law} --material {material.name}"]
-    for name, option in (("V", "-V"), ("epsilon", "-e"), ("frequency", "-f")):
-        if name in values:
-            parts.append(f'{option} "{exact_text(values[name], known[name].kind)}"')
-    if values.get("inertia"):
-        parts.append("--inertia")
-    if values.get("eta"):
-        parts.append(f'--radiation-damping "{exact_text(values["eta"], "damping")}"')
-    for name in (n for n in values if n not in {"V", "epsilon", "frequency", "inertia", "eta"}):
+    for name, value in values.items():
         published = _published(material, name)
-        if lacking(name, values):
-            continue
-        if values[name] != (known[name].default if published is None else published):
-            parts.append(f'--set "{name}={exact_text(values[name], known[name].kind)}"')
+        default = known[name].default if published is None else published
+        if value != default and not lacking(name, values):
+            parts.append(number_option(name, exact_text(value, known[name].kind)))
     return parts

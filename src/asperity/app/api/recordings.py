@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import field_validator
@@ -27,12 +27,6 @@ from asperity.questions.options import measure_options, source_options
 from asperity.recording.extremes import thinned
 from asperity.recording.readers.from_file import read_source
 from asperity.recording.roles import ROLES, candidates
-
-if TYPE_CHECKING:
-    from asperity.measurement.measure import Measurement
-    from asperity.measurement.sliding.measure import SlidingMeasurement
-    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
-
 
 #: Address space (bytes) and processor time (s) of a process that reads a recording.
 LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
@@ -67,7 +61,7 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
             return {"table": table}
         report(stage="reading")
         trace = read_source(path, Source(**argument["source"]))
-        report(recording=_described(trace, name, argument["source"]))
+        report(recording=_described(trace, name))
         return _measured(trace, argument, report)
 
 
@@ -82,7 +76,7 @@ def named(path: Path, name: str) -> Iterator[None]:
             raise InputError(printable(text, 900)) from None
 
 
-def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, Any]:
+def _described(trace: Any, name: str) -> dict[str, Any]:
     """Channels and units as understood, findings of the reader, and curves of the channels."""
     kinds = {n: c.kind for n, c in trace.channels.items()}
     roles = {role: trace.roles.get(role) for role in ROLES if role != "time"}
@@ -116,7 +110,6 @@ def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, An
         "candidates": fitting,
         "findings": [asdict(f) for f in trace.findings[:_MOST_LISTED]],
         "provenance": {**provenance, "file": name},
-        "python": _read_python(name, source),
     }  # fmt: skip
 
 
@@ -124,7 +117,13 @@ def _measured(
     trace: Any, argument: Mapping[str, Any], report: Callable[..., None]
 ) -> dict[str, Any]:
     from asperity.measurement.from_file import answer_measurement
-    from asperity.measurement.report import amplitude_sections, measured_sections
+    from asperity.measurement.measure import measure_amplitudes
+    from asperity.measurement.report import (
+        amplitude_sections,
+        measured_record,
+        measured_rows,
+        measured_sections,
+    )
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
     names: Names = argument.get("names", NAMES[0])
@@ -139,75 +138,53 @@ def _measured(
     measurement: Any
     measurement, note = answer_measurement(trace, question, plain=True)
     modulated = hasattr(measurement, "reading")
-    measured: dict[str, Any]
+    stick_slip = isinstance(measurement, StickSlipMeasurement)
+    parts: Any = measurement
     if modulated:
-        measured = _modulated(trace, measurement, question, name)
+        several = question.window is None and sum(p.modulated for p in measurement.stretches) > 1
+        parts = measure_amplitudes(trace, question) if several else [measurement]
+    measured: dict[str, Any] = {
+        "record": measured_record(measurement),
+        "rows": measured_rows(Path(name), parts),
+        "curves": _curves(measurement),
+        "sections": described(measured_sections(measurement, name, names)),
+        "note": note,
+    }
+    if modulated:
         measured["amplitudes"] = described(amplitude_sections(measured["rows"], name))
-    elif isinstance(measurement, StickSlipMeasurement):
-        measured = _stick_slip_record(measurement, name)
+    if stick_slip:
         question = question.model_copy(update={"stick_slip": True, "modulated": None})
-    else:
-        measured = {**_sliding_record(measurement, name), "note": note}
-    measured["sections"] = described(measured_sections(measurement, name, names))
     source = Source(**argument["source"])
     command = ["asperity measure", shlex.quote(name), *source_options(source)]
-    command += measure_options(question, modulated=modulated or bool(question.stick_slip))
+    command += measure_options(question, modulated=modulated or stick_slip)
     return {
         "measured": measured,
-        "python": _python(name, source, question, modulated=modulated or bool(question.stick_slip)),
+        "python": _python(name, source, question, modulated=modulated or stick_slip),
         "command": " ".join(command),
     }
 
 
-def _modulated(
-    trace: Any, measurement: Measurement, question: questions.Measurement, name: str
-) -> dict[str, Any]:
-    from asperity.measurement.campaign import modulated_rows
-    from asperity.measurement.measure import measure_amplitudes
-    from asperity.measurement.record import mean_cycle, modulated_record, residual_spectrum
+def _curves(measurement: Any) -> dict[str, Any]:
+    """What the page draws of a measurement of any kind."""
+    from asperity.measurement.record import mean_cycle, middle_events, residual_spectrum
 
-    several = question.window is None and sum(p.modulated for p in measurement.stretches) > 1
-    parts = measure_amplitudes(trace, question) if several else [measurement]
-    samples, reading = measurement.samples, measurement.reading
-    cycle = mean_cycle(measurement)
-    frequencies, amplitudes = residual_spectrum(measurement)
-    return {
-        "record": modulated_record(measurement),
-        "rows": modulated_rows(Path(name), parts),
-        "curves": {
-            "load": thinned(samples.time, samples.load / reading.W0, _BLOCKS),
-            "force": thinned(samples.time, samples.force / reading.W0, _BLOCKS),
-            "cycle": cycle._asdict(),
-            "spectrum": thinned(frequencies, amplitudes, _BLOCKS),
-        },
-    }
-
-
-def _sliding_record(measurement: SlidingMeasurement, name: str) -> dict[str, Any]:
-    from asperity.measurement.campaign import sliding_rows
-    from asperity.measurement.record import sliding_record
-
-    return {
-        "record": sliding_record(measurement),
-        "rows": sliding_rows(Path(name), measurement),
-        "curves": {"friction": thinned(measurement.time, measurement.values, _BLOCKS)},
-    }
-
-
-def _stick_slip_record(measurement: StickSlipMeasurement, name: str) -> dict[str, Any]:
-    from asperity.measurement.record import middle_events
-    from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
-
-    time, friction, events = measurement.time, measurement.friction, measurement.events
+    if hasattr(measurement, "reading"):
+        samples, W0 = measurement.samples, measurement.reading.W0
+        return {
+            "load": thinned(samples.time, samples.load / W0, _BLOCKS),
+            "force": thinned(samples.time, samples.force / W0, _BLOCKS),
+            "cycle": mean_cycle(measurement)._asdict(),
+            "spectrum": thinned(*residual_spectrum(measurement), _BLOCKS),
+        }
+    time = measurement.time
+    if not hasattr(measurement, "regimes"):
+        return {"friction": thinned(time, measurement.values, _BLOCKS)}
+    friction = measurement.friction
     curves = {"friction": thinned(time, friction, _BLOCKS)}
-    if len(events):
+    if len(measurement.events):
         _, near = middle_events(measurement)
         curves["close"] = thinned(time[near], friction[near], _BLOCKS)
-    return {
-        "record": stick_slip_record(measurement),
-        "rows": [stick_slip_row(Path(name), measurement)],
-        "curves": curves,
-    }
+    return curves
 
 
 def _table_in(path: Path, name: str) -> dict[str, Any] | None:
@@ -236,14 +213,10 @@ def _table_in(path: Path, name: str) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _read_python(name: str, source: Mapping[str, Any]) -> str:
-    arguments = "".join(f", {k}={v!r}" for k, v in Source(**source).arguments.items())
-    return f"trace = asp.read({name!r}{arguments})"
-
-
 def _python(name: str, source: Source, question: questions.Measurement, *, modulated: bool) -> str:
     """The same measurement as Python."""
-    lines = ["import asperity as asp", "", _read_python(name, source.model_dump())]
+    reading = "".join(f", {k}={v!r}" for k, v in source.arguments.items())
+    lines = ["import asperity as asp", "", f"trace = asp.read({name!r}{reading})"]
     if source.area:
         lines.insert(1, "from asperity.recording import stress_to_force")
         lines.append(f"trace = stress_to_force(trace, {source.area!r})")

@@ -33,9 +33,9 @@ class Preparation:
                 self._futures[name] = self._pool.submit(self._tasks[name])
 
     def want(self, name: str) -> bool:
-        """Whether a task is done, or has failed; one that is not becomes the next in the queue.
+        """Whether a task has ended; a task that has not becomes the next in the queue.
 
-        The request that needs the program reports what is wrong with a task that failed.
+        A task that failed has ended: the request that needs its program reports the reason.
         """
         with self._lock:
             future = self._futures.get(name)
@@ -71,5 +71,5 @@ def use(preparation: Preparation) -> None:
 
 
 def is_ready(task: str) -> bool:
-    """Whether a program is compiled, or there is no preparation; else it is the next to be."""
+    """Whether a program is compiled, or nothing is prepared; one that is not becomes the next."""
     return _preparation is None or _preparation.want(task)

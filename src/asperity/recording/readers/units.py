@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, printable
 from asperity.recording.roles import ROLES, candidates
 from asperity.units import KINDS
-from asperity.units.convert import shortened
 from asperity.units.scale import normalised, unit_factor
 
 #: Words for units, lower case, as the unit they stand for.
@@ -167,7 +166,7 @@ def required(text: str, name: str) -> Unit:
     if not _SMALLEST < abs(factor) < 1 / _SMALLEST:
         rule = f"be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in SI"
         advice = "give what one recorded unit is, like '12.5 N'"
-        raise InputError(Argument("units", name), rule, f"'{shortened(text)}'", advice)
+        raise InputError(Argument("units", name), rule, f"'{printable(text, 63)}'", advice)
     return Unit(unit.kind, factor)
 
 

@@ -57,9 +57,9 @@ export class Figure {
     });
     this.plot.style.minHeight = `${height}px`; // nothing moves when the picture comes
     if (ownLabel) this.plot.setAttribute("aria-label", ownLabel);
-    // The first drawing may come before the panels beside it.
+    // A chart may be drawn before its figure, or the panels beside it, are on the page.
     new ResizeObserver(() => {
-      if (this.frames && !printing && this.plot.clientWidth !== this.width) this.#paint();
+      if (this.chart && !printing && this.plot.clientWidth !== this.width) this.#paint();
     }).observe(this.plot);
     this.note = el("div", { class: "note" });
     const label = fresh("figure");
@@ -197,7 +197,7 @@ export class Figure {
       for (const item of row[kind] || []) {
         for (let i = 0; i < item.x.length; i += 1) {
           const y = item.y[i];
-          if (y === null || y === undefined) continue;
+          if (!isKnown(y)) continue;
           const dx = frame.x.to(item.x[i]) - px;
           const dy = frame.y.to(y) - py;
           const far = kind === "bars" ? Math.abs(dx) : Math.hypot(dx, kind === "lines" ? 0.35 * dy : dy);
@@ -315,7 +315,8 @@ export class Figure {
   }
 }
 
-const isKnown = (value) => value !== null && value !== undefined && Number.isFinite(value);
+/** Whether a value is a number: gaps of curves are null. */
+const isKnown = Number.isFinite;
 
 /** Draw everything again, with other letters or for paper. */
 export function redrawAll(onPaper = false) {
@@ -400,7 +401,7 @@ function drawRow(row, frame, x, last, size) {
   for (const line of row.lines || []) parts.push(drawLine(line, frame));
   for (const points of row.points || []) {
     points.x.forEach((at, i) => {
-      if (points.y[i] === null || points.y[i] === undefined) return;
+      if (!isKnown(points.y[i])) return;
       const px = round(frame.x.to(at));
       const py = round(frame.y.to(points.y[i]));
       parts.push(points.cross
@@ -447,26 +448,13 @@ function smoothPath(points) {
 }
 
 function drawLine(line, frame) {
-  if (line.smooth) {
-    const runs = [[]];
-    line.x.forEach((x, i) => {
-      if (isKnown(line.y[i])) runs.at(-1).push([frame.x.to(x), clampPixel(frame.y.to(line.y[i]))]);
-      else if (runs.at(-1).length) runs.push([]);
-    });
-    const d = runs.filter((r) => r.length > 1).map(smoothPath).join("");
-    return d ? `<path class="line ${line.cls} ${line.thick ? "thick" : ""} ${line.dashed ? "dashed" : ""}" d="${d}"/>` : "";
-  }
-  let path = "";
-  let pen = "M";
-  for (let i = 0; i < line.x.length; i += 1) {
-    const y = line.y[i];
-    if (y === null || y === undefined) {
-      pen = "M";
-      continue;
-    }
-    path += `${pen}${round(frame.x.to(line.x[i]))} ${round(clampPixel(frame.y.to(y)))}`;
-    pen = "L";
-  }
+  const runs = [[]];
+  line.x.forEach((x, i) => {
+    if (isKnown(line.y[i])) runs.at(-1).push([frame.x.to(x), clampPixel(frame.y.to(line.y[i]))]);
+    else if (runs.at(-1).length) runs.push([]);
+  });
+  const straight = (points) => `M${points.map(([x, y]) => `${round(x)} ${round(y)}`).join("L")}`;
+  const path = runs.filter((points) => points.length > 1).map(line.smooth ? smoothPath : straight).join("");
   return path ? `<path class="line ${line.cls} ${line.thick ? "thick" : ""} ${line.dashed ? "dashed" : ""}" d="${path}"/>` : "";
 }
 
@@ -496,7 +484,7 @@ function extent(values, log, margin) {
   let low = Infinity;
   let high = -Infinity;
   for (const v of values) {
-    if (v === null || v === undefined || !Number.isFinite(v) || (log && v <= 0)) continue;
+    if (!isKnown(v) || (log && v <= 0)) continue;
     if (v < low) low = v;
     if (v > high) high = v;
   }

@@ -11,7 +11,7 @@ function channels(hex) {
 }
 
 /** Red, green and blue of a scale at a share from 0 to 1. */
-export function colourAt(scale, share) {
+function colourAt(scale, share) {
   const stops = SCALES[scale];
   const at = Math.max(0, Math.min(1, share)) * (stops.length - 1);
   const i = Math.min(stops.length - 2, Math.floor(at));

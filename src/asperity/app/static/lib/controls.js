@@ -117,26 +117,23 @@ export class Dock {
 }
 
 /** A field for a number, without a slider. */
-export class Entry {
-  constructor({ parameter, value, onInput, label }) {
-    this.parameter = parameter;
-    const id = fresh("entry");
-    const text = (v) => (typeof v === "number" ? quantity(v, parameter.kind, 4) : v);
-    const field = el("input", {
-      type: "text", class: "number", id, spellcheck: "false", autocomplete: "off",
-      "aria-label": label ? parameter.meaning : false,
-      change: () => {
-        const value = parse(field.value, parameter.kind) ?? field.value.trim();
-        field.value = text(value);
-        onInput(value);
-      },
-    });
-    field.value = text(value);
-    this.element = el("div", { class: "entry" },
-      el("label", { for: id, title: parameter.meaning },
-        label || [parameter.symbol ? formula(symbolOf(parameter)) : parameter.name, el("span", { class: "meaning" }, parameter.meaning)]),
-      field);
-  }
+export function entry({ parameter, value, onInput, label }) {
+  const id = fresh("entry");
+  const text = (v) => (typeof v === "number" ? quantity(v, parameter.kind, 4) : v);
+  const field = el("input", {
+    type: "text", class: "number", id, spellcheck: "false", autocomplete: "off",
+    "aria-label": label ? parameter.meaning : false,
+    change: () => {
+      const written = parse(field.value, parameter.kind) ?? field.value.trim();
+      field.value = text(written);
+      onInput(written);
+    },
+  });
+  field.value = text(value);
+  return el("div", { class: "entry" },
+    el("label", { for: id, title: parameter.meaning },
+      label || [parameter.symbol ? formula(symbolOf(parameter)) : parameter.name, el("span", { class: "meaning" }, parameter.meaning)]),
+    field);
 }
 
 /** A box to tick. */
@@ -144,8 +141,34 @@ export function tick(label, checked, onInput, title) {
   const id = fresh("tick");
   const box = el("input", { type: "checkbox", id, change: () => onInput(box.checked) });
   box.checked = checked;
-  const element = el("div", { class: "tick", title }, box, el("label", { for: id }, label));
-  return { element, set: (value) => { box.checked = value; }, box };
+  return el("div", { class: "tick", title }, box, el("label", { for: id }, label));
+}
+
+/** Numbers that laws need and a material does not have: the values at which their sliders start. */
+export function neededNumbers({ materials, laws }, material, names) {
+  const { numbers, sliders } = materials[material];
+  const needed = names.flatMap((law) => laws[law].required).filter((n) => !numbers[n]);
+  return Object.fromEntries(needed.map((n) => [n, sliders[n].value]));
+}
+
+/** The box that counts the mass of the slider among the numbers of a view. */
+export function inertiaTick(numbers, changed) {
+  return tick("With the mass of the slider (inertia)", Boolean(numbers.inertia), (on) => {
+    if (on) numbers.inertia = 1;
+    else delete numbers.inertia;
+    changed();
+  });
+}
+
+/** A labelled text, taken without blanks around it when it is finished. */
+export function textField(label, value, onInput, placeholder = "") {
+  const id = fresh("field");
+  const field = el("input", {
+    type: "text", id, placeholder, spellcheck: "false", autocomplete: "off",
+    change: () => onInput(field.value.trim()),
+  });
+  field.value = value ?? "";
+  return el("div", { class: "choice" }, el("label", { for: id }, label), field);
 }
 
 /** A labelled list to choose from. */
@@ -154,10 +177,7 @@ export function choice(label, options, value, onInput) {
   const select = el("select", { id, change: () => onInput(select.value) },
     options.map(([name, text]) => el("option", { value: name }, text)));
   select.value = value;
-  return {
-    element: el("div", { class: "choice" }, el("label", { for: id }, label), select),
-    set: (chosen) => { select.value = chosen; },
-  };
+  return el("div", { class: "choice" }, el("label", { for: id }, label), select);
 }
 
 /** A group of controls that can be folded; on narrow screens only the first are open. */

@@ -2,6 +2,7 @@
 
 import { el } from "./dom.js";
 import { flushLink } from "./link.js";
+import { Work } from "./server.js";
 
 /** Offer a file. */
 export function saveFile(name, content, type) {
@@ -35,6 +36,13 @@ export function copies(...labelled) {
       if (copied) copyText(copied, currentTarget);
     },
   }, label));
+}
+
+/** Copies a question as Python and as a command, as the server writes them. */
+export function textsOf(path, question, refused) {
+  const asking = new Work(refused);
+  const as = (kind) => async () => (await asking.ask(path, question()))?.[kind];
+  return [["Copy as Python", as("python")], ["Copy as command", as("command")]];
 }
 
 /** Copies the address of the view. */

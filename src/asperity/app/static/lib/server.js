@@ -1,7 +1,15 @@
 // Requests to the server that the page came from.
 
+import { capital } from "./words.js";
+
 /** A request that the server refuses; the message is the server's sentence. */
 export class Refused extends Error {}
+
+/** Report a refusal as a sentence; any other error is a defect of the page. */
+function refuse(error, report) {
+  if (!(error instanceof Refused)) throw error;
+  report(capital(error.message));
+}
 
 /** What the network gives, or a sentence where it gives nothing. */
 async function received(promise) {
@@ -33,7 +41,7 @@ export async function get(path) {
 }
 
 /** JSON answer to a POST request. */
-export async function ask(path, body, signal) {
+async function ask(path, body, signal) {
   return received((await send(path, body, signal)).json());
 }
 
@@ -41,7 +49,7 @@ export async function ask(path, body, signal) {
  * Run a job: `onMessage` is called with each of its messages, and the last message is returned.
  * Aborting the signal ends the job.
  */
-export async function run(path, body, onMessage, signal) {
+async function run(path, body, onMessage, signal) {
   const response = await send(path, body, signal);
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let begun = "";
@@ -63,7 +71,7 @@ export async function run(path, body, onMessage, signal) {
 }
 
 /** Send a file; `onProgress` is called with the share that has gone out. */
-export function sendFile(path, file, onProgress, signal) {
+function sendFile(path, file, onProgress, signal) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open("POST", `/api/${path}`);
@@ -83,14 +91,63 @@ export function sendFile(path, file, onProgress, signal) {
 }
 
 /**
+ * Requests of which only the newest counts: a new request, or `stop`, ends the one before.
+ *
+ * `onRefused` is called with the sentence of a server that refuses. Each request gives null where it was
+ * refused or ended.
+ */
+export class Work {
+  constructor(onRefused) {
+    this.onRefused = onRefused;
+    this.current = null;
+  }
+
+  /** JSON answer to a question. */
+  ask(path, body) {
+    return this.#newest((signal) => ask(path, body, signal));
+  }
+
+  /** Result of a job; `onMessage` is called with each of its messages. */
+  async run(path, body, onMessage = () => {}) {
+    const last = await this.#newest((signal) => run(path, body, (part) => { if (!signal.aborted) onMessage(part); }, signal));
+    return last?.result ?? null;
+  }
+
+  /** Send a file; `onProgress` is called with the share that has gone out. */
+  send(path, file, onProgress) {
+    return this.#newest((signal) => sendFile(path, file, onProgress, signal));
+  }
+
+  stop() {
+    this.current?.abort();
+    this.current = null;
+  }
+
+  async #newest(request) {
+    this.stop();
+    const here = new AbortController();
+    this.current = here;
+    try {
+      const answer = await request(here.signal);
+      return here.signal.aborted ? null : answer;
+    } catch (error) {
+      if (error.name !== "AbortError") refuse(error, this.onRefused);
+      return null;
+    } finally {
+      if (this.current === here) this.current = null;
+    }
+  }
+}
+
+/**
  * Asks for the newest question only: while an answer is on its way, later questions replace each
- * other, and the last is sent next.
+ * other, and the last is sent next. `onRefused` is called as that of `Work`.
  */
 export class Latest {
-  constructor(path, onAnswer, onError) {
+  constructor(path, onAnswer, onRefused) {
     this.path = path;
     this.onAnswer = onAnswer;
-    this.onError = onError;
+    this.onRefused = onRefused;
     this.busy = false;
     this.pending = null;
   }
@@ -108,7 +165,7 @@ export class Latest {
       try {
         await this.onAnswer(await ask(this.path, body), extra, this.pending !== null);
       } catch (error) {
-        this.onError(error, extra);
+        refuse(error, this.onRefused);
       }
     }
     this.busy = false;

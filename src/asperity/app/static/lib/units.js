@@ -12,7 +12,7 @@ const plain = (unit) => unit.replaceAll("µ", "u").replaceAll("μ", "u").replace
 
 /** A number with so many significant digits, without trailing zeros. */
 export function digits(value, count = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) {
@@ -29,7 +29,7 @@ function superscript(power) {
 }
 
 /** The unit in which a value reads best, and its power of ten. */
-export function rung(value, kind) {
+function rung(value, kind) {
   const { ladder, si } = kinds[kind];
   const size = Math.abs(value) * (1 + 1e-9);
   if (!size) return [pretty(si), ladder.some(([u]) => u === si) ? 0 : ladder[0][1]];
@@ -62,9 +62,14 @@ export function parse(text, kind) {
   return step[1] < 0 ? number / 10 ** -step[1] : number * 10 ** step[1];
 }
 
+/** A number of the address in SI, or its text where it has a unit. */
+export function written(text) {
+  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
+}
+
 /** A value with the digits that its standard uncertainty leaves. */
 export function withDoubt(value, doubt) {
-  if (value === null || value === undefined) return "–";
+  if (!Number.isFinite(value)) return "–";
   if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
   const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
   if (places > 7 || Math.abs(value) >= 1e6) {

@@ -2,8 +2,7 @@
 
 import { el } from "../lib/dom.js";
 import { copies, copyLink } from "../lib/save.js";
-import { ask, Refused } from "../lib/server.js";
-import { capital } from "../lib/words.js";
+import { Work } from "../lib/server.js";
 import { FitPanel } from "./data/fit.js";
 import { ProtocolPanel } from "./data/protocol.js";
 import { RecordingCard } from "./data/recording.js";
@@ -15,6 +14,7 @@ export function create(page) {
   let known = null;
   const cards = [];
   const message = el("p", { class: "message", role: "alert" });
+  const asking = new Work((why) => { message.textContent = why; });
   const list = el("div", { class: "recordings" });
   const choose = el("input", {
     type: "file", multiple: true, id: "data-files", class: "visually-hidden",
@@ -84,13 +84,8 @@ export function create(page) {
     },
     async show(parameters) {
       if (!known) {
-        try {
-          known = await ask("data", {});
-        } catch (error) {
-          if (!(error instanceof Refused)) throw error;
-          message.textContent = capital(error.message);
-          return;
-        }
+        known = await asking.ask("data", {});
+        if (!known) return;
         protocol.begin(known.protocols);
       }
       if (written && parameters.toString() === written) return;

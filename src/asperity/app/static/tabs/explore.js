@@ -1,11 +1,11 @@
 // Explore: an operating point, whose response follows the sliders.
 
 import { Figure, key, series } from "../lib/charts.js";
-import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
+import { choice, Dock, group, inertiaTick, neededNumbers, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
-import { copies, copyLink } from "../lib/save.js";
-import { ask, Latest, Refused, run } from "../lib/server.js";
-import { digits, quantity } from "../lib/units.js";
+import { copies, copyLink, textsOf } from "../lib/save.js";
+import { Latest, Work } from "../lib/server.js";
+import { digits, quantity, written } from "../lib/units.js";
 import { capital, worded } from "../lib/words.js";
 import { Machine } from "./explore/machine.js";
 import { MotionPanel } from "./explore/motion.js";
@@ -19,6 +19,8 @@ const PAUSE = 250;
 const SLOW = 1000;
 /** Numbers of the drive and of the machine, in the order of the page; those of the law follow. */
 const FIRST = ["V", "epsilon", "frequency", "W0", "K", "M"];
+/** Curves against the amplitude. */
+const CURVES = ["mean_friction", "mu1", "mu2", "phase1", "phase2"];
 
 export function create(page) {
   const { catalogue } = page;
@@ -27,7 +29,6 @@ export function create(page) {
   let figures = null;
   let machine = null;
   let motion = null;
-  let searching = null;
   let resting = 0;
   let slow = 0;
   let compiling = null;
@@ -44,6 +45,7 @@ export function create(page) {
   }
 
   const latest = new Latest("explore", answered, refused);
+  const searching = new Work(refused);
 
   // --- The address ---------------------------------------------------------------------------
 
@@ -69,11 +71,10 @@ export function create(page) {
       view.laws = parameters.get("laws").split(",").filter((n) => catalogue.laws[n]);
     }
     view.phases = parameters.get("show") === "phases";
-    const number = (text) => (Number.isFinite(Number(text)) ? Number(text) : text);
     const sliders = catalogue.materials[view.material].sliders;
     for (const [n, text] of parameters) {
-      if (n in sliders) view.numbers[n] = number(text);
-      else if (n.startsWith("air.")) (view.air ||= {})[n.slice(4)] = number(text);
+      if (n in sliders) view.numbers[n] = written(text);
+      else if (n.startsWith("air.")) (view.air ||= {})[n.slice(4)] = written(text);
     }
     if (parameters.get("air") === "1") view.air ||= {};
   }
@@ -85,20 +86,9 @@ export function create(page) {
     const drive = Object.fromEntries(["V", "epsilon", "frequency"].map((n) => [n, sliders[n].value]));
     return {
       material: view.material, law: view.law, laws: view.laws,
-      numbers: { ...needed(), ...drive, ...view.numbers }, air: view.air,
+      numbers: { ...neededNumbers(catalogue, view.material, [view.law, ...view.laws]), ...drive, ...view.numbers },
+      air: view.air,
     };
-  }
-
-  /** Numbers that the chosen laws need and the material does not have: the values at which their sliders start. */
-  function needed() {
-    const { numbers, sliders } = catalogue.materials[view.material];
-    const values = {};
-    for (const law of [view.law, ...view.laws]) {
-      for (const n of catalogue.laws[law].required) {
-        if (!numbers[n]) values[n] = sliders[n].value;
-      }
-    }
-    return values;
   }
 
   function changed() {
@@ -117,8 +107,7 @@ export function create(page) {
   function stopSearch() {
     motion.stop();
     clearTimeout(resting);
-    if (searching) searching.abort();
-    searching = null;
+    searching.stop();
   }
 
   async function answered(response, { since }, more) {
@@ -156,40 +145,30 @@ export function create(page) {
     return page.say("Compiling…");
   }
 
-  function refused(error) {
-    if (!(error instanceof Refused)) throw error;
+  function refused(why) {
     clearTimeout(slow);
-    message.textContent = capital(error.message);
+    message.textContent = why;
     page.say("");
   }
 
-  async function search() {
-    searching = new AbortController();
-    const { signal } = searching;
-    try {
-      await run("explore/search", question(), (part) => {
-        if (signal.aborted) return;
-        if (part.point) {
-          const known = answer.point.searched;
-          answer.point = part.point;
-          if (!known) motion.ask(question(), answer.point);
-        } else if (part.curve) {
-          const curve = answer.curves[part.curve];
-          part.rows.forEach((row, i) => {
-            for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
-              curve[n][row] = part[n][i];
-            }
-            if (!part.converged[i] && !curve.lost) {
-              curve.lost = { at: answer.amplitudes[row], row, why: part.result[i] };
-            }
-          });
-          curve.left = curve.left.filter((row) => !part.rows.includes(row));
-        } else return;
-        draw();
-      }, signal);
-    } catch (error) {
-      if (error.name !== "AbortError") refused(error);
-    }
+  function search() {
+    return searching.run("explore/search", question(), (part) => {
+      if (part.point) {
+        const known = answer.point.searched;
+        answer.point = part.point;
+        if (!known) motion.ask(question(), answer.point);
+      } else if (part.curve) {
+        const curve = answer.curves[part.curve];
+        part.rows.forEach((row, i) => {
+          for (const n of CURVES) curve[n][row] = part[n][i];
+          if (!part.converged[i] && !curve.lost) {
+            curve.lost = { at: answer.amplitudes[row], row, why: part.result[i] };
+          }
+        });
+        curve.left = curve.left.filter((row) => !part.rows.includes(row));
+      } else return;
+      draw();
+    });
   }
 
   // --- Figures ---------------------------------------------------------------------------------
@@ -206,7 +185,7 @@ export function create(page) {
       }),
       amplitude: new Figure({
         name: "amplitude", title: "Against the amplitude", height: 400, columns: amplitudeColumns,
-        options: phases.element,
+        options: phases,
         caption: "Modulation lowers the mean friction; the laws differ most in the harmonics.",
       }),
       harmonics: new Figure({
@@ -241,9 +220,7 @@ export function create(page) {
     if (!answer?.curves) return null;
     const columns = { epsilon: answer.amplitudes };
     for (const [law, curve] of Object.entries(answer.curves)) {
-      for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
-        columns[`${law} ${n}`] = curve[n];
-      }
+      for (const n of CURVES) columns[`${law} ${n}`] = curve[n];
     }
     return columns;
   }
@@ -409,16 +386,15 @@ export function create(page) {
     const rebuild = () => { buildControls(); changed(); };
     fill(controls,
       choice("Material", Object.entries(catalogue.materials).map(([n, m]) => [n, `${n} – ${m.title}`]), view.material,
-        (value) => { view.material = value; view.numbers = {}; rebuild(); }).element,
-      choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
+        (value) => { view.material = value; view.numbers = {}; rebuild(); }),
+      choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }),
       group("Drive and machine", false,
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
-        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia),
-          (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
+        inertiaTick(view.numbers, changed)),
       group("Law", false, ofLaw.map(sliderOf)),
       group("Air layer", false,
         tick("Air between the surfaces", view.air !== null, (on) => { view.air = on ? {} : null; rebuild(); },
-          "ε is then the amplitude of the load, of which the contacts bear a share").element,
+          "ε is then the amplitude of the load, of which the contacts bear a share"),
         view.air === null ? [] : material.air.map((p) => slider({
           parameter: p,
           slider: { ...p.slider, value: view.air[p.name] ?? p.value },
@@ -428,7 +404,7 @@ export function create(page) {
         laws.filter((n) => n !== view.law).map((n) => tick(n, view.laws.includes(n), (on) => {
           view.laws = laws.filter((m) => (m === n ? on : view.laws.includes(m)));
           changed();
-        }, catalogue.laws[n].title).element)),
+        }, catalogue.laws[n].title))),
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); rebuild(); } }, "Start again")),
     );
@@ -447,8 +423,7 @@ export function create(page) {
     page.setLink(name, toParameters());
     draw();
   }, "Phases of the harmonics in place of their amplitudes");
-  const textAs = (kind) => () => ask("explore/text", question()).then((texts) => texts[kind], refused);
-  const buttons = el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", textAs("python")], ["Copy as command", textAs("command")]));
+  const buttons = el("div", { class: "actions" }, copies(copyLink, ...textsOf("explore/text", question, refused)));
 
   return {
     element,
@@ -464,7 +439,7 @@ export function create(page) {
           el("section", { class: "law", tabindex: "0", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
-      phases.set(view.phases);
+      phases.querySelector("input").checked = view.phases;
       buildControls();
       changed();
     },

@@ -2,12 +2,12 @@
 
 import { Figure, key } from "../lib/charts.js";
 import { picture, stops } from "../lib/colours.js";
-import { choice, Entry, group, tick } from "../lib/controls.js";
+import { choice, entry, group, inertiaTick, neededNumbers, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
-import { copies, copyLink } from "../lib/save.js";
-import { ask, Refused, run } from "../lib/server.js";
-import { digits, quantity } from "../lib/units.js";
-import { capital, count, nameOf } from "../lib/words.js";
+import { copies, copyLink, textsOf } from "../lib/save.js";
+import { Work } from "../lib/server.js";
+import { digits, quantity, written } from "../lib/units.js";
+import { count, nameOf } from "../lib/words.js";
 
 export const name = "map";
 export const title = "Map";
@@ -25,7 +25,6 @@ export function create(page) {
   const view = fresh();
   let figure = null;
   let grid = null;
-  let running = null;
   let resting = 0;
   let shown = null;
   let marker = null;
@@ -68,22 +67,15 @@ export function create(page) {
     if (FINEST.includes(Number(parameters.get("count")))) view.count = Number(parameters.get("count"));
     for (const side of ["x", "y"]) {
       const [n, low, high, log] = (parameters.get(side) || "").split(",");
-      if (parameter(n)) view[side] = { name: n, low: number(low), high: number(high), log: log === "log" };
+      if (parameter(n)) view[side] = { name: n, low: written(low), high: written(high), log: log === "log" };
     }
-    for (const [n, text] of parameters) if (parameter(n) || n === "inertia") view.numbers[n] = number(text);
+    for (const [n, text] of parameters) if (parameter(n) || n === "inertia") view.numbers[n] = written(text);
   }
 
   // --- Asking ----------------------------------------------------------------------------------
 
   function question() {
-    const numbers = {};
-    for (const p of parametersOf(view.law)) {
-      const published = catalogue.materials[view.material].numbers[p.name];
-      if (catalogue.laws[view.law].required.includes(p.name) && !published) {
-        numbers[p.name] = sliderOf(p.name).value;
-      }
-    }
-    Object.assign(numbers, view.numbers);
+    const numbers = { ...neededNumbers(catalogue, view.material, [view.law]), ...view.numbers };
     for (const side of ["x", "y"]) delete numbers[view[side].name];
     return {
       material: view.material, law: view.law, numbers, x: view.x, y: view.y, show: view.show,
@@ -99,42 +91,36 @@ export function create(page) {
 
   function stop() {
     clearTimeout(resting);
-    if (running) running.abort();
-    running = null;
+    solving.stop();
     progress.hidden = true;
     cancel.hidden = true;
   }
 
+  const solving = new Work((why) => {
+    stop();
+    status.textContent = "";
+    message.textContent = why;
+  });
+
   async function start() {
     const solved = question();
-    running = new AbortController();
-    const { signal } = running;
     message.textContent = "";
     progress.hidden = false;
     cancel.hidden = false;
     progress.removeAttribute("value");
     status.textContent = "Solving the first, coarse grid…";
-    try {
-      await run("map", solved, (part) => {
-        if (signal.aborted) return;
-        if (part.waiting) status.textContent = "Waiting for another map to be done…";
-        if (part.progress !== undefined) progress.value = part.progress;
-        if (!part.grid) return;
-        grid = part.grid;
-        shown = solved;
-        draw();
-        if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
-      }, signal);
-      if (signal.aborted) return;
-      status.textContent = `${grid.count} × ${grid.count} points.`;
-      stop();
-    } catch (error) {
-      if (error.name === "AbortError") return;
-      stop();
-      status.textContent = "";
-      if (!(error instanceof Refused)) throw error;
-      message.textContent = capital(error.message);
-    }
+    const done = await solving.run("map", solved, (part) => {
+      if (part.waiting) status.textContent = "Waiting for another map to be done…";
+      if (part.progress !== undefined) progress.value = part.progress;
+      if (!part.grid) return;
+      grid = part.grid;
+      shown = solved;
+      draw();
+      if (grid.count < solved.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
+    });
+    if (!done) return;
+    status.textContent = `${grid.count} × ${grid.count} points.`;
+    stop();
   }
 
   // --- The figure ------------------------------------------------------------------------------
@@ -263,19 +249,19 @@ export function create(page) {
     const rebuild = () => { buildControls(); changed(); };
     const axisControls = (side, label) => {
       const p = parameter(view[side].name);
-      const entry = (end, text) => new Entry({
+      const field = (end, text) => entry({
         parameter: { ...p, meaning: `${text} of ${label}` }, label: text, value: view[side][end],
         onInput: (value) => { view[side][end] = value; changed(); },
-      }).element;
+      });
       return group(label, true,
         choice("Number", names, view[side].name, (value) => {
           const { low, high, log } = sliderOf(value);
           view[side] = { name: value, low, high, log };
           marker = null;
           rebuild();
-        }).element,
-        el("div", { class: "ends" }, entry("low", "from"), entry("high", "to")),
-        tick("At equal ratios (logarithmic)", view[side].log, (on) => { view[side].log = on; changed(); }).element);
+        }),
+        el("div", { class: "ends" }, field("low", "from"), field("high", "to")),
+        tick("At equal ratios (logarithmic)", view[side].log, (on) => { view[side].log = on; changed(); }));
     };
     const others = parametersOf(view.law).filter((p) => ![view.x.name, view.y.name].includes(p.name));
     fill(controls,
@@ -286,26 +272,21 @@ export function create(page) {
         }
         marker = null;
         rebuild();
-      }).element,
+      }),
       axisControls("x", "Across"),
       axisControls("y", "Up"),
       group("Picture", false,
-        choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }).element,
-        choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); }).element),
+        choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }),
+        choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); })),
       group("Other numbers", false,
-        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia), (on) => {
-          if (on) view.numbers.inertia = 1; else delete view.numbers.inertia;
-          changed();
-        }).element,
-        others.map((p) => new Entry({
+        inertiaTick(view.numbers, changed),
+        others.map((p) => entry({
           parameter: p, value: view.numbers[p.name] ?? sliderOf(p.name).value,
           onInput: (value) => { view.numbers[p.name] = value; changed(); },
-        }).element)),
+        }))),
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); marker = null; rebuild(); } }, "Start again")));
   }
-
-  const textAs = (kind) => () => ask("map/text", question()).then((texts) => texts[kind], (error) => { message.textContent = capital(error.message); });
 
   const results = el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Stability map"));
   const element = el("section", { class: "tab map", "aria-label": title }, controls, results);
@@ -333,7 +314,7 @@ export function create(page) {
         results.append(
           el("div", { class: "summary" }, el("p", { class: "hint" }, "A click takes the point to Explore; with the keyboard, arrow keys and Enter."),
             el("div", { class: "work" }, status, progress, cancel), message,
-            el("div", { class: "actions" }, copies(copyLink, ["Copy as Python", textAs("python")], ["Copy as command", textAs("command")]))),
+            el("div", { class: "actions" }, copies(copyLink, ...textsOf("map/text", question, (why) => { message.textContent = why; })))),
           figure.element);
       }
       fromParameters(parameters);
@@ -342,9 +323,4 @@ export function create(page) {
     },
     hide: stop,
   };
-}
-
-/** A number of the address, or its text where it has a unit. */
-function number(text) {
-  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
 }

@@ -4,10 +4,9 @@ import { Figure, key, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity } from "../lib/controls.js";
 import { el, fill, fresh } from "../lib/dom.js";
 import { copies, copyLink, csv, saveFile } from "../lib/save.js";
-import { ask, Latest, Refused, run } from "../lib/server.js";
+import { Latest, Work } from "../lib/server.js";
 import { table } from "../lib/tables.js";
-import { digits, quantity } from "../lib/units.js";
-import { capital } from "../lib/words.js";
+import { digits, quantity, written } from "../lib/units.js";
 import { elementDrawing } from "./paper/element.js";
 
 export const name = "paper";
@@ -23,12 +22,13 @@ export function create(page) {
   let paper = null;
   let answer = null;
   let verdicts = null;
-  let computing = null;
   let inertia = [];
-  let weighing = null;
   let resting = 0;
 
   const latest = new Latest("paper/figure", answered, refused);
+  const opening = new Work(refused);
+  const weighing = new Work((why) => { massStatus.textContent = ""; massBar.hidden = true; refused(why); });
+  const judging = new Work((why) => { ledgerMessage.textContent = why; });
   const message = el("p", { class: "message", role: "alert" });
   const controls = el("form", { class: "controls", "aria-label": "Figure and numbers", submit: (e) => e.preventDefault() });
   const sentence = el("p", { class: "sentence", role: "status" });
@@ -71,9 +71,7 @@ export function create(page) {
     if (!view.figure) view.show = "ledger";
     view.numbers = {};
     for (const { name: n } of current()?.numbers || []) {
-      if (!parameters.has(n)) continue;
-      const text = parameters.get(n);
-      view.numbers[n] = Number.isFinite(Number(text)) ? Number(text) : text;
+      if (parameters.has(n)) view.numbers[n] = written(parameters.get(n));
     }
     for (const n of ["status", "kind", "section", "search"]) view[n] = parameters.get(n) || "";
   }
@@ -82,11 +80,13 @@ export function create(page) {
 
   // --- Figures ---------------------------------------------------------------------------------
 
+  const question = () => ({ paper: view.paper, figure: view.figure, numbers: view.numbers });
+
   function changed() {
     link();
     stopMass();
     sentence.textContent = asSentence();
-    latest.ask({ paper: view.paper, figure: view.figure, numbers: view.numbers }, null);
+    latest.ask(question());
   }
 
   function asSentence() {
@@ -104,7 +104,7 @@ export function create(page) {
     message.textContent = "";
     if (response.preparing) {
       page.say(`Compiling the equations of ${response.preparing}, once; this takes some seconds.`);
-      setTimeout(() => latest.ask({ paper: view.paper, figure: view.figure, numbers: view.numbers }, null), 500);
+      setTimeout(() => latest.ask(question()), 500);
       return;
     }
     page.say("");
@@ -117,8 +117,7 @@ export function create(page) {
 
   function stopMass() {
     clearTimeout(resting);
-    weighing?.abort();
-    weighing = null;
+    weighing.stop();
     inertia = [];
     massBar.hidden = true;
     massStatus.textContent = "";
@@ -126,32 +125,22 @@ export function create(page) {
 
   async function weigh() {
     stopMass();
-    weighing = new AbortController();
-    const { signal } = weighing;
     massBar.hidden = false;
     massBar.removeAttribute("value");
     massStatus.textContent = "Computing the curves with the mass of the slider…";
-    try {
-      await run("paper/inertia", { paper: view.paper, figure: view.figure, numbers: view.numbers }, (part) => {
-        if (signal.aborted) return;
-        if (part.progress !== undefined) massBar.value = part.progress;
-        if (!part.curve) return;
-        inertia.push(part);
-        draw();
-      }, signal);
-      if (signal.aborted) return;
-      massStatus.textContent = "";
-    } catch (error) {
-      if (error.name === "AbortError") return;
-      massStatus.textContent = "";
-      refused(error);
-    }
+    const done = await weighing.run("paper/inertia", question(), (part) => {
+      if (part.progress !== undefined) massBar.value = part.progress;
+      if (!part.curve) return;
+      inertia.push(part);
+      draw();
+    });
+    if (!done) return;
+    massStatus.textContent = "";
     massBar.hidden = true;
   }
 
-  function refused(error) {
-    if (!(error instanceof Refused)) throw error;
-    message.textContent = capital(error.message);
+  function refused(why) {
+    message.textContent = why;
     page.say("");
   }
 
@@ -238,7 +227,7 @@ export function create(page) {
         view.numbers = Object.fromEntries(Object.entries(view.numbers).filter(([n]) => kept.includes(n)));
         buildControls();
         changed();
-      }).element,
+      }),
       group("Numbers of the paper", false, sliders.map((q) => q.element)),
       el("div", { class: "actions" }, el("button", {
         type: "button", click: () => { view.numbers = {}; buildControls(); changed(); },
@@ -264,7 +253,7 @@ export function create(page) {
     filters.search = el("input", { type: "search", id, value: view.search, input: () => changedFilter("search")(filters.search.value) });
     fill(ledgerView,
       el("form", { class: "filters", role: "search", "aria-label": "Claims", submit: (e) => e.preventDefault() },
-        filters.status.element, filters.kind.element, filters.section.element,
+        filters.status, filters.kind, filters.section,
         el("div", { class: "choice" }, el("label", { for: id }, "Text"), filters.search)),
       el("div", { class: "summary" }, count, ledgerMessage, el("div", { class: "actions" },
         copies(copyLink, ["Copy as Python", ledgerPython], ["Copy as command", () => `asperity reproduce ${paper.paper.name} --out report`]),
@@ -306,21 +295,14 @@ export function create(page) {
   }
 
   async function computeLedger() {
-    if (verdicts || computing) return;
-    computing = new AbortController();
-    try {
-      const last = await run("paper/ledger", { paper: view.paper }, (m) => {
-        if (m.finished) page.say(`${m.finished} of ${m.total} claims computed`);
-      }, computing.signal);
-      if (last.result) verdicts = new Map(last.result.claims.map((c) => [c.id, c]));
-      page.say("");
-      if (view.show === "ledger") drawLedger();
-    } catch (error) {
-      if (!(error instanceof Refused)) throw error;
-      ledgerMessage.textContent = capital(error.message);
-    } finally {
-      computing = null;
-    }
+    if (verdicts || judging.current) return;
+    const judged = await judging.run("paper/ledger", { paper: view.paper }, (m) => {
+      if (m.finished) page.say(`${m.finished} of ${m.total} claims computed`);
+    });
+    if (!judged) return;
+    verdicts = new Map(judged.claims.map((c) => [c.id, c]));
+    page.say("");
+    if (view.show === "ledger") drawLedger();
   }
 
   function buildSwitches() {
@@ -337,15 +319,18 @@ export function create(page) {
       Object.assign(view, { paper: value, figure: "", numbers: {} });
       await open(new URLSearchParams());
       link();
-    }).element);
+    }));
   }
 
   /** Ask for the words of the chosen paper, and show them. */
   async function open(parameters) {
     stopMass();
-    computing?.abort();
-    [answer, verdicts, computing] = [null, null, null];
-    paper = await ask("paper", { paper: view.paper });
+    judging.stop();
+    [answer, verdicts] = [null, null];
+    const opened = await opening.ask("paper", { paper: view.paper });
+    if (!opened) return;
+    message.textContent = "";
+    paper = opened;
     heading.textContent = paper.paper.title;
     cite.textContent = `${paper.paper.authors}, ${paper.paper.journal}`;
     fromParameters(parameters);

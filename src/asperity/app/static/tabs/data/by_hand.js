@@ -3,7 +3,7 @@
 import { Figure, series } from "../../lib/charts.js";
 import { Quantity } from "../../lib/controls.js";
 import { el, fill } from "../../lib/dom.js";
-import { Latest, Refused } from "../../lib/server.js";
+import { Latest } from "../../lib/server.js";
 import { capital } from "../../lib/words.js";
 
 /** Start values before a fit: typical of rocks. */
@@ -22,10 +22,7 @@ export class ByHand {
       columns: () => this.shown && { time: this.shown.x, model: this.shown.y },
       caption: "The level and a straight trend over time are fitted to the recording; all other numbers are those of the sliders.",
     });
-    this.latest = new Latest("data/model", (answer) => this.#draw(answer), (error) => {
-      if (!(error instanceof Refused)) throw error;
-      this.message.textContent = capital(error.message);
-    });
+    this.latest = new Latest("data/model", (answer) => this.#draw(answer), (why) => { this.message.textContent = why; });
     this.element = el("details", { class: "by-hand", hidden: true },
       el("summary", {}, "Move the numbers by hand over the recording"), this.sliders, this.message, this.figure.element,
       el("div", { class: "actions" }, el("button", { type: "button", click: () => this.fitFrom(this.start()) }, "Fit from here")));

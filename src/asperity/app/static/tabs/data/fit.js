@@ -1,12 +1,12 @@
 // A law fitted to what was measured, or several compared.
 
 import { Figure, key, series } from "../../lib/charts.js";
-import { choice, tick } from "../../lib/controls.js";
+import { choice, textField, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copies, csv, saveFile } from "../../lib/save.js";
-import { Refused, run } from "../../lib/server.js";
+import { Work } from "../../lib/server.js";
 import { sections } from "../../lib/tables.js";
-import { digits } from "../../lib/units.js";
+import { digits, written } from "../../lib/units.js";
 import { capital, ended, nameOf, names as chosenNames } from "../../lib/words.js";
 import { ByHand } from "./by_hand.js";
 
@@ -35,8 +35,9 @@ export class FitPanel {
     this.results = el("div", { class: "card-body" });
     this.byHand = new ByHand(page, (start) => this.start(start), changed);
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
-    this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
+    this.cancel = el("button", { type: "button", click: () => this.#end("Cancelled.") }, "Cancel");
     this.cancel.hidden = true;
+    this.work = new Work((why) => this.#end("", why));
     this.bar = el("progress", { max: 1, "aria-label": "Progress of the draws", hidden: true });
     this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
       el("h3", {}, "Fit and compare"), this.data, this.form, this.byHand.element,
@@ -102,7 +103,7 @@ export class FitPanel {
   }
 
   #build() {
-    const { laws, materials } = this.page.catalogue;
+    const { laws, materials, labels } = this.page.catalogue;
     const { settings } = this;
     const names = Object.keys(laws).filter((n) => laws[n].rate_dependent);
     const set = (key) => (value) => { settings[key] = value; this.changed(); };
@@ -117,36 +118,32 @@ export class FitPanel {
     const fixed = el("textarea", { id, rows: 3, spellcheck: "false", placeholder: "V = 10 um/s", input: () => set("fixed")(fixed.value) });
     fixed.value = settings.fixed;
     this.freeHolder = el("div", { class: "ticks" });
-    const text = (label, key, placeholder) => {
-      const fieldId = fresh("field");
-      const field = el("input", { type: "text", id: fieldId, placeholder, spellcheck: "false", autocomplete: "off", change: () => set(key)(field.value.trim()) });
-      field.value = settings[key];
-      return el("div", { class: "choice" }, el("label", { for: fieldId }, label), field);
-    };
-    this.sampling = el("div", { class: "filters" }, text("Draws of each chain", "draws", "1000"), text("Chains", "chains", "4"));
+    const text = (key, placeholder) => textField(labels[key], settings[key], set(key), placeholder);
+    const flag = (key, explanation) => tick(labels[key], settings[key], set(key), explanation);
+    this.sampling = el("div", { class: "filters" }, text("draws", "1000"), text("chains", "4"));
     this.sampling.hidden = !settings.posterior;
     this.runOptions = el("fieldset", {}, el("legend", {}, "Whole recordings"),
       el("p", { class: "note" }, "The law's motion over the whole recording is fitted; K is free for each recording, and the noise is estimated."),
       el("div", { class: "filters" },
-        choice("Trend of the friction over slip", ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")).element,
-        choice("State at the beginning", [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
-        text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
-        text("Mean values per second for long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
-        tick("Friction also drifts over time", settings.drift, set("drift")).element));
+        choice(labels.trend, ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")),
+        choice(labels.initial, [["steady", "steady sliding"], ["free", "free"]], settings.initial, set("initial")),
+        text("gauge", "none, or 50 Hz"),
+        text("fit_rate", "chosen, or 100 Hz, or full"),
+        flag("drift")));
     fill(this.form,
-      el("fieldset", {}, el("legend", {}, "Laws: tick one to fit it, several to compare them"),
-        el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
-      el("fieldset", {}, el("legend", {}, "Free parameters; if none is ticked, all that the data can determine"), this.freeHolder),
+      el("fieldset", {}, el("legend", {}, `${labels.laws}: tick one to fit it, several to compare them`),
+        el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title)))),
+      el("fieldset", {}, el("legend", {}, `${labels.free}; if none is ticked, all that the data can determine`), this.freeHolder),
       el("div", { class: "fit-more" },
-        choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")).element,
-        el("div", { class: "choice" }, el("label", { for: id }, "Fixed numbers, one per line; V is the pulling velocity"), fixed),
+        choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")),
+        el("div", { class: "choice" }, el("label", { for: id }, `${labels.fixed}, one per line; V is the pulling velocity`), fixed),
         el("div", { class: "ticks" },
-          tick("Published uncertainties as priors", settings.prior, set("prior")).element,
-          tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
-          tick("Posterior of one law by sampling", settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
-            "As asperity fit --posterior; it takes a minute or more").element,
-          tick("With the inertia of the slider", settings.inertia, set("inertia")).element,
-          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element),
+          flag("prior"),
+          flag("profile"),
+          tick(labels.posterior, settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
+            "As asperity fit --posterior; it takes a minute or more"),
+          tick("With the inertia of the slider", settings.inertia, set("inertia")),
+          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it")),
         this.sampling),
       this.runOptions);
     this.runOptions.hidden = !this.runs().length;
@@ -161,7 +158,7 @@ export class FitPanel {
     fill(this.freeHolder, names.map((n) => tick(nameOf(n), this.settings.free.includes(n), (on) => {
       this.settings.free = names.filter((m) => (m === n ? on : this.settings.free.includes(m)));
       this.changed();
-    }).element));
+    })));
     this.names = names;
   }
 
@@ -173,11 +170,8 @@ export class FitPanel {
 
   /** Fit or compare; `start` has start values by parameter. */
   async start(start = {}) {
-    this.work?.abort();
-    this.work = new AbortController();
-    const { signal } = this.work;
     const { settings } = this;
-    this.message.textContent = "";
+    this.#end("");
     fill(this.results);
     const fixed = {};
     for (const line of settings.fixed.split(/[\n;]+/).filter((l) => l.trim())) {
@@ -201,56 +195,46 @@ export class FitPanel {
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
     };
-    if (settings.posterior) {
-      question.posterior = true;
-      for (const [key, label, low, high] of [["draws", "Draws of each chain", 100, 10000], ["chains", "Chains", 2, 8]]) {
-        question[key] = Number(settings[key]);
-        if (!settings[key] || !Number.isInteger(question[key]) || question[key] < low || question[key] > high) {
-          this.message.textContent = `${label} must be a whole number from ${low} to ${high}, got “${settings[key]}”; change it.`;
-          return;
-        }
-      }
-    }
+    if (settings.posterior) Object.assign(question, { posterior: true, draws: written(settings.draws), chains: written(settings.chains) });
     this.#running(true);
-    try {
-      const last = await run("data/fit", question, (part) => {
-        if (part.waiting) this.status.textContent = "Waiting for another fit…";
-        if (part.share !== undefined) {
-          this.bar.value = part.share;
-          this.status.textContent = `Fitting… ${Math.round(100 * part.share)} %.`;
-        }
-        if (part.draws !== undefined) {
-          this.bar.value = part.draws / part.of;
-          this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, warm-up included.` : "Sampling: starting the processes…";
-        }
-        this.bar.hidden = part.draws === undefined && part.share === undefined;
-        if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
-        if (part.stage === "report") this.status.textContent = "Writing the report folder…";
-      }, signal);
-      if (last.result) this.#draw(last.result);
-    } catch (error) {
-      if (error.name === "AbortError") this.status.textContent = "Cancelled.";
-      else if (error instanceof Refused) {
-        this.status.textContent = "";
-        this.message.textContent = capital(error.message);
-      } else throw error;
-    } finally {
-      this.#running(false);
-    }
+    this.status.textContent = "Fitting…";
+    const result = await this.work.run("data/fit", question, (part) => {
+      if (part.waiting) this.status.textContent = "Waiting for another fit…";
+      if (part.share !== undefined) {
+        this.bar.value = part.share;
+        this.status.textContent = `Fitting… ${Math.round(100 * part.share)} %.`;
+      }
+      if (part.draws !== undefined) {
+        this.bar.value = part.draws / part.of;
+        this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, warm-up included.` : "Sampling: starting the processes…";
+      }
+      this.bar.hidden = part.draws === undefined && part.share === undefined;
+      if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
+      if (part.stage === "report") this.status.textContent = "Writing the report folder…";
+    });
+    if (!result) return;
+    this.#running(false);
+    this.#draw(result);
   }
 
   #running(on) {
     this.cancel.hidden = !on;
     this.bar.hidden = true;
     this.fitButton.disabled = on;
-    if (on) this.status.textContent = "Fitting…";
   }
 
-  #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, command }) {
-    this.figures = [];
+  /** End the fit: its state, and why it was refused. */
+  #end(status, message = "") {
+    this.work.stop();
+    this.#running(false);
+    this.status.textContent = status;
+    this.message.textContent = message;
+  }
+
+  #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, python, command }) {
     const record = fit || comparison;
     const buttons = el("div", { class: "actions" },
-      copies(["Copy as Python", () => this.#python()], ["Copy as command", () => command]),
+      copies(["Copy as Python", () => python], ["Copy as command", () => command]),
       el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(posterior ? { ...record, posterior } : record, null, 2), "application/json") }, "JSON"),
       report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
@@ -261,7 +245,6 @@ export class FitPanel {
     const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw.map((s) => ({ ...s, title: s.title === n ? "" : s.title })), ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
-    for (const draw of this.figures) draw();
   }
 
   /** Densities of the draws. */
@@ -273,10 +256,10 @@ export class FitPanel {
       const figure = new Figure({ name: `posterior-${n}`, title: `Posterior of ${n}`, height: 230, columns: () => ({ [n]: x, density: y }) });
       figure.note.textContent = `Dotted: the ends of the 95 % interval. ${priorText(p.prior)}`;
       const [low, high] = [x[0], x.at(-1)];
-      this.figures.push(() => figure.draw({
+      figure.draw({
         x: { label: p.unit ? `${n} (${p.unit})` : n, range: [Math.min(low, p.interval_95[0]), Math.max(high, p.interval_95[1])] },
         rows: [{ y: { label: "density", range: [0, 1.05 * Math.max(...y)] }, marks: p.interval_95, bars: [{ x, y, cls: series(0), title: (i) => `${n} about ${digits(x[i], 4)}` }] }],
-      }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`));
+      }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`);
       return figure.element;
     });
     return [el("div", { class: "panels" }, shown)];
@@ -295,7 +278,7 @@ export class FitPanel {
         rows[0].series.slice(0, 12).map(({ label }, i) => key(series(i), label)),
         many > 12 && el("p", {}, `and ${many - 12} more series`),
         el("p", {}, "Points: readings with two standard errors. Lines: the law, with its 95 % band between the thin ones."));
-      this.figures.push(() => figure.draw({
+      figure.draw({
         x: { label: "ε as applied" },
         rows: rows.map(({ name, series: curves }) => ({
           y: { label: LABELS[name] || name },
@@ -306,7 +289,7 @@ export class FitPanel {
           ]),
           points: curves.map((v, i) => ({ x: v.at, y: v.value, cls: series(i), size: 4, title: (j) => `${name} ${digits(v.value[j])} ± ${digits(v.error[j], 2)} at ε ${digits(v.at[j], 3)}` })),
         })),
-      }, "Readings and what the fitted law predicts between them."));
+      }, "Readings and what the fitted law predicts between them.");
       return figure.element;
     });
   }
@@ -317,14 +300,14 @@ export class FitPanel {
       const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y, time_of_fitted: fitted.x, fitted: fitted.y }) });
       fill(figure.note, key("s6", "recorded"), key("s2", "fitted"));
       const both = (of) => [{ ...of.recorded, cls: "s6", name: "recorded" }, { ...of.fitted, cls: "s2", name: "fitted", thick: true }];
-      this.figures.push(() => figure.draw({ x: { label: "time (s)" }, rows: [
+      figure.draw({ x: { label: "time (s)" }, rows: [
         { y: { label: "F/W" }, marks: transients.map((t) => t.time), lines: both({ recorded, fitted }) },
         { y: { label: "recorded − fitted" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
-      ] }, `Friction of ${name} as recorded and as fitted.`));
+      ] }, `Friction of ${name} as recorded and as fitted.`);
       const enlarged = transients.map((transient) => {
         const title = `After ${digits(transient.time, 6)} s`;
         const near = new Figure({ name: "transient", title, height: 250, columns: () => ({ time: transient.recorded.x, friction: transient.recorded.y }) });
-        this.figures.push(() => near.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`));
+        near.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`);
         return near.element;
       });
       return el("div", { class: "panels" }, figure.element, enlarged);
@@ -337,45 +320,20 @@ export class FitPanel {
     const names = [...new Set(observable)];
     const figure = new Figure({ name: "residuals", title: "Residuals in standard deviations", height: 230, columns: () => ({ observable, residual: value }) });
     fill(figure.note, names.map((n, k) => key(`point ${series(k)}`, n)));
-    this.figures.push(() => {
-      const at = value.map((_, i) => i + 1);
-      const of = (n) => at.filter((_, i) => observable[i] === n);
-      const far = 1.1 * Math.max(3, ...value.map(Math.abs));
-      figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
-        y: { label: "residual", range: [-far, far] },
-        lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
-        points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
-      }] }, `Residuals of ${names.join(", ")}.`);
-    });
+    const at = value.map((_, i) => i + 1);
+    const of = (n) => at.filter((_, i) => observable[i] === n);
+    const far = 1.1 * Math.max(3, ...value.map(Math.abs));
+    figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
+      y: { label: "residual", range: [-far, far] },
+      lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
+      points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
+    }] }, `Residuals of ${names.join(", ")}.`);
     return figure.element;
   }
 
   #saveCsv(fits) {
     const rows = Object.entries(fits).flatMap(([law, f]) => Object.entries(f.parameters).map(([n, p]) => ({ law, parameter: n, value: p.value, se: p.se, low_95: p.interval_95[0], high_95: p.interval_95[1], unit: p.unit })));
     saveFile("parameters.csv", csv(Object.fromEntries(Object.keys(rows[0]).map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
-  }
-
-  #runOptions() {
-    const { trend, drift, initial, gauge, fit_rate } = this.settings;
-    if (!this.runs().length || (trend === "linear" && !drift && initial === "steady" && !gauge && !fit_rate)) return "";
-    const linear = ["offset", ...{ none: [], linear: ["trend"], quadratic: ["trend", "bend"] }[trend], ...(drift ? ["drift"] : [])];
-    const corner = gauge ? `, gauge=(1, asp.units.to_si(${JSON.stringify(gauge)}, "frequency", "gauge"))` : "";
-    const rate = fit_rate ? `, fit_rate=${JSON.stringify(fit_rate)}` : "";
-    return `    runs=inference.RunOptions(linear=${JSON.stringify(linear).replace("[", "(").replace("]", ",)")}, initial="${initial}"${corner}${rate}),\n`;
-  }
-
-  #python() {
-    const { laws, material, profile, inertia, posterior, chains, draws } = this.settings;
-    const one = laws.length === 1;
-    const list = (names) => `[${names.map((n) => `"${n}"`).join(", ")}]`;
-    const fixed = this.settings.fixed.split(/[\n;]+/).filter((l) => l.includes("=")).map((l) => l.split("=").map((p) => p.trim()));
-    const chosen = `{${fixed.map(([n, v]) => `"${n}": "${v}"`).join(", ")}}`;
-    const files = [...this.tables().map((t) => t.name), ...(this.rows().length ? ["campaign.csv"] : [])];
-    return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
-      + this.runs().map(({ name, python, question }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${question.window ? `, window=(${question.window.replace(":", ", ")})` : ""}${question.steps ? `, steps=[${question.steps.join(", ")}]` : ""}))\n`).join("")
-      + `result = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${this.#freed() ? list(this.#freed()) : "None"},\n    fixed=fixed,\n`
-      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`
-      + (posterior && one ? `posterior = inference.sample_posterior(result, chains=${Number(chains)}, draws=${Number(draws)})\n` : "");
   }
 }
 

@@ -4,7 +4,7 @@ import { Figure, series } from "../../lib/charts.js";
 import { choice } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copies } from "../../lib/save.js";
-import { Refused, run } from "../../lib/server.js";
+import { Work } from "../../lib/server.js";
 import { digits } from "../../lib/units.js";
 import { capital } from "../../lib/words.js";
 
@@ -30,8 +30,10 @@ export class ProtocolPanel {
     this.bar.hidden = true;
     this.result = el("div", { class: "card-body" });
     this.runButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Run");
-    this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
+    this.cancel = el("button", { type: "button", click: () => this.#end("Cancelled.") }, "Cancel");
     this.cancel.hidden = true;
+    this.checking = new Work((sentence) => this.#checked({ mistakes: [{ sentence, line: null }] }));
+    this.work = new Work((why) => this.#end("", why));
     this.chooser = el("div");
     this.figure = new Figure({
       name: "motion", title: "The motion", height: 420,
@@ -62,7 +64,7 @@ export class ProtocolPanel {
       this.text.value = this.protocols[n];
       this.#check();
       this.changed();
-    }).element);
+    }));
   }
 
   save(parameters) {
@@ -86,17 +88,8 @@ export class ProtocolPanel {
 
   async #check() {
     clearTimeout(this.resting);
-    this.checking?.abort();
-    this.checking = new AbortController();
-    const { signal } = this.checking;
-    try {
-      const last = await run("data/protocol", { text: this.text.value }, () => {}, signal);
-      if (!signal.aborted && last.result) this.#checked(last.result);
-    } catch (error) {
-      if (error.name === "AbortError") return;
-      if (!(error instanceof Refused)) throw error;
-      this.#checked({ mistakes: [{ sentence: error.message, line: null }] });
-    }
+    const result = await this.checking.run("data/protocol", { text: this.text.value });
+    if (result) this.#checked(result);
   }
 
   #checked({ mistakes, duration, rows, steps, records }) {
@@ -116,36 +109,34 @@ export class ProtocolPanel {
   }
 
   async start() {
-    this.work?.abort();
-    this.work = new AbortController();
     this.message.textContent = "";
     fill(this.result);
     this.cancel.hidden = false;
     this.bar.hidden = false;
     this.bar.removeAttribute("value");
     this.status.textContent = "Preparing…";
-    try {
-      const last = await run("data/run", { text: this.text.value }, (part) => {
-        if (part.waiting) this.status.textContent = "Waiting for another run…";
-        if (part.reached !== undefined) {
-          this.bar.value = part.reached / part.duration;
-          this.status.textContent = `${digits(part.reached, 3)} s of ${digits(part.duration, 3)} s`;
-        }
-      }, this.work.signal);
-      if (last.result) this.#draw(last.result);
-    } catch (error) {
-      this.status.textContent = error.name === "AbortError" ? "Cancelled." : "";
-      if (error instanceof Refused) this.message.textContent = capital(error.message);
-      else if (error.name !== "AbortError") throw error;
-    } finally {
-      this.cancel.hidden = true;
-      this.bar.hidden = true;
-    }
+    const result = await this.work.run("data/run", { text: this.text.value }, (part) => {
+      if (part.waiting) this.status.textContent = "Waiting for another run…";
+      if (part.reached !== undefined) {
+        this.bar.value = part.reached / part.duration;
+        this.status.textContent = `${digits(part.reached, 3)} s of ${digits(part.duration, 3)} s`;
+      }
+    });
+    if (result) this.#draw(result);
+  }
+
+  /** End the run: its state, and why it was refused. */
+  #end(status, message = "") {
+    this.work.stop();
+    this.cancel.hidden = true;
+    this.bar.hidden = true;
+    this.status.textContent = status;
+    this.message.textContent = message;
   }
 
   #draw(result) {
     this.shown = result;
-    this.status.textContent = result.stopped ? capital(result.stopped) : `Done: ${result.rows.toLocaleString("en")} rows.`;
+    this.#end(result.stopped ? capital(result.stopped) : `Done: ${result.rows.toLocaleString("en")} rows.`);
     fill(this.result,
       result.stability && el("p", { class: "note" }, capital(result.stability)),
       el("div", { class: "actions" }, el("button", { type: "button", class: "primary", click: () => this.read({ id: result.id, name: result.name }) }, "Read this recording")),

@@ -1,19 +1,14 @@
 // A recording: channels as understood, corrections by hand, what was measured.
 
 import { Figure, series } from "../../lib/charts.js";
-import { choice, tick } from "../../lib/controls.js";
-import { el, fill, fresh } from "../../lib/dom.js";
+import { choice, textField, tick } from "../../lib/controls.js";
+import { el, fill } from "../../lib/dom.js";
 import { copies, csv, saveFile } from "../../lib/save.js";
-import { Refused, run, sendFile } from "../../lib/server.js";
+import { Work } from "../../lib/server.js";
 import { scrolling, sections, table } from "../../lib/tables.js";
-import { digits, quantity, withDoubt } from "../../lib/units.js";
-import { capital, count, ended, names, typeset } from "../../lib/words.js";
+import { digits, quantity, withDoubt, written } from "../../lib/units.js";
+import { count, ended, names, typeset } from "../../lib/words.js";
 import { catalogue, stickSlip, stickSlipSentence } from "./stick_slip.js";
-
-const ROLE_NAMES = {
-  time: "time", W: "normal load", F: "shear force", velocity: "velocity",
-  displacement: "displacement", friction: "friction",
-};
 
 export class RecordingCard {
   constructor(page, known, state, { changed, removed }) {
@@ -35,6 +30,7 @@ export class RecordingCard {
         el("button", { type: "button", class: "quiet", "aria-label": `Remove ${this.state.name}`, click: () => this.remove() }, "Remove")),
       this.status, this.bar, this.message, this.forms, this.body);
     this.bar.hidden = true;
+    this.work = new Work((why) => this.#refused(why));
   }
 
   /** What a link holds: see `RecordingCard.restored`. */
@@ -65,7 +61,7 @@ export class RecordingCard {
     const { record, curves } = this.result.measured;
     this.traced ||= { curve: curves.friction, segments: record.segments, level: record.friction.value, load: record.load?.value ?? 1 };
     return {
-      name, python: this.recording?.python || "", recording: this.traced,
+      recording: this.traced,
       question: { recording: key, source, window: options.window || null, steps: options.steps || null, velocities: options.velocities || null },
     };
   }
@@ -76,65 +72,48 @@ export class RecordingCard {
   }
 
   remove() {
-    this.stop();
+    this.work.stop();
     this.removed();
   }
 
-  stop() {
-    this.work?.abort();
-    this.work = new AbortController();
-    return this.work.signal;
-  }
-
   async send(file) {
-    const signal = this.stop();
     this.#says("Sending…");
     this.bar.hidden = false;
-    try {
-      const sent = await sendFile("data/upload", file, (share) => { this.bar.value = share; }, signal);
-      this.state.key = sent.id;
-      await this.measure();
-    } catch (error) {
-      this.#refused(error);
-    }
+    const sent = await this.work.send("data/upload", file, (share) => { this.bar.value = share; });
+    if (!sent) return;
+    this.state.key = sent.id;
+    await this.measure();
   }
 
   async measure() {
-    const signal = this.stop();
     this.message.textContent = "";
     this.bar.hidden = false;
     this.bar.removeAttribute("value");
     this.#says("Reading…");
-    try {
-      const { source } = this.state;
-      const { mode, ...options } = this.state.options;
-      if (mode === "stick-slip") options.stick_slip = true;
-      else if (mode && mode !== "auto") options.modulated = mode === "modulated";
-      const last = await run("data/measure", { recording: this.state.key, source, options, names: names() }, (part) => {
-        if (signal.aborted) return;
-        if (part.waiting) this.#says("Waiting for another recording…");
-        if (part.stage === "measuring") this.#says("Measuring…");
-        if (part.recording) { this.recording = part.recording; this.#drawForms(); }
-      }, signal);
-      if (signal.aborted || !last.result) return;
-      this.result = last.result;
-      this.traced = null;
-      this.bar.hidden = true;
-      this.#draw();
-      this.changed();
-    } catch (error) {
-      this.#refused(error);
-    }
+    const { source } = this.state;
+    const { mode, ...options } = this.state.options;
+    if (mode === "stick-slip") options.stick_slip = true;
+    else if (mode && mode !== "auto") options.modulated = mode === "modulated";
+    if (options.harmonics) options.harmonics = written(options.harmonics);
+    const result = await this.work.run("data/measure", { recording: this.state.key, source, options, names: names() }, (part) => {
+      if (part.waiting) this.#says("Waiting for another recording…");
+      if (part.stage === "measuring") this.#says("Measuring…");
+      if (part.recording) { this.recording = part.recording; this.#drawForms(); }
+    });
+    if (!result) return;
+    this.result = result;
+    this.traced = null;
+    this.bar.hidden = true;
+    this.#draw();
+    this.changed();
   }
 
-  #refused(error) {
-    if (error.name === "AbortError") return;
-    if (!(error instanceof Refused)) throw error;
+  #refused(why) {
     this.bar.hidden = true;
     this.result = null;
     fill(this.body);
     this.#says("Not measured.", "bad");
-    this.message.textContent = capital(error.message);
+    this.message.textContent = why;
     if (this.state.key) this.#drawForms();
     this.changed();
   }
@@ -148,23 +127,21 @@ export class RecordingCard {
 
   #drawForms() {
     const { source, options } = this.state;
+    const { labels } = this.page.catalogue;
     const open = this.forms.querySelector("details")?.open;
     const again = () => { this.left.clear(); this.measure(); };
-    const text = (label, value, set, placeholder = "") => {
-      const id = fresh("field");
-      const field = el("input", {
-        type: "text", id, placeholder, spellcheck: "false", autocomplete: "off",
-        change: () => { set(field.value.trim()); again(); },
-      });
-      field.value = value ?? "";
-      return el("div", { class: "choice" }, el("label", { for: id }, label), field);
+    const set = (object, key) => (value) => {
+      if (value) object[key] = value; else delete object[key];
+      again();
     };
-    const optional = (object, key) => (value) => { if (value) object[key] = value; else delete object[key]; };
     // The server reads the texts, and says what is wrong with them.
-    const several = (key) => (value) => {
-      const texts = value.split(/[,;]+/).map((t) => t.trim()).filter(Boolean);
-      if (texts.length) options[key] = texts; else delete options[key];
-    };
+    const text = (object, key, placeholder, unit = "") =>
+      textField((labels[`measure.${key}`] || labels[key]) + unit, object[key], set(object, key), placeholder);
+    const texts = (key, placeholder, unit = "") => textField(labels[key] + unit, options[key]?.join(", "), (value) => {
+      const parts = value.split(/[,;]/).map((part) => part.trim()).filter(Boolean);
+      set(options, key)(parts.length ? parts : null);
+    }, placeholder);
+    const flag = (key) => tick(labels[key], Boolean(options[key]), set(options, key));
     const { recording } = this;
     const channels = recording ? [this.#channelTable(recording, again)] : [];
     const mode = options.mode || "auto";
@@ -173,30 +150,33 @@ export class RecordingCard {
       ...channels,
       el("form", { class: "filters", submit: (e) => e.preventDefault() },
         choice("What it is", [["auto", "recognised by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"], ["stick-slip", "stick-slip"]],
-          mode, (v) => { options.mode = v; again(); }).element,
-        text("Frequency", options.frequency, optional(options, "frequency"), "measured, or 120 Hz"),
-        tick("Take it as exact", Boolean(options.exact_frequency), (on) => { if (on) options.exact_frequency = true; else delete options.exact_frequency; again(); }).element,
-        text("Harmonics", options.harmonics, optional(options, "harmonics"), "4"),
-        text("Window (s)", options.window, optional(options, "window"), "chosen, or 10:60"),
-        tick("Whole periods only", Boolean(options.whole_periods), (on) => { if (on) options.whole_periods = true; else delete options.whole_periods; again(); }).element,
-        choice("Drift", ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", (v) => { options.detrend = v; again(); }).element,
-        text("Velocity steps (s)", options.steps?.join(", "), several("steps"), "detected, or 12.5, 60"),
-        text("Velocities between steps", options.velocities?.join(", "), several("velocities"), "measured, or 1 um/s, 10 um/s"),
-        text("Holds (s)", options.holds?.join(", "), several("holds"), "detected, or 100:110"),
-        ...[["Spring stiffness K", "stiffness", "for slips and energies, 168 N/m"], ["Pulling velocity V", "velocity", "of stick-slip, 42 um/s"], ["Mass M", "mass", "of stick-slip, 30.7 g"], ["Normal load W0", "normal_load", "M g, or 3 N"]]
-          .map(([label, key, example]) => text(label, options[key], optional(options, key), example)),
-        text("Time column", source.columns.time, optional(source.columns, "time"), "named in the file, or column 0"),
-        text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
-        text("Area", source.area, optional(source, "area"), "turns stress into force, 25 cm^2"),
-        text("Group", source.group, optional(source, "group"), "of HDF5, MATLAB, TDMS"),
-        text("File format", source.format, optional(source, "format"), "recognised, or text"),
-        text("Delimiter", source.delimiter, optional(source, "delimiter"), "detected"),
-        text("Decimal mark", source.decimal, optional(source, "decimal"), "detected"),
-        text("Derived channels", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {
+          mode, set(options, "mode")),
+        text(options, "frequency", "measured, or 120 Hz"),
+        flag("exact_frequency"),
+        text(options, "harmonics", "4"),
+        text(options, "window", "chosen, or 10:60", " (s)"),
+        flag("whole_periods"),
+        choice(labels.detrend, ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", set(options, "detrend")),
+        texts("steps", "detected, or 12.5, 60", " (s)"),
+        texts("velocities", "measured, or 1 um/s, 10 um/s"),
+        texts("holds", "detected, or 100:110", " (s)"),
+        text(options, "stiffness", "for slips and energies, 168 N/m"),
+        text(options, "velocity", "of stick-slip, 42 um/s"),
+        text(options, "mass", "of stick-slip, 30.7 g"),
+        text(options, "normal_load", "M g, or 3 N"),
+        text(source.columns, "time", "named in the file, or column 0"),
+        text(source, "rate", "from the file, or 10 kHz"),
+        text(source, "area", "turns stress into force, 25 cm^2"),
+        text(source, "group", "of HDF5, MATLAB, TDMS"),
+        text(source, "format", "recognised, or text"),
+        text(source, "delimiter", "detected"),
+        text(source, "decimal", "detected"),
+        textField("Derived channels", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {
           source.channels = Object.fromEntries(v.split(";").filter((part) => part.trim()).map((part) => {
             const [made, ...formula] = part.split("=");
             return [made.trim(), formula.join("=").trim()];
           }));
+          again();
         }, "load = A - B"))));
   }
 
@@ -212,7 +192,7 @@ export class RecordingCard {
           if (role.value) source.columns[role.value] = channel.name;
           again();
         },
-      }, [["", "–"], ...Object.entries(ROLE_NAMES)].map(([v, t]) => el("option", { value: v }, t)));
+      }, [["", "–"], ...Object.entries(this.known.roles)].map(([v, t]) => el("option", { value: v }, t)));
       role.value = roleOf(channel.name);
       const unit = el("input", {
         type: "text", class: "unit", "aria-label": `Unit of ${channel.name}`, placeholder: channel.recorded_unit || "unit",
@@ -238,25 +218,25 @@ export class RecordingCard {
   // --- Results ---------------------------------------------------------------------------------
 
   #draw() {
-    if (this.result.table) return this.#drawTable();
+    if (this.result.table) {
+      this.#drawTable();
+      return;
+    }
     const { measured } = this.result;
     const { record } = measured;
     this.#says(this.#sentence(record, measured.note), record.verdict === "ok" ? "stable" : "unstable");
-    const figures = this.#figures(measured);
     fill(this.body,
       el("div", { class: "actions" },
         copies(["Copy as Python", () => this.result.python], ["Copy as command", () => this.result.command]),
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
       record.mode === "sliding" && tick("Fit the whole recording", this.fitted, (on) => { this.fitted = on; this.changed(); },
-        "The fit below uses it, with the window, the velocity steps and the velocities above").element,
+        "The fit below uses it, with the window, the velocity steps and the velocities above"),
       measured.amplitudes && this.#amplitudes(measured),
-      el("div", { class: "panels" }, figures.list.map((f) => f.element)),
+      el("div", { class: "panels" }, this.#figures(measured).map((f) => f.element)),
       ...sections(measured.sections, ` of ${this.state.name}`),
       record.mode === "stick-slip" && catalogue(record, this.state.name),
       this.#findings());
-    for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
-    return undefined;
   }
 
   #sentence(record, note) {
@@ -283,29 +263,26 @@ export class RecordingCard {
     const amplitudes = record.harmonics.map(([a, b]) => Math.hypot(a, b));
     const bars = this.#figure("harmonics", "Harmonics", { x: amplitudes.map((_, i) => i + 1), y: amplitudes }, ["harmonic", "amplitude"]);
     const { start, end } = record.window;
-    return {
-      list: [whole, cycle, bars, spectrum],
-      charts: [
-        [whole, { x: { label: "time (s)" }, rows: [
-          { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
-          { y: { label: "F/W₀" }, marks: [start, end], lines: [{ ...curves.force, cls: series(0), name: "force" }] },
-        ] }, `Load and force; read from ${digits(start, 6)} s to ${digits(end, 6)} s.`],
-        [cycle, { x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
-          y: { label: "F/W₀ − mean" },
-          lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
-          points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0), size: 3 }],
-        }] }, "Mean cycle with the fitted harmonics."],
-        [bars, { x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: amplitudes.map((_, i) => i + 1) }, rows: [{
-          y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
-          bars: [{ x: amplitudes.map((_, i) => i + 1), y: amplitudes, cls: series(0), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])} ± ${digits(record.uncertainties[`mu${i + 1}`], 2)}` }],
-        }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", ")],
-        [spectrum, { x: { label: "frequency (Hz)" }, rows: [{
-          y: { label: "amplitude of F/W₀", log: true },
-          lines: [{ ...curves.spectrum, cls: series(5), name: "residual" }],
-          points: [{ x: amplitudes.map((_, i) => (i + 1) * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
-        }] }, "Spectrum of the residual, and the harmonics as points."],
-      ],
-    };
+    const order = amplitudes.map((_, i) => i + 1);
+    whole.draw({ x: { label: "time (s)" }, rows: [
+      { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
+      { y: { label: "F/W₀" }, marks: [start, end], lines: [{ ...curves.force, cls: series(0), name: "force" }] },
+    ] }, `Load and force; read from ${digits(start, 6)} s to ${digits(end, 6)} s.`);
+    cycle.draw({ x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
+      y: { label: "F/W₀ − mean" },
+      lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
+      points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0), size: 3 }],
+    }] }, "Mean cycle with the fitted harmonics.");
+    bars.draw({ x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: order }, rows: [{
+      y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
+      bars: [{ x: order, y: amplitudes, cls: series(0), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])} ± ${digits(record.uncertainties[`mu${i + 1}`], 2)}` }],
+    }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", "));
+    spectrum.draw({ x: { label: "frequency (Hz)" }, rows: [{
+      y: { label: "amplitude of F/W₀", log: true },
+      lines: [{ ...curves.spectrum, cls: series(5), name: "residual" }],
+      points: [{ x: order.map((n) => n * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
+    }] }, "Spectrum of the residual, and the harmonics as points.");
+    return [whole, cycle, bars, spectrum];
   }
 
   #sliding({ record, curves }) {
@@ -316,25 +293,30 @@ export class RecordingCard {
       const line = (from, to, style) => ({ x: [from, to], y: [at(from), at(to)], cls: series(1), name: `steady level and drift at ${quantity(s.velocity ?? 0, "velocity", 3)}`, ...style });
       return [line(s.start, s.steady.start, { dashed: true }), line(s.steady.start, s.end, { thick: true })];
     });
-    const rate = this.#figure("rates", "Rate dependence A − B", { x: record.steps.map((s) => s.velocity_after), y: record.steps.map((s) => s.rate_dependence) }, ["velocity after", "rate dependence"]);
-    const healing = this.#figure("healing", "Healing after holds", { x: record.holds.map((h) => h.hold_time), y: record.holds.map((h) => h.healing) }, ["hold time", "healing"]);
-    const charts = [[whole, { x: { label: "time (s)" }, rows: [{
+    whole.draw({ x: { label: "time (s)" }, rows: [{
       y: { label: "friction F/W" }, marks: record.segments.slice(1).map((s) => s.start),
       lines: [{ ...curves.friction, cls: series(5), name: "friction" }, ...levels],
       points: [{ x: record.holds.map((h) => h.peak_time), y: record.holds.map((h) => h.peak), cls: series(0), title: (i) => `peak after ${digits(record.holds[i].hold_time, 3)} s: ${digits(record.holds[i].peak, 4)}` }],
-    }] }, `Friction over time: ${count(record.steps.length, "step")}, ${count(record.holds.length, "hold")}.`]];
-    const list = [whole];
+    }] }, `Friction over time: ${count(record.steps.length, "step")}, ${count(record.holds.length, "hold")}.`);
+    const figures = [whole];
+    const dots = (figure, x, label, at, values, doubts, description) => {
+      figures.push(figure);
+      const range = [Math.min(...at) / 1.6, Math.max(...at) * 1.6];
+      figure.draw({ x: { ...x, log: true, range }, rows: [{ y: { label }, ...errorBars(at, values, doubts) }] }, description);
+    };
     if (record.steps.length) {
-      list.push(rate);
-      const at = record.steps.map((s) => Math.abs(s.velocity_after));
-      charts.push([rate, { x: { label: "velocity after the step", log: true, range: [Math.min(...at) / 1.6, Math.max(...at) * 1.6], format: (v) => quantity(v, "velocity", 3) }, rows: [{ y: { label: "A − B" }, ...errorBars(at, record.steps.map((s) => s.rate_dependence), record.steps.map((s) => s.rate_uncertainty)) }] }, "A − B of each velocity step."]);
+      const [after, rates] = ["velocity_after", "rate_dependence"].map((n) => record.steps.map((s) => s[n]));
+      dots(this.#figure("rates", "Rate dependence A − B", { x: after, y: rates }, ["velocity after", "rate dependence"]),
+        { label: "velocity after the step", format: (v) => quantity(v, "velocity", 3) }, "A − B",
+        after.map(Math.abs), rates, record.steps.map((s) => s.rate_uncertainty), "A − B of each velocity step.");
     }
     if (record.holds.length) {
-      list.push(healing);
-      const held = record.holds.map((h) => h.hold_time);
-      charts.push([healing, { x: { label: "hold time (s)", log: true, range: [Math.min(...held) / 1.6, Math.max(...held) * 1.6] }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
+      const [held, healing] = ["hold_time", "healing"].map((n) => record.holds.map((h) => h[n]));
+      dots(this.#figure("healing", "Healing after holds", { x: held, y: healing }, ["hold time", "healing"]),
+        { label: "hold time (s)" }, "healing",
+        held, healing, record.holds.map((h) => h.healing_uncertainty), "Healing against the time of each hold.");
     }
-    return { list, charts };
+    return figures;
   }
 
   #figure(kind, title, curve, [x, y]) {

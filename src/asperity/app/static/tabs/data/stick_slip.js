@@ -37,8 +37,8 @@ export function stickSlip({ record, curves }, whole) {
     return { x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks, lines: [{ ...curve, cls: series(5), name: "F/W" }, ...marked.lines], points: marked.points }] };
   };
   const changes = record.regimes.slice(1).map((r) => r.start);
-  const charts = [[whole, trace(curves.friction, events, changes), `Force over load with ${count(record.events, "slip event")} marked. ${record.regimes.map((r) => `${r.kind} from ${digits(r.start, 5)} to ${digits(r.end, 5)} s`).join("; ")}.`]];
-  const list = [whole];
+  whole.draw(trace(curves.friction, events, changes), `Force over load with ${count(record.events, "slip event")} marked. ${record.regimes.map((r) => `${r.kind} from ${digits(r.start, 5)} to ${digits(r.end, 5)} s`).join("; ")}.`);
+  const figures = [whole];
   if (curves.close) {
     const near = events.filter((e) => e.end >= curves.close.x[0] && e.onset <= curves.close.x.at(-1));
     const close = new Figure({
@@ -46,8 +46,8 @@ export function stickSlip({ record, curves }, whole) {
       columns: () => ({ time: curves.close.x, "F/W": curves.close.y }),
       caption: "The force rises while the slider sticks, and falls when it slips: the marks are onset and end of each slip.",
     });
-    list.push(close);
-    charts.push([close, trace(curves.close, near), `${count(near.length, "event")} with onsets and ends.`]);
+    close.draw(trace(curves.close, near), `${count(near.length, "event")} with onsets and ends.`);
+    figures.push(close);
   }
   const timed = events.filter((e) => e.stick_duration !== null);
   if (timed.length) {
@@ -58,8 +58,8 @@ export function stickSlip({ record, curves }, whole) {
       caption: "Within one recording a larger drop follows a longer stick without any healing, as friction varies along the track; recordings at several velocities separate healing from it.",
     });
     const range = [Math.min(...times) / 1.3, Math.max(...times) * 1.3];
-    list.push(drops);
-    charts.push([drops, {
+    figures.push(drops);
+    drops.draw({
       x: { label: "stick time (s)", log: true, range },
       rows: [{
         y: { label: "drop of F/W", range: [0, 1.08 * Math.max(...timed.map((e) => e.drop))] },
@@ -69,9 +69,9 @@ export function stickSlip({ record, curves }, whole) {
           title: (i) => `slip at ${digits(timed[i].onset, 6)} s: drop ${withDoubt(timed[i].drop, timed[i].drop_uncertainty)} after ${digits(times[i], 3)} s of stick`,
         }],
       }],
-    }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest detectable drop.`]);
+    }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest detectable drop.`);
   }
-  return { list, charts };
+  return figures;
 }
 
 /** Events with their numbers; the CSV has all. */

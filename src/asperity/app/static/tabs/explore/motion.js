@@ -1,7 +1,7 @@
 // The motion in time: computed after the last change of a slider, and drawn while it is computed.
 
 import { Figure, series } from "../../lib/charts.js";
-import { Refused, run } from "../../lib/server.js";
+import { Work } from "../../lib/server.js";
 import { digits, quantity } from "../../lib/units.js";
 import { ended, worded } from "../../lib/words.js";
 
@@ -22,12 +22,13 @@ export class MotionPanel {
       caption: "Integrated in time, with the mass of the slider, from steady sliding at 0.7 V. Dashed: the pulled end of the spring. A displacement along it is sliding; a staircase is stick-slip.",
     });
     this.element = this.figure.element;
+    this.work = new Work((sentence) => { this.figure.note.textContent = ended(sentence); });
   }
 
   /** Forget the motion, whose numbers have changed. */
   stop() {
     clearTimeout(this.timer);
-    this.work?.abort();
+    this.work.stop();
     this.motion = null;
     this.onMotion(null);
     this.element.classList.add("waiting");
@@ -40,24 +41,15 @@ export class MotionPanel {
   }
 
   async #compute(question, point) {
-    this.work?.abort();
-    this.work = new AbortController();
-    const { signal } = this.work;
     const { laws, ...operating } = question;
     this.figure.note.textContent = "Integrating the motion in time; the equations of a law are compiled first, once, which takes some seconds.";
-    try {
-      const last = await run("explore/motion", { ...operating, growth_rate: point.converged ? point.growth_rate : null }, (part) => {
-        if (!signal.aborted && part.curves) this.#draw(part, question, point, false);
-      }, signal);
-      if (!signal.aborted && last.result) this.#draw(last.result, question, point, true);
-    } catch (error) {
-      if (error.name === "AbortError") return;
-      if (!(error instanceof Refused)) throw error;
-      this.figure.note.textContent = ended(error.message);
-    }
+    const motion = await this.work.run("explore/motion", { ...operating, growth_rate: point.converged ? point.growth_rate : null }, (part) => {
+      if (part.curves) this.#draw(part, point, false);
+    });
+    if (motion) this.#draw(motion, point, true);
   }
 
-  #draw(motion, question, point, done) {
+  #draw(motion, point, done) {
     this.motion = motion;
     this.element.classList.remove("waiting");
     const { force, displacement } = motion.curves;
