@@ -21,6 +21,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large, spare_mappings
+from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
@@ -435,7 +436,7 @@ def _with_searched(
 
 
 def _add_searched_derivatives(
-    table: NDArray[np.float64],
+    table: Float,
     parameters: Parameters,
     searched: SearchedOrbits | None,
     program: Program,
@@ -569,15 +570,15 @@ class Sensitivities:
 
     parameters: tuple[str, ...]
     outcome: NDArray[np.int64]
-    mean_friction: NDArray[np.float64]
-    mu1: NDArray[np.float64]
-    mu2: NDArray[np.float64]
-    phase1: NDArray[np.float64]
-    phase2: NDArray[np.float64]
-    log_multipliers: NDArray[np.complex128]
+    mean_friction: Float
+    mu1: Float
+    mu2: Float
+    phase1: Float
+    phase2: Float
+    log_multipliers: Complex
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Whether each point was solved."""
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
@@ -653,7 +654,7 @@ def sensitivities(
     )
 
 
-def _outputs(values: ResponseValues, change: ResponseValues) -> NDArray[np.complex128]:
+def _outputs(values: ResponseValues, change: ResponseValues) -> Complex:
     """Derivatives of the outputs to one parameter, (points, outputs)."""
     relative = change.harmonics / values.harmonics
     growth, turn = relative.real * np.abs(values.harmonics), relative.imag

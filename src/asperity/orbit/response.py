@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
@@ -29,8 +30,6 @@ from asperity.slider.named import equation_parameters, equation_values, equation
 if TYPE_CHECKING:
     import xarray
 
-
-Float = NDArray[np.float64]
 
 #: Variables of the dataset with one value a point.
 _VARIABLES = (
@@ -90,8 +89,8 @@ class PeriodicResponse(Drawn):
 
     mean_friction: Float
     mu_ss: Float
-    harmonics: NDArray[np.complex128]
-    log_multipliers: NDArray[np.complex128]
+    harmonics: Complex
+    log_multipliers: Complex
     start: Float
     waveform: Float
     iterations: NDArray[np.int64]
@@ -174,7 +173,7 @@ class PeriodicResponse(Drawn):
         return np.angle(self.harmonics[..., 1])
 
     @property
-    def multipliers(self) -> NDArray[np.complex128]:
+    def multipliers(self) -> Complex:
         """Floquet multipliers; beyond the range of doubles they are inf or 0."""
         return from_logs(self.log_multipliers)
 
@@ -187,12 +186,12 @@ class PeriodicResponse(Drawn):
             return np.exp(self.log_multipliers[..., 0].real)
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Whether each point was solved."""
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Bool:
         """Whether a small perturbation dies out."""
         with np.errstate(invalid="ignore"):
             return self.converged & np.asarray(self.floquet_max < 1)

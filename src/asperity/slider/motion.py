@@ -60,7 +60,7 @@ class Motion(eqx.Module):
 
     @property
     def linear(self) -> tuple[int, ...]:
-        """Indices of the states that are not logarithms."""
+        """Index of the states that are not logarithms."""
         return tuple(i for i, log in enumerate(self.logarithmic) if not log)
 
     @property

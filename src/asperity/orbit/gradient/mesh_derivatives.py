@@ -25,6 +25,7 @@ from asperity._jax import jit_large
 from asperity._processes import kept_processes
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
+from asperity.arrays import Bool, Complex, Float
 from asperity.orbit.batches import mesh_chunk, run_chunks
 from asperity.orbit.gradient.parametrised import (
     Parameters,
@@ -44,9 +45,6 @@ from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.outcome import Outcome
 from asperity.slider.pointwise import curvature_along, slopes_along
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Number of right-hand sides that are solved together; shorter sets are padded.
 _SIDES = 8
@@ -331,7 +329,7 @@ def _in_another_process(function: Any, *arguments: Any) -> Any:
 
 
 def _response(
-    program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_], derivatives: bool
+    program: Program, parameters: dict[str, Float], wanted: Bool, derivatives: bool
 ) -> tuple[Float, NDArray[np.int64], Float]:
     """Real columns (points, count) of the response, the outcome, and derivatives of the columns.
 

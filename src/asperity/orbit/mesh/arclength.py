@@ -32,6 +32,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Float
 from asperity.orbit.mesh.equations import CondensedEquations, condensed
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import (
@@ -48,8 +49,6 @@ from asperity.orbit.mesh.newton import (
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 class ParameterLine(NamedTuple):
@@ -242,6 +241,6 @@ def arclength_step(
     return ArclengthStep(orbit, turn.point, error, result.steps, turn.cosine)
 
 
-def usable(orbit: Orbit, cosine: Float) -> NDArray[np.bool_]:
+def usable(orbit: Orbit, cosine: Float) -> Bool:
     """Whether a new mesh and tangent are finite."""
     return np.isfinite(orbit.slopes).all((0, 1, 2)) & np.isfinite(cosine)

@@ -18,7 +18,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import (
@@ -28,6 +27,7 @@ from asperity.algebra.small_systems import (
     spectral_abscissa,
     spectral_radius,
 )
+from asperity.arrays import Complex, Float
 from asperity.loads import Excitation
 from asperity.orbit.mesh.mesh import STAGES, Orbit, split
 from asperity.orbit.observables import Observables
@@ -131,8 +131,6 @@ def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
     identity = np.eye(n).reshape(n, n, *(1 for _ in widths.shape))
     return identity + widths * sum(b[k] * response[:, k] for k in range(STAGES))
 
-
-Float = NDArray[np.float64]
 
 #: Numbers of intervals that are condensed in a call, for small and large numbers of them.
 _FEW, _MANY = 576, 1728
@@ -244,9 +242,7 @@ _SMALL_EXPONENT = 1e-5
 VANISHING_GROWTH = -200.0
 
 
-def fourier_coefficients(
-    force: Float, orbit: Orbit, harmonics: int
-) -> tuple[Float, NDArray[np.complex128]]:
+def fourier_coefficients(force: Float, orbit: Orbit, harmonics: int) -> tuple[Float, Complex]:
     """Mean (..., points) and harmonics (count, ..., points) of a force, peak amplitudes.
 
     Parameters
@@ -266,9 +262,7 @@ def fourier_coefficients(
     return weighted.sum((-3, -2)), np.stack(phasors)
 
 
-def mean_and_harmonics(
-    values: PointValues, orbit: Orbit, harmonics: int
-) -> tuple[Float, NDArray[np.complex128]]:
+def mean_and_harmonics(values: PointValues, orbit: Orbit, harmonics: int) -> tuple[Float, Complex]:
     """Mean (points,) and harmonics (count, points) of F/W0, peak amplitudes."""
     mean, phasors = fourier_coefficients(values.force_rest, orbit, harmonics)
     return values.force_mean[0, 0] + mean, phasors

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
+from asperity.arrays import Bool, Float
 from asperity.orbit.batches import FEW, put, run_chunks
 from asperity.orbit.mesh.equations import (
     CondensedEquations,
@@ -40,7 +41,6 @@ from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
 
-Float = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Newton's method ends at this change; the error is then about the square of the change.
@@ -358,5 +358,5 @@ def _attempt(
     return mesh, solve(problem, mesh, _NEWTON_STEPS, patience)
 
 
-def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:
+def _where(condition: Bool, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: np.where(condition, a, b), yes, no)

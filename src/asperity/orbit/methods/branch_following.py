@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
-from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.arrays import Bool, Float, Index
+from asperity.orbit.batches import put, run_chunks, take
 from asperity.orbit.mesh.arclength import (
     ContinuationPoint,
     ParameterLine,
@@ -32,8 +33,6 @@ from asperity.orbit.methods.collocation import refine
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 #: Branches that are followed in a call; one or two, which may need by far the most steps, take half
 #: of the time in a smaller call.
@@ -74,9 +73,7 @@ _DOUBT = 1.5
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 
 
-def follow_from_steady_sliding(
-    problem: Problem, index: Indices, mesh: BranchMesh
-) -> SteadyBranches:
+def follow_from_steady_sliding(problem: Problem, index: Index, mesh: BranchMesh) -> SteadyBranches:
     """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
 
     The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
@@ -88,7 +85,7 @@ def follow_from_steady_sliding(
     return branches
 
 
-def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: int) -> PointPair:
+def _steady_pair(line: ParameterLine, points: int, index: Index, intervals: int) -> PointPair:
     system = line.origin.system
     orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
     orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
@@ -107,7 +104,7 @@ def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: in
     return pair
 
 
-def continues(share: Float, fastest: Float) -> NDArray[np.bool_]:
+def continues(share: Float, fastest: Float) -> Bool:
     """Whether to follow a branch further: it has not arrived, run away or returned to the start."""
     left = np.abs(share - 1)
     fastest = np.where(left < _NEAR, fastest - _AHEAD, fastest)
@@ -163,12 +160,12 @@ class SteadyBranches(Curves):
         return self.pair.point.t
 
     @property
-    def arrived(self) -> NDArray[np.bool_]:
+    def arrived(self) -> Bool:
         """Whether the requested amplitude was reached."""
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
-    def folded(self) -> NDArray[np.bool_]:
+    def folded(self) -> Bool:
         """Whether the branch was abandoned while it returned from its farthest fold."""
         with np.errstate(invalid="ignore"):
             back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
@@ -200,8 +197,8 @@ class SteadyBranches(Curves):
         return np.where(near, aimed, ratio) * self.span
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """Steps on the moving mesh."""
         advance = partial(moving_step, max_steps=_NEWTON_STEPS)
         inputs = (self.line, self.pair, length / self.span)
@@ -210,7 +207,7 @@ class SteadyBranches(Curves):
             converged = np.isfinite(step.error)
             yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Update folds, shares and exponents; a branch ends where it arrives or runs away."""
         step, before = attempt.next, self.pair.point.tangent.t[rows]
         turned = before * step.next.point.tangent.t[chosen] < 0
@@ -223,7 +220,7 @@ class SteadyBranches(Curves):
         self._watch(rows, share)
         return ["" if goes_on else "ended" for goes_on in continues(share, self.fastest[rows])]
 
-    def _watch(self, rows: Indices, share: Float) -> None:
+    def _watch(self, rows: Index, share: Float) -> None:
         """Extrapolate the share to where pulses run away, once they have grown enough."""
         exponent = self.fastest[rows]
         rise = exponent - self.watched_exponent[rows]
@@ -238,7 +235,7 @@ class SteadyBranches(Curves):
         self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
 
 
-def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indices) -> Float:
+def _extremum(pair: PointPair, step: MovingMeshStep, rows: Index, chosen: Index) -> Float:
     """Largest or smallest t between two points, of the cubic through values and directions."""
     t, slope = pair.point.t[rows], pair.point.tangent.t[rows]
     t_next = step.next.point.t[chosen]
@@ -268,7 +265,7 @@ class BranchFollowing(Method):
         """Any equations and load."""
         return True
 
-    def candidates(self, solution: Solution) -> Indices:
+    def candidates(self, solution: Solution) -> Index:
         """Points without an orbit, or whose orbit was lost on every finer mesh."""
         return np.flatnonzero(_without_orbit(solution))
 
@@ -288,14 +285,14 @@ class BranchFollowing(Method):
         return solution
 
 
-def _without_orbit(solution: Solution) -> NDArray[np.bool_]:
+def _without_orbit(solution: Solution) -> Bool:
     lost = (solution.outcome == Outcome.NOT_RESOLVED) & np.isinf(solution.detail)
     return np.isin(solution.outcome, WITHOUT_ORBIT) | lost
 
 
 def solve_along_branches(
     problem: Problem, solution: Solution, options: SearchOptions, mesh: BranchMesh
-) -> NDArray[np.bool_]:
+) -> Bool:
     """Refine the orbits at the ends of the branches, or give the reason why a branch has none.
 
     Returns

@@ -30,11 +30,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
+from asperity.arrays import Float
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, FEW, chunk_of, points_of, run_chunks, take
 from asperity.orbit.floquet import floquet_form
@@ -443,7 +443,5 @@ class Fourier(Method):
         return solution
 
 
-def _sample(
-    problem: Problem, orbit: FourierOrbit, *, grading: float, phases: int
-) -> NDArray[np.float64]:
+def _sample(problem: Problem, orbit: FourierOrbit, *, grading: float, phases: int) -> Float:
     return waveform(problem, orbit._replace(grading=grading), phases)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
+from asperity.arrays import Float, Index
+from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import remeshed, solve
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit, refine
@@ -18,8 +19,6 @@ from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.orbit.steady_sliding import perturbation_rate
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 #: Rate per radian of a perturbation at which the averaged limit is close enough to start from.
 _FAST_MODULATION = 0.02
@@ -41,7 +40,7 @@ class FrequencyPath(Method):
         """Any equations and load."""
         return True
 
-    def candidates(self, solution: Solution) -> Indices:
+    def candidates(self, solution: Solution) -> Index:
         """Points whose branch from steady sliding has no orbit at the requested amplitude."""
         return np.flatnonzero(np.isin(solution.outcome, WITHOUT_ORBIT))
 
@@ -56,7 +55,7 @@ class FrequencyPath(Method):
         return solution
 
 
-def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, Indices]:
+def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, Index]:
     """Orbits of the points that reach the end of their path in frequency, and these points."""
     rate, everyone = np.zeros(points), np.arange(points)
     chunk = mesh_chunk(problem.system.size)
@@ -105,8 +104,8 @@ class FrequencyPaths(Curves):
         return np.minimum(length, self.left)
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """Collocation from the orbit at a higher frequency."""
         inputs = _faster(self.problem, self.faster ** (self.left - length)), self.orbit
         for part, (moved, error) in run_chunks(
@@ -117,7 +116,7 @@ class FrequencyPaths(Curves):
             none = np.zeros(len(part))
             yield part, Attempt(moved, good, none, none, none, length[part])
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Keep the orbits; a path ends at the frequency of its point."""
         put(self.orbit, rows, take(attempt.next, chosen))
         self.left[rows] -= attempt.length[chosen]

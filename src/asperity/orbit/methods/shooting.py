@@ -25,19 +25,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import jacobian_columns, solve_columns
+from asperity.arrays import Bool, Complex, Float, Index
 from asperity.loads import Excitation, Harmonic
-from asperity.orbit.batches import Indices, run_chunks, take
+from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.methods.balance import LEAST_SWING, SWING_ORDERS, elastic_swing
 from asperity.orbit.observables import Observables, response_gap, waveform_of
-from asperity.orbit.solution import Float, Method, SearchOptions, Solution
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.limits import averaged_limit, even_phases
@@ -159,7 +159,7 @@ def _refine(
     options: SearchOptions,
     divisions: _Divisions,
     first: Float,
-    rows: Indices,
+    rows: Index,
 ) -> None:
     """Solve points on finer and finer divisions of the period until two divisions agree.
 
@@ -213,7 +213,7 @@ def _refine(
         rows = _joined(unresolved)
 
 
-def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps: Steps) -> Indices:
+def _chords(problem: Problem, first: Float, inverse: Float, rows: Index, steps: Steps) -> Index:
     """Chord steps with the matrices of a coarser division, in place; the rows left finite."""
     solve, nearly = partial(chord_step, steps=steps), []
     for _ in range(_CHORDS):
@@ -228,9 +228,7 @@ def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps
     return _joined([*nearly, rows])
 
 
-def _agreed(
-    observed: Observables, numbers: NDArray[np.complex128], logs: NDArray[np.complex128]
-) -> NDArray[np.bool_]:
+def _agreed(observed: Observables, numbers: Complex, logs: Complex) -> Bool:
     """Which points have the numbers of the division before, and Liouville's determinant."""
     determinant = np.linalg.det(np.moveaxis(observed.monodromy, -1, 0))
     with np.errstate(all="ignore"):
@@ -244,7 +242,7 @@ def _sample(
     problem: Problem,
     solution: Solution,
     first: Float,
-    rows: Indices,
+    rows: Index,
     steps: Steps,
     grading: float,
 ) -> None:
@@ -259,11 +257,11 @@ def _sample(
         solution.waveform[..., members] = samples
 
 
-def _chunk(rows: Indices) -> int:
+def _chunk(rows: Index) -> int:
     return _CHUNK if len(rows) > 3 * _FEW else _FEW
 
 
-def _joined(parts: list[Indices]) -> Indices:
+def _joined(parts: list[Index]) -> Index:
     """Rows in order, so that points of like difficulty stay together."""
     return np.sort(np.concatenate([np.empty(0, dtype=int), *parts]))
 
@@ -476,7 +474,7 @@ def _path(problem: Problem, start: Array, steps: Steps, *, count: int) -> Array:
 
 def shot_waveform(
     problem: Problem, start: Array, *, steps: Steps, count: int, grading: float, phases: int
-) -> NDArray[np.float64]:
+) -> Float:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points).
 
     By trigonometric interpolation in tau between the ends of `count` steps.
