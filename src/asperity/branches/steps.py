@@ -23,12 +23,14 @@ from asperity.algebra.continuation import STEPS, Attempt, Curves, StepControl, f
 from asperity.arrays import Complex, Float, Index
 from asperity.orbit.floquet import FOLD, kind_of_crossing, log_multipliers
 from asperity.orbit.mesh.arclength import (
-    ArclengthStep,
+    EQUIDISTRIBUTED,
+    BranchStep,
     ContinuationPoint,
     ParameterLine,
-    arclength_step,
+    branch_step,
     first_point,
     interpolated,
+    straight,
 )
 from asperity.orbit.mesh.equations import read_orbit
 from asperity.orbit.mesh.mesh import Orbit
@@ -38,8 +40,6 @@ from asperity.orbit.solution import SearchOptions
 
 #: Mesh intervals of a branch of simple period; a bifurcation is solved on three times as many.
 INTERVALS = 216
-#: A step is accepted if Newton's last change is below this; the error is about its square.
-_CONVERGED = 1e-6
 _NEWTON_STEPS = 10
 #: First step, and longest step, as shares of the span.
 _FIRST, _LARGEST_PART = 1e-3, 0.04
@@ -83,13 +83,19 @@ class BranchFollower(NamedTuple):
 
     def step(
         self, point: ContinuationPoint, length: float
-    ) -> tuple[BranchOrbit | None, ArclengthStep]:
+    ) -> tuple[BranchOrbit | None, BranchStep]:
         """The orbit at the distance `length` from `point`, None where Newton's method fails."""
         spare_mappings()
-        step = arclength_step(self.line, point, np.array([length]), max_steps=_NEWTON_STEPS)
-        if not step.error[0] < _CONVERGED:
+        step = branch_step(
+            self.line,
+            straight(point, np.ones(1)),
+            np.array([length]),
+            remeshing=EQUIDISTRIBUTED,
+            max_steps=_NEWTON_STEPS,
+        )
+        if not np.isfinite(step.error[0]):
             return None, step
-        return self.branch_orbit(step.orbit, step.next), step
+        return self.branch_orbit(step.orbit, step.next.point), step
 
     def branch_orbit(self, orbit: Orbit, point: ContinuationPoint) -> BranchOrbit:
         """Evaluate the observables of an orbit."""

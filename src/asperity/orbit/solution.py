@@ -165,9 +165,9 @@ class Method(ABC):
     block: ClassVar[int] = 2048
     on_mesh: ClassVar[bool] = True
 
-    @abstractmethod
     def suits(self, problem: Problem) -> bool:
-        """Whether the method can solve these equations under this load."""
+        """Whether the method can solve these equations under this load; by default it can any."""
+        return True
 
     def candidates(self, solution: Solution) -> Index:
         """Points that the method may solve, by their outcome so far; by default all unsolved."""

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.small_systems import jacobian_columns
+from asperity.algebra.small_systems import value_and_jacobian
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
@@ -135,8 +135,7 @@ class Motion(eqx.Module):
         """Derivatives [row, column] of the rates in steady sliding, shape (size, size, points)."""
         steady = self.steady()
         at = Excitation(jnp.ones(steady.shape[1:]))
-        _, columns = jacobian_columns(lambda Y: self.rates(Y, at), steady)
-        return jnp.stack(columns, axis=1)
+        return value_and_jacobian(lambda Y: self.rates(Y, at), steady)[1]
 
     def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
         """Factors, shape as Y, that make the rates times them as linear in Y as possible.

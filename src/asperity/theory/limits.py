@@ -30,8 +30,8 @@ from asperity.algebra.small_systems import (
     averaged,
     inverse_points,
     jacobian,
-    jacobian_columns,
     spectral_abscissa,
+    value_and_jacobian,
 )
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
@@ -189,6 +189,6 @@ def adiabatic_growth(problem: Problem) -> Array:
     system, load = problem
     Y = adiabatic_states(problem, nodes=_NODES)
     at = load.at(even_phases(_NODES) * jnp.ones(Y.shape[2]))
-    _, columns = jacobian_columns(lambda y: system.rates(y, at), Y)
-    rate = spectral_abscissa(jnp.stack(columns, axis=1))
+    _, slopes = value_and_jacobian(lambda y: system.rates(y, at), Y)
+    rate = spectral_abscissa(slopes)
     return 2 * jnp.pi * jnp.maximum(rate, 0.0).mean(0)

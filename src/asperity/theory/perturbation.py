@@ -29,7 +29,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.small_systems import jacobian_columns, solve_points
+from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.loads import Excitation
 from asperity.parameters import DRIVE, MACHINE, obeying
 from asperity.parameters.arguments import broadcast_shape, typed
@@ -209,8 +209,8 @@ def _expand(system: Motion) -> PerturbationResponse:
     def force(point: RateArguments) -> Array:
         return system.force(point[0], Excitation(*point[1:]))[None]
 
-    jacobian = jnp.stack(jacobian_columns(lambda Y: rates((Y, *steady[1:])), Y0)[1], axis=1)
-    force_gradient = jnp.stack(jacobian_columns(lambda Y: force((Y, *steady[1:])), Y0)[1])[:, 0]
+    _, jacobian = value_and_jacobian(lambda Y: rates((Y, *steady[1:])), Y0)
+    _, (force_gradient,) = value_and_jacobian(lambda Y: force((Y, *steady[1:])), Y0)
     load = (jnp.zeros_like(Y0) + 0j, one + 0j, 1j * one)
     Y1 = _harmonic_response(jacobian, _first(rates, steady, load), 1)
     u: RateArguments = (Y1, load[1], load[2])

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -37,7 +37,7 @@ from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
     advance,
-    error_of,
+    iterated,
     load_cycle,
     spectrum,
     together,
@@ -369,27 +369,18 @@ def _iterate(
     def prepare(unknowns: BalanceUnknowns) -> Prepared:
         return equations.linearised(problem, unknowns)
 
-    def unfinished(carry: tuple) -> Array:
-        _, _, change, error, steps = carry
-        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
-
-    def body(carry: tuple) -> tuple:
-        unknowns, at, last, reached, steps = carry
+    def step(state: tuple[BalanceUnknowns, Prepared], last: Array) -> tuple[Any, Array]:
+        unknowns, at = state
         far = jnp.any((last > _NEAR) & ~jnp.isnan(last))
         at = jax.lax.cond(far, prepare, lambda _: at, unknowns)
         new, change = equations.bounded_step(problem, cycle, unknowns, at)
-        error = error_of(change, last, _ROUND_OFF)
-        # Further steps change converged points by round-off only.
-        error = jnp.where(reached <= tolerance, reached, error)
-        return new, at, change, error, steps + 1
+        return (new, at), change
 
     shapes = jax.eval_shape(prepare, start)
     nothing = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
-    far = jnp.full(start.friction.shape[1], jnp.inf)
-    unknowns, at, change, error, steps = jax.lax.while_loop(
-        unfinished, body, (start, nothing, far, far, 0)
-    )
-    return unknowns, at, jnp.where(jnp.isnan(change), jnp.inf, error), steps
+    points = start.friction.shape[1]
+    state, error, steps = iterated(step, (start, nothing), points, tolerance, _ROUND_OFF, max_steps)
+    return *state, error, steps
 
 
 def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:

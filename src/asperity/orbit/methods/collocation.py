@@ -156,10 +156,6 @@ class Collocation(Method):
     name = "collocation"
     choice = "collocation"
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations and load."""
-        return True
-
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`."""
         solution = Solution.unsolved(problem, problem.system.V.shape[-1], options)

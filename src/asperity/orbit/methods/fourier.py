@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -179,11 +179,54 @@ def _largest_change(change: States, new: States, old: States, kappa: Array) -> A
     return jnp.stack([moved[0] / size, *moved[1:], *map(jnp.abs, change)]).max(0)
 
 
-def error_of(change: Array, last: Array, round_off: float) -> Array:
-    """Error after a change, from the change before: r / (1 - r) times it for contraction by r."""
-    contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-    error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-    return jnp.where(change < round_off, change, error)
+def iterated(
+    step: Callable[[Any, Array], tuple[Any, Array]],
+    start: Any,
+    points: int,
+    tolerance: float,
+    round_off: float,
+    max_steps: int,
+) -> tuple[Any, Array, Array]:
+    """Repeat a contraction until the estimated error of every point is below a tolerance.
+
+    Parameters
+    ----------
+    step : callable
+        Takes unknowns and their last change, (points,), inf before the first step; returns new
+        unknowns and their change.
+    start : pytree
+    points : int
+    tolerance : float
+        Bound on the error estimated from the observed contraction.
+    round_off : float
+        Round-off of a change.
+    max_steps : int
+
+    Returns
+    -------
+    unknowns : pytree
+    error : array, shape (points,)
+        inf where the iteration does not contract.
+    steps : array, shape ()
+    """
+
+    def unfinished(carry: tuple) -> Array:
+        _, change, error, steps = carry
+        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
+
+    def body(carry: tuple) -> tuple:
+        unknowns, last, reached, steps = carry
+        unknowns, change = step(unknowns, last)
+        # A contraction by r leaves an error of r / (1 - r) times the change.
+        r = jnp.where(jnp.isinf(last), 0.5, change / last)
+        error = jnp.where(r < 1, change * r / (1 - r), jnp.inf)
+        error = jnp.where(change < round_off, change, error)
+        # Further steps change converged points by round-off only.
+        return unknowns, change, jnp.where(reached <= tolerance, reached, error), steps + 1
+
+    far = jnp.full(points, jnp.inf)
+    unknowns, change, error, steps = jax.lax.while_loop(unfinished, body, (start, far, far, 0))
+    return unknowns, jnp.where(jnp.isnan(change), jnp.inf, error), steps
 
 
 def fourier_orbit(
@@ -227,27 +270,16 @@ def fourier_orbit(
     inverse = inverse_points(averaged.matrix)
     rates_of = rates_on(system, cycle)
     zero = (jnp.zeros((nodes, points)),) * system.size
-    far = jnp.full(points, jnp.inf)
 
-    def unfinished(carry: tuple) -> Array:
-        *_, change, error, steps = carry
-        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
-
-    def body(carry: tuple) -> tuple:
-        mean, zero_mean, last, reached, steps = carry
+    def step(unknowns: tuple[States, States], _: Array) -> tuple[tuple[States, States], Array]:
+        mean, zero_mean = unknowns
         rates, push = jax.linearize(rates_of, *together(mean, zero_mean))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
-        change = _largest_change(moved, new, zero_mean, system.kappa)
-        error = error_of(change, last, _ROUND_OFF)
-        # Further steps change converged points by round-off only.
-        return mean, new, change, jnp.where(reached <= tolerance, reached, error), steps + 1
+        return (mean, new), _largest_change(moved, new, zero_mean, system.kappa)
 
-    mean, zero_mean, change, error, steps = jax.lax.while_loop(
-        unfinished, body, (averaged.centre, zero, far, far, 0)
-    )
-    return FourierOrbit(
-        mean, zero_mean, jnp.where(jnp.isnan(change), jnp.inf, error), steps, grading
-    )
+    start = averaged.centre, zero
+    unknowns, error, steps = iterated(step, start, points, tolerance, _ROUND_OFF, max_steps)
+    return FourierOrbit(*unknowns, error, steps, grading)
 
 
 def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:

@@ -36,10 +36,6 @@ class FrequencyPath(Method):
     name = "frequency path"
     choice = "collocation"
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations and load."""
-        return True
-
     def candidates(self, solution: Solution) -> Index:
         """Points whose branch from steady sliding has no orbit at the requested amplitude."""
         return np.flatnonzero(np.isin(solution.outcome, WITHOUT_ORBIT))

@@ -67,10 +67,6 @@ class FourierSeries(Method):
     name = "series"
     choice = "series"
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations: an attempt shows which orbits are smooth."""
-        return True
-
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; only points under slow or weak modulation are tried."""
         points = np.arange(problem.system.V.shape[-1])

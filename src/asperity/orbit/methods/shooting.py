@@ -29,7 +29,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
-from asperity.algebra.small_systems import jacobian_columns, solve_columns
+from asperity.algebra.small_systems import solve_columns, value_and_jacobian
 from asperity.arrays import Bool, Complex, Float, Index
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.batches import run_chunks, take
@@ -421,8 +421,8 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
 def _trace(problem: Problem, theta: Array, states: Array) -> Array:
     """Trace of the Jacobian of the rates."""
     at = problem.load.at(theta)
-    _, columns = jacobian_columns(lambda Y: problem.system.rates(Y, at), states)
-    return sum((column[i] for i, column in enumerate(columns)), jnp.zeros_like(states[0]))
+    _, J = value_and_jacobian(lambda Y: problem.system.rates(Y, at), states)
+    return sum((J[i, i] for i in range(len(states))), jnp.zeros_like(states[0]))
 
 
 def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array) -> Array:
