@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -126,14 +126,9 @@ class ResponseFunction:
             `Outcome.INVALID`.
         """
         padded, points = self._padded(parameters)
-        self._check_known(known, points or 1, traced=_traced(padded))
-        if _traced(padded):
-            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
-        fast, searched = _orbits(self._program, padded, points or 1, known, motions=motions)
-        part = _fast_part(self._program)
-        values = _evaluate(padded, fast, None, program=part)
-        return _cut(_with_searched(values, searched, part), points)
+        orbits = self._orbits(padded, points or 1, known, motions=motions)
+        values = _evaluate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        return _cut(_with_searched(values, orbits), points)
 
     def value_and_jacobian(
         self,
@@ -166,20 +161,15 @@ class ResponseFunction:
             share is the sum over the points.
         """
         padded, points = self._padded(parameters)
-        self._check_known(known, points or 1, traced=_traced(padded))
+        orbits = self._orbits(padded, points or 1, known, every=every)
         table: Any
-        if _traced(padded):
-            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            whole, table = _differentiate(padded, fast, wanted, program=self._program)
-        else:
-            fast, searched = _orbits(self._program, padded, points or 1, known, every=every)
-            part = _fast_part(self._program)
-            whole, table = _differentiate(padded, fast, None, program=part)
-            whole = _with_searched(whole, searched, part)
+        whole, table = _differentiate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        whole = _with_searched(whole, orbits)
+        if not _traced(padded):
             outcome = np.asarray(whole.outcome)[: points or 1]
             table = np.array(table)
             if not every or (outcome == Outcome.CONVERGED).all():
-                _add_searched_derivatives(table, padded, searched, part, names)
+                _add_searched_derivatives(table, padded, orbits, names)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
         columns = zip(self._program.equations.names, cut, strict=True)
@@ -187,10 +177,42 @@ class ResponseFunction:
             n: _derivative(c, values) for n, c in columns if names is None or n in names
         }
 
-    def _check_known(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
+    def _orbits(
+        self,
+        parameters: Parameters,
+        points: int,
+        known: KnownOrbits | None,
+        *,
+        every: bool = False,
+        motions: bool | None = None,
+    ) -> _Orbits:
+        """Orbits of the first `points` points; further points are padding."""
+        program, traced = self._program, _traced(parameters)
+        if known is not None:
+            self._check_known(known, points, traced=traced)
+        if traced:
+            fast, wanted = _fast_orbits(program, jax.lax.stop_gradient(parameters))
+            return _Orbits(program, fast, wanted if program.search else None, None)
+        spare_mappings()
+        fast, wanted = _fast_orbits(program, parameters)
+        rows, searched = np.asarray(wanted) & (np.arange(len(wanted)) < points), None
+        if program.search and rows.any():
+            searched = search_orbits(
+                program.equations,
+                program.harmonics,
+                {n: np.asarray(v) for n, v in parameters.items()},
+                rows,
+                # A direct search does not resolve multipliers.
+                direct=program.search in ("direct", "coarse") and not program.multipliers,
+                coarse=program.search == "coarse",
+                motions=motions,
+                known=known,
+                every=every,
+            )
+        return _Orbits(program.without_search, fast, None, searched)
+
+    def _check_known(self, known: KnownOrbits, points: int, *, traced: bool) -> None:
         """Refuse known orbits that this call cannot take as initial guesses."""
-        if known is None:
-            return
         if traced or not self._program.search or self._program.multipliers:
             raise InputError(
                 "known must go with a search, no multipliers and parameters that are not traced; "
@@ -363,73 +385,36 @@ def _traced(parameters: Parameters) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(parameters))
 
 
-def _traced_orbits(
-    program: Program, parameters: Parameters
-) -> tuple[FastOrbits | None, Array | None]:
-    """Orbits of the fast method within a program, and a mask of the points left to the search.
+class _Orbits(NamedTuple):
+    """Orbits of all points, and the program that evaluates them."""
 
-    None for a method that the program does not have.
-    """
-    fast, wanted = _fast_orbits(program, parameters)
-    return fast, wanted if program.search else None
-
-
-def _orbits(
-    program: Program,
-    parameters: Parameters,
-    points: int,
-    known: KnownOrbits | None,
-    *,
-    every: bool = False,
-    motions: bool | None = None,
-) -> tuple[FastOrbits | None, SearchedOrbits | None]:
-    """Orbits of the first `points` points by the fast method and, of the others, by the search."""
-    spare_mappings()
-    fast, wanted = _fast_orbits(program, parameters)
-    # Further points are padding.
-    rows = np.asarray(wanted) & (np.arange(len(wanted)) < points)
-    if not program.search or not rows.any():
-        return fast, None
-    values = {n: np.asarray(v) for n, v in parameters.items()}
-    # A direct search does not resolve multipliers.
-    direct = program.search in ("direct", "coarse") and not program.multipliers
-    return fast, search_orbits(
-        program.equations,
-        program.harmonics,
-        values,
-        rows,
-        direct=direct,
-        coarse=program.search == "coarse",
-        motions=motions,
-        known=known,
-        every=every,
-    )
+    program: Program
+    #: Of the fast method; None without one.
+    fast: FastOrbits | None
+    #: Within a compiled program: mask of the points that are left to the search.
+    wanted: Array | None
+    #: Of the search, outside of compiled programs.
+    searched: SearchedOrbits | None
 
 
 def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits | None, Array]:
     """Orbits of the fast method (None without one), and a mask of the points left to the search."""
     if not has_fast_method(program):
         return None, program.equations.valid(parameters)
-    fast = fast_orbits(parameters, program=_fast_part(program))
+    fast = fast_orbits(parameters, program=program.without_search)
     return fast, fast.valid & ~fast.converged
 
 
-def _fast_part(program: Program) -> Program:
-    """The program without orbits of the search."""
-    return program._replace(search=False)
-
-
-def _with_searched(
-    values: ResponseValues, searched: SearchedOrbits | None, program: Program
-) -> ResponseValues:
+def _with_searched(values: ResponseValues, orbits: _Orbits) -> ResponseValues:
     """Values of the fast method and of the search together, NumPy arrays."""
+    searched = orbits.searched
     if searched is None:
         return values
     whole = ResponseValues(*(np.array(a) for a in values))
     missing = whole.outcome == Outcome.NO_ORBIT
     whole.outcome[missing] = searched.outcome[missing]
-    for index, orbits in searched.parts:
-        values = values_of(orbits, multipliers=program.multipliers)
+    for index, found in searched.parts:
+        values = values_of(found, multipliers=orbits.program.multipliers)
         for target, part in zip(whole, values, strict=True):
             target[index] = part
     return whole
@@ -438,16 +423,15 @@ def _with_searched(
 def _add_searched_derivatives(
     table: Float,
     parameters: Parameters,
-    searched: SearchedOrbits | None,
-    program: Program,
+    orbits: _Orbits,
     names: Collection[str] | None,
 ) -> None:
     """Write derivatives at the orbits of the search into the result of `_differentiate`."""
-    values = {n: np.asarray(v) for n, v in parameters.items()}
-    for index, orbits in searched.parts if searched else []:
-        part = {n: v[index] for n, v in values.items()}
+    program = orbits.program
+    for index, found in orbits.searched.parts if orbits.searched else []:
+        part = {n: np.asarray(v)[index] for n, v in parameters.items()}
         table[:, index] = derivatives_of(
-            program.equations, part, orbits, multipliers=program.multipliers, names=names
+            program.equations, part, found, multipliers=program.multipliers, names=names
         )
 
 

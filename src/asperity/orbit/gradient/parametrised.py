@@ -217,6 +217,11 @@ class Program(NamedTuple):
         """Number of states of the equations of motion."""
         return len(self.equations.motion.mechanical) + len(self.equations.law.state_names)
 
+    @property
+    def without_search(self) -> Program:
+        """The program without orbits of the search."""
+        return self._replace(search=False)
+
 
 Parameters = dict[str, Array]
 
