@@ -180,10 +180,15 @@ class PeriodicResponse(Drawn):
     @property
     def floquet_max(self) -> Float:
         """Largest modulus of the multipliers; 0 for a law without dynamics."""
-        if self.log_multipliers.shape[-1] == 0:
-            return np.zeros(self.mean_friction.shape)
         with np.errstate(over="ignore"):
-            return np.exp(self.log_multipliers[..., 0].real)
+            return np.exp(self._leading.real)
+
+    @property
+    def _leading(self) -> Complex:
+        """Logarithm of the leading multiplier; of a law without dynamics that of 0."""
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, complex(-np.inf, np.nan))
+        return self.log_multipliers[..., 0]
 
     @property
     def converged(self) -> Bool:
@@ -202,9 +207,7 @@ class PeriodicResponse(Drawn):
 
         "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
         """
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, "", dtype=object)
-        return kind_of_crossing(self.log_multipliers[..., 0])
+        return kind_of_crossing(self._leading)
 
     @property
     def mode_frequency(self) -> Float:
@@ -212,17 +215,12 @@ class PeriodicResponse(Drawn):
 
         Known from the monodromy up to multiples of the modulation frequency f and up to its sign.
         """
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, np.nan)
-        turn = np.abs(self.log_multipliers[..., 0].imag) / (2 * np.pi)
-        return np.asarray(turn * self.frequency)
+        return np.asarray(np.abs(self._leading.imag) / (2 * np.pi) * self.frequency)
 
     @property
     def growth_rate(self) -> Float:
         """Rate at which the leading mode grows (1/s); negative where the orbit is stable."""
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, -np.inf)
-        return np.asarray(self.log_multipliers[..., 0].real * self.frequency)
+        return np.asarray(self._leading.real * self.frequency)
 
     @property
     def result(self) -> NDArray[np.object_]:

@@ -394,25 +394,17 @@ def fast_solve(
     points = points_of(problem)
 
     def solve(block: Problem) -> tuple[Observables, Array, Array, FourierOrbit | None]:
-        observables, error, orbit = _fast_block(block, nodes, grading, harmonics)
-        return observables, error, orbit.steps, orbit if orbits else None
+        count = points_of(block)
+        orbit = fourier_orbit(
+            *block, count, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
+        )
+        observables, error = fourier_observables(*block, orbit, harmonics=harmonics)
+        each = {name: jnp.full(count, getattr(orbit, name)) for name in ("steps", "grading")}
+        return observables, error, each["steps"], orbit._replace(**each) if orbits else None
 
     blocks = jax.tree.map(lambda a: a.reshape(-1, min(points, FAST_BLOCK)), problem)
     results = jax.lax.map(solve, blocks)
     return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
-
-
-def _fast_block(
-    problem: Problem, nodes: int, grading: float, harmonics: int
-) -> tuple[Observables, Array, FourierOrbit]:
-    system, load = problem
-    points = points_of(problem)
-    orbit = fourier_orbit(
-        system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
-    )
-    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics)
-    each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
-    return observables, error, orbit._replace(**each)
 
 
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
