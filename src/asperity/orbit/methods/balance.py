@@ -55,6 +55,8 @@ _NEAR = 3e-2
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
+#: Tolerance on the error: harmonics may be much smaller than the states. Most steps on a grid.
+_TOLERANCE, _MOST_STEPS = 1e-11, 40
 #: Steps for a linear system, more than the orbit took.
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
@@ -206,6 +208,42 @@ class BalanceEquations(Equations):
         stepped, _ = self._advance(problem, cycle, unknowns, at, moved)
         return jax.tree.map(jnp.subtract, unknowns, stepped)
 
+    def orbits(
+        self, problem: Problem, harmonics: int
+    ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
+        """Iterate to the periodic orbit of every operating point, first on `FIRST_NODES` at most.
+
+        Parameters
+        ----------
+        problem : Problem
+            With inertia or damping, parameters of shape (points,).
+        harmonics : int
+            Harmonics whose truncation counts.
+
+        Returns
+        -------
+        BalanceUnknowns
+            Undefined where the error is not small.
+        Prepared
+            The linearisation that the last step used.
+        error : array, shape (points,)
+            Estimated; inf where the iteration does not converge.
+        steps : array, shape ()
+        """
+        coarse = BalanceEquations(min(self.nodes, FIRST_NODES), self.grading)
+        unknowns, steps = _start(coarse, problem), jnp.asarray(0)
+        if self.nodes > FIRST_NODES:
+            unknowns, _, _, steps = _iterate(coarse, problem, unknowns, _COARSE_TOLERANCE)
+            unknowns = _resampled(unknowns, self.nodes)
+        unknowns, prepared, error, more = _iterate(self, problem, unknowns, _TOLERANCE)
+        slow, at = together(unknowns.mean, unknowns.zero_mean), self.cycle(problem).at
+        exponent = _log_slip(problem, at, unknowns.friction, slow[1:])
+        # Where the interface sticks it has kinks, which no Fourier series resolves.
+        error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
+        for waves in (unknowns.zero_mean[0], unknowns.friction, at.w * unknowns.friction):
+            error = jnp.maximum(error, truncation(waves, harmonics))
+        return unknowns, prepared, error, steps + more
+
     def steady(self, problem: Problem) -> BalanceUnknowns:
         """Steady sliding under the mean load."""
         law, V = problem.system.slider.law, problem.system.V
@@ -304,64 +342,11 @@ def _derivative(nodes: int, grading: float) -> np.ndarray:
     return by_tau / (1 + grading * np.cos(tau))[:, None]
 
 
-class BalancedOrbit(NamedTuple):
-    """Orbits on the grid; undefined where `error` is not small."""
-
-    unknowns: BalanceUnknowns
-    prepared: Prepared
-    error: Array  # (points,): estimated; inf where the iteration does not converge
-    steps: Array
-
-
-def balanced_orbit(
-    problem: Problem,
-    *,
-    nodes: int,
-    grading: float,
-    harmonics: int,
-    tolerance: float,
-    max_steps: int,
-) -> BalancedOrbit:
-    """Iterate to the periodic orbit of every operating point.
-
-    Parameters
-    ----------
-    problem : Problem
-        With inertia or damping, parameters of shape (points,).
-    nodes : int
-        Grid points per period, even. The iteration begins on `FIRST_NODES` at most.
-    grading : float
-        g in theta = tau + g sin(tau), 0 <= g < 1.
-    harmonics : int
-        Harmonics whose truncation counts.
-    tolerance : float
-        Bound on the error estimated from the observed contraction.
-    max_steps : int
-        On each grid.
-    """
-    coarse = BalanceEquations(min(nodes, FIRST_NODES), grading)
-    unknowns, steps = _start(coarse, problem), jnp.asarray(0)
-    if nodes > FIRST_NODES:
-        unknowns, _, _, steps = _iterate(coarse, problem, unknowns, _COARSE_TOLERANCE, max_steps)
-        unknowns = _resampled(unknowns, nodes)
-    equations = BalanceEquations(nodes, grading)
-    unknowns, prepared, error, more = _iterate(equations, problem, unknowns, tolerance, max_steps)
-    slow = together(unknowns.mean, unknowns.zero_mean)
-    exponent = _log_slip(problem, equations.cycle(problem).at, unknowns.friction, slow[1:])
-    # Where the interface sticks it has kinks, which no Fourier series resolves.
-    error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
-    g = unknowns.friction
-    for waves in (unknowns.zero_mean[0], g, equations.cycle(problem).at.w * g):
-        error = jnp.maximum(error, truncation(waves, harmonics))
-    return BalancedOrbit(unknowns, prepared, error, steps + more)
-
-
 def _iterate(
     equations: BalanceEquations,
     problem: Problem,
     start: BalanceUnknowns,
     tolerance: float,
-    max_steps: int,
 ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
     """Unknowns, the linearisation that their last step used, estimated error, number of steps."""
     cycle = equations.cycle(problem)
@@ -379,7 +364,9 @@ def _iterate(
     shapes = jax.eval_shape(prepare, start)
     nothing = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
     points = start.friction.shape[1]
-    state, error, steps = iterated(step, (start, nothing), points, tolerance, _ROUND_OFF, max_steps)
+    state, error, steps = iterated(
+        step, (start, nothing), points, tolerance, _ROUND_OFF, _MOST_STEPS
+    )
     return *state, error, steps
 
 
