@@ -50,9 +50,10 @@ class Solution(NamedTuple):
     orbit: Orbit
 
     @classmethod
-    def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
+    def unsolved(cls, problem: Problem, options: SearchOptions) -> Solution:
         """A solution of a problem in which every point is unsolved."""
-        return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
+        system = problem.system
+        return cls.empty(system.size, system.V.shape[-1], options, scheme_for(system))
 
     @classmethod
     def empty(

@@ -7,10 +7,12 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.algebra.small_systems import value_and_jacobian
+from asperity.arrays import Bool
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
@@ -59,9 +61,10 @@ class Motion(eqx.Module):
         return 0.0
 
     @property
-    def linear(self) -> tuple[int, ...]:
-        """Index of the states that are not logarithms."""
-        return tuple(i for i, log in enumerate(self.logarithmic) if not log)
+    def logarithms(self) -> Bool:
+        """Mask of the states that are logarithms: those of the law are, shape (size,)."""
+        of_law = [True] * (self.size - len(self.logarithmic))
+        return np.array([*self.logarithmic, *of_law])
 
     @property
     def kappa(self) -> Array:

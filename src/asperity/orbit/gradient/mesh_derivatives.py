@@ -91,12 +91,14 @@ def orbit_derivatives(
         directions = equations.directions(given, points)
         values = collocated(problem, orbit)
         sides, forces, gradient = _slopes(problem, orbit, directions)
-        changes = _orbit_changes(orbit, values, sides)
+        response, constant = _condensed(values.jacobian, sides, orbit)
+        changes = _orbit_changes(orbit, response, constant)
         forces = forces + np.einsum("nkmb,dnkmb->dkmb", gradient, changes)
         mean, phasors = fourier_coefficients(forces, orbit, harmonics)
         columns = [np.moveaxis(np.stack([mean, *phasors.real, *phasors.imag]), 0, -1)]
         if logs is not None:
-            columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
+            linearised = values.jacobian, response
+            columns += _multiplier_columns(problem, orbit, linearised, directions, changes, logs)
         part = np.concatenate(columns, axis=-1)
     table[[name in given for name in equations.names]] = part
     return table
@@ -128,15 +130,14 @@ def _solved(
     return jnp.moveaxis(nodes[:, None] + widths * jnp.einsum("jk,nksmb->njsmb", a, bent), 2, 0)
 
 
-def _orbit_changes(orbit: Orbit, values: Any, sides: Float) -> Float:
+def _orbit_changes(orbit: Orbit, response: Float, constant: Float) -> Float:
     """Changes of the states at the collocation points, (directions, size, STAGES, ...)."""
-    response, constant = _condensed(values.jacobian, sides, orbit)
     coefficients = np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)
     parts = []
-    for start in range(0, sides.shape[2], _SIDES):
+    for start in range(0, constant.shape[2], _SIDES):
         padded = _filled(constant[:, :, start : start + _SIDES])
         parts.append(np.asarray(_solved(response, padded, orbit.widths, coefficients)))
-    return np.concatenate(parts)[: sides.shape[2]]
+    return np.concatenate(parts)[: constant.shape[2]]
 
 
 def _filled(sides: Float) -> Float:
@@ -159,18 +160,19 @@ def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Floa
 def _multiplier_columns(
     problem: Problem,
     orbit: Orbit,
-    values: Any,
+    linearised: tuple[Float, Float],
     directions: Problem,
     changes: Float,
     logs: Complex,
 ) -> list[Float]:
-    """Changes of the logarithms of the multipliers, real and imaginary parts."""
-    size, points = logs.shape
+    """Changes of the logarithms of the multipliers, real and imaginary parts.
+
+    `linearised` are the Jacobian and the response of the slopes to a change at the left node.
+    """
+    (jacobian, response), (size, points) = linearised, logs.shape
     # Two multipliers: the smaller is lost in the round-off of the larger; Liouville's sum gives it.
     pair = size == 2
     theta, states = orbit.stage_phases, orbit.stage_states
-    none = np.zeros((*orbit.slopes.shape[:2], 1, *orbit.widths.shape))
-    response, _ = condensed_jacobian(values.jacobian, none, orbit)
     maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
     right, left, gap = _eigenvectors(maps, logs)
 
@@ -183,7 +185,7 @@ def _multiplier_columns(
         bent = np.einsum("nkcmb,cmb->nkmb", response, right[j])
         inner = right[j][:, None] + orbit.widths * orbit.stage_sums(bent)
         sides = [along(k, part) for k in range(len(changes)) for part in (inner.real, inner.imag)]
-        _, constant = _condensed(values.jacobian, np.stack(sides, axis=2), orbit)
+        _, constant = _condensed(jacobian, np.stack(sides, axis=2), orbit)
         moved = orbit.widths * np.einsum("k,nkcmb->cnmb", orbit.scheme.b, constant)
         moved = moved[0::2] + 1j * moved[1::2]
         after = np.einsum("ncmb,cmb->nmb", maps, right[j])

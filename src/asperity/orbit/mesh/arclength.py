@@ -112,8 +112,7 @@ class ContinuationPoint(NamedTuple):
 def slip_units(system: Motion, values: PointValues) -> Float:
     """1/s_k, shape (n, points), from the equations at the collocation points."""
     units = np.abs(values.slip_gradient).mean((1, 2))
-    logarithmic = ~np.isin(np.arange(len(units)), system.linear)
-    return np.where(logarithmic[:, None], 1.0, units)
+    return np.where(system.logarithms[:, None], 1.0, units)
 
 
 def weighted_row(orbit: Orbit, nodes: Float, units: Float) -> Float:

@@ -132,26 +132,12 @@ class BalanceEquations(Equations):
         """Inverse of the balance, and the response to changes of the means."""
         cycle = self.cycle(problem)
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction
-        D = self.derivative
-        c = _coefficients(problem)
-        ones = jnp.ones_like(g)
-        _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
-        n, none = range(len(slow)), jnp.zeros_like(g)
-
-        def by(j: int) -> Array:
-            """Change of slip with the j-th of friction and states of the law."""
-            return push(*(ones if i == j else none for i in n))
-
-        def drag(slip: Array) -> Array:
-            return c.damping * slip + c.inertness * (D @ slip)
-
-        matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (
-            c.damping * c.elastic + c.inertness * by(0)[None]
-        )
-        diagonal = (cycle.at.w + c.ratio) + c.damping * by(0)
-        matrix = matrix + np.eye(self.nodes)[..., None] * diagonal[:, None]
-        inverse = inverse_by_elimination(matrix)
-        pulls = [ones, *(-drag(by(j)) for j in n[1:])]
+        n, ones, none = range(len(slow)), jnp.ones_like(g), jnp.zeros_like(g)
+        _, push = jax.linearize(lambda g, *Y: self._balance(problem, cycle, Y, g), g, *slow)
+        nodes = jnp.eye(self.nodes)[..., None] * ones
+        columns = jax.vmap(lambda node: push(node, *(none for _ in n)), out_axes=1)(nodes)
+        inverse = inverse_by_elimination(columns)
+        pulls = [-push(none, *(ones if i == j else none for i in n)) for j in n]
         friction = tuple(_times(inverse, pull) for pull in pulls)
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
         columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]

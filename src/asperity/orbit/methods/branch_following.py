@@ -268,14 +268,13 @@ class BranchFollowing(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; `detail` is the amplitude at which the branch ends."""
-        points = problem.system.V.shape[-1]
-        solution = Solution.unsolved(problem, points, options)
-        definite = np.zeros(points, dtype=bool)
+        solution = Solution.unsolved(problem, options)
+        definite = np.zeros_like(solution.converged)
         for mesh in self.meshes:
             rows = np.flatnonzero(_without_orbit(solution) & ~definite)
             if len(rows):
-                attempt = Solution.unsolved(problem, len(rows), options)
                 part = take(problem, rows)
+                attempt = Solution.unsolved(part, options)
                 definite[rows] = solve_along_branches(part, attempt, options, mesh)
                 solution.merge(rows, attempt)
                 options.progress(int(attempt.converged.sum()))

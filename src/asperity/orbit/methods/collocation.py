@@ -52,7 +52,7 @@ def refine(
     options : SearchOptions
     """
     size, points = orbit.centre.shape
-    coarse, previous = len(orbit.mesh) - 1, Solution.unsolved(problem, points, options)
+    coarse, previous = len(orbit.mesh) - 1, Solution.unsolved(problem, options)
     evaluate = partial(read_orbit, harmonics=options.harmonics)
     for part, initial in run_chunks(evaluate, (problem, orbit), index, mesh_chunk(size)):
         previous.store(part, initial)
@@ -158,7 +158,7 @@ class Collocation(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`."""
-        solution = Solution.unsolved(problem, problem.system.V.shape[-1], options)
+        solution = Solution.unsolved(problem, options)
         everyone = np.arange(len(solution.outcome))
         orbit, solved = orbits_from_averaged_limit(problem, everyone)
         refine(problem, solution, orbit, solved, options)

@@ -433,7 +433,7 @@ class Fourier(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; a grid gives its failures to the next, finer one."""
         points = np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(points), options)
+        solution = Solution.unsolved(problem, options)
         rate, sharpness, _ = steady_sliding(problem)
         left = points[rate < LARGEST_CONTRACTING_RATE]
         # A block runs until its slowest point has converged, so points are sorted by difficulty.

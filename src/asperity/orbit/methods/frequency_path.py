@@ -42,25 +42,25 @@ class FrequencyPath(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; an orbit that is not resolved may not exist, and is not reported."""
-        points = problem.system.V.shape[-1]
-        solution = Solution.unsolved(problem, points, options)
-        refine(problem, solution, *_orbits_from_high_frequency(problem, points), options)
+        solution = Solution.unsolved(problem, options)
+        refine(problem, solution, *_orbits_from_high_frequency(problem), options)
         lost = solution.outcome == Outcome.NOT_RESOLVED
         solution.outcome[lost], solution.detail[lost] = Outcome.NO_ORBIT, 0.0
         options.progress(int(solution.converged.sum()))
         return solution
 
 
-def _orbits_from_high_frequency(problem: Problem, points: int) -> tuple[Orbit, Index]:
+def _orbits_from_high_frequency(problem: Problem) -> tuple[Orbit, Index]:
     """Orbits of the points that reach the end of their path in frequency, and these points."""
-    rate, everyone = np.zeros(points), np.arange(points)
+    rate = np.zeros(problem.system.V.shape[-1])
+    everyone = np.arange(len(rate))
     chunk = mesh_chunk(problem.system.size)
     for part, value in run_chunks(_rate, (problem,), everyone, chunk):
         rate[part] = value
     faster = np.maximum(rate / _FAST_MODULATION, 1.0)
     orbit, rows = orbits_from_averaged_limit(_faster(problem, faster), everyone)
     paths = FrequencyPaths(problem, faster, orbit)
-    why = follow(paths, np.full(points, _FIRST_STEP), rows=rows, most=_MOST_STEPS)
+    why = follow(paths, np.full(len(rate), _FIRST_STEP), rows=rows, most=_MOST_STEPS)
     return paths.orbit, np.flatnonzero(np.array(why) == _ARRIVED)
 
 

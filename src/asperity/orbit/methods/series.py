@@ -69,15 +69,15 @@ class FourierSeries(Method):
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; only points under slow or weak modulation are tried."""
-        points = np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(points), options)
+        solution = Solution.unsolved(problem, options)
         rate, sharpness, _ = steady_sliding(problem)
         slow, weak = rate >= _SLOW, (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
         smooth = np.flatnonzero(slow | weak)
         orbit, rows = series_orbits(problem, smooth)
         if len(rows):
-            attempt = Solution.unsolved(problem, len(rows), options)
-            accept(take(problem, rows), attempt, take(orbit, rows), options)
+            part = take(problem, rows)
+            attempt = Solution.unsolved(part, options)
+            accept(part, attempt, take(orbit, rows), options)
             exact = slow[rows] | (np.abs(attempt.harmonics[:2]) > _LEAST_HARMONIC).all(0)
             options.progress(int(attempt.converged[exact].sum()))
             solution.merge(rows[exact], take(attempt, np.flatnonzero(exact)))
@@ -149,7 +149,6 @@ def _newton(problem: Problem, Y: Float, at: Index, most_steps: int) -> Index:
     """Improve the points `at` of the states in place; returns those that converged."""
     derivative = _derivative(Y.shape[1])
     system = problem.system
-    logarithms = [i for i in range(system.size) if i not in system.linear]
     excitation = excitation_at(problem.load, even_phases(Y.shape[1]) * np.ones(Y.shape[2]))
     done = []
     for count in range(1, most_steps + 1):
@@ -167,7 +166,7 @@ def _newton(problem: Problem, Y: Float, at: Index, most_steps: int) -> Index:
             break
         with np.errstate(all="ignore"):
             exponent = (values.slip_gradient[..., at] * step).sum(0)
-            change = np.abs([exponent, *step[logarithms]]).max((0, 1))
+            change = np.abs([exponent, *step[system.logarithms]]).max((0, 1))
         usable = np.isfinite(change)
         at, step, change = at[usable], step[..., usable], change[usable]
         Y[..., at] += step * np.minimum(1.0, _LARGEST_CHANGE / np.maximum(change, 1e-300))

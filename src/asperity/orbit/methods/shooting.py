@@ -140,7 +140,7 @@ class Shooting(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; slower relaxation by slip allows coarser divisions of the period."""
         size, rows = problem.system.size, np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(rows), options)
+        solution = Solution.unsolved(problem, options)
         guess, relaxation = np.empty((size, len(rows))), np.empty(len(rows))
         for members, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
             guess[:, members], relaxation[members] = values
@@ -440,8 +440,7 @@ def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array)
     array, shape (...)
     """
     _, exponent = jax.jvp(lambda Y: system.log_slip(Y, at), (states,), (step,))
-    logarithms = [step[i] for i in range(system.size) if i not in system.linear]
-    return jnp.abs(jnp.stack([exponent, *logarithms])).max(0)
+    return jnp.abs(jnp.stack([exponent, *step[system.logarithms]])).max(0)
 
 
 def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]:
