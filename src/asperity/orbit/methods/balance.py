@@ -132,13 +132,18 @@ class BalanceEquations(Equations):
         """Inverse of the balance, and the response to changes of the means."""
         cycle = self.cycle(problem)
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction
+        D, c = self.derivative, _coefficients(problem)
         n, ones, none = range(len(slow)), jnp.ones_like(g), jnp.zeros_like(g)
-        _, push = jax.linearize(lambda g, *Y: self._balance(problem, cycle, Y, g), g, *slow)
-        nodes = jnp.eye(self.nodes)[..., None] * ones
-        columns = jax.vmap(lambda node: push(node, *(none for _ in n)), out_axes=1)(nodes)
-        inverse = inverse_by_elimination(columns)
-        pulls = [-push(none, *(ones if i == j else none for i in n)) for j in n]
-        friction = tuple(_times(inverse, pull) for pull in pulls)
+        _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
+        # Change of slip with friction and with the states of the law, one after the other.
+        softening, *by_state = (push(*(ones if i == j else none for i in n)) for j in n)
+        matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (
+            c.damping * c.elastic + c.inertness * softening[None]
+        )
+        diagonal = (cycle.at.w + c.ratio) + c.damping * softening
+        inverse = inverse_by_elimination(matrix + np.eye(self.nodes)[..., None] * diagonal[:, None])
+        drags = (-c.damping * slip - c.inertness * (D @ slip) for slip in by_state)
+        friction = tuple(_times(inverse, pull) for pull in (ones, *drags))
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
         columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]
         rates = [[columns[j][i] for j in n] for i in n]
