@@ -182,14 +182,15 @@ def _multiplier_columns(
 
     result = np.zeros((len(changes), size, points), complex)
     for j in range(size - pair):
-        bent = np.einsum("nkcmb,cmb->nkmb", response, right[j])
-        inner = right[j][:, None] + orbit.widths * orbit.stage_sums(bent)
+        v, w = right[:, j], left[:, j]
+        bent = np.einsum("nkcmb,cmb->nkmb", response, v)
+        inner = v[:, None] + orbit.widths * orbit.stage_sums(bent)
         sides = [along(k, part) for k in range(len(changes)) for part in (inner.real, inner.imag)]
         _, constant = _condensed(jacobian, np.stack(sides, axis=2), orbit)
         moved = orbit.widths * np.einsum("k,nkcmb->cnmb", orbit.scheme.b, constant)
         moved = moved[0::2] + 1j * moved[1::2]
-        after = np.einsum("ncmb,cmb->nmb", maps, right[j])
-        share = (left[j] * moved).sum(1) / (left[j] * after).sum(0)
+        after = np.einsum("ncmb,cmb->nmb", maps, v)
+        share = (w * moved).sum(1) / (w * after).sum(0)
         result[:, j] = share.sum(1)
     if pair:
         units = np.broadcast_to(np.eye(size)[..., None, None, None], (size, *states.shape))
@@ -207,14 +208,14 @@ def _multiplier_columns(
     return [np.moveaxis(both, 1, 2)]
 
 
-def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Complex], Float]:
+def _eigenvectors(maps: Float, logs: Complex) -> tuple[Complex, Complex, Float]:
     """Eigenvectors that belong to `logs`, carried along the maps.
 
     Returns
     -------
-    right : list of complex array, shape (size, intervals, points)
-        At the left node of each interval, to any scale.
-    left : list of complex array
+    right : complex array, shape (size, size, intervals, points)
+        [component, multiplier] at the left node of each interval, to any scale.
+    left : complex array
         The same at the right node.
     gap : array, shape (size, points)
         Relative difference of the multipliers of the maps from the known ones.
@@ -224,27 +225,21 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
     finite = np.asarray(np.isfinite(whole).all((0, 1)))
     matrix = np.moveaxis(np.where(finite, whole, np.eye(size)[..., None]), -1, 0)
     multipliers, vectors = np.linalg.eig(matrix.astype(complex))
-    duals = np.linalg.inv(vectors)
     mesh_logs = np.where(finite[:, None], np.log(multipliers) + log_scale[:, None], np.nan)
     distance = np.abs(np.expm1(mesh_logs[:, None] - logs.T[:, :, None]))  # (points, known, mesh)
     nearest = np.argmin(np.nan_to_num(distance, nan=np.inf), axis=2)
     gap = np.take_along_axis(distance, nearest[..., None], 2)[..., 0].T
-    at = np.arange(points)
-    right, left = [], []
-    for j in range(size):
-        v, w = vectors[at, :, nearest[:, j]].T, duals[at, nearest[:, j]].T
-        forward = np.empty((size, intervals, points), complex)
-        backward = np.empty_like(forward)
-        for i in range(intervals):
-            forward[:, i] = v
-            v = np.einsum("nmb,mb->nb", maps[:, :, i], v)
-            v = v / np.abs(v).max(0)
-        for i in reversed(range(intervals)):
-            backward[:, i] = w
-            w = np.einsum("nmb,nb->mb", maps[:, :, i], w)
-            w = w / np.abs(w).max(0)
-        right.append(forward)
-        left.append(backward)
+    v = np.take_along_axis(vectors, nearest[:, None], 2).transpose(1, 2, 0)
+    w = np.take_along_axis(np.linalg.inv(vectors), nearest[..., None], 1).transpose(2, 1, 0)
+    right, left = np.empty((2, size, size, intervals, points), complex)
+    for i in range(intervals):
+        right[:, :, i] = v
+        v = np.einsum("nmb,mjb->njb", maps[:, :, i], v)
+        v = v / np.abs(v).max(0)
+    for i in reversed(range(intervals)):
+        left[:, :, i] = w
+        w = np.einsum("nmb,njb->mjb", maps[:, :, i], w)
+        w = w / np.abs(w).max(0)
     return right, left, gap
 
 

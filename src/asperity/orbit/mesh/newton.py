@@ -267,8 +267,9 @@ def solve(
     t = np.zeros(guess.nodes.shape[-1])
     few = FEW if len(t) > FEW else 0
     plane = Plane.of_fixed_parameters(guess)
-    line = partial(_fixed, problem)
-    result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few, patience=patience)
+    result = solve_in_plane(
+        lambda _: (problem, None), guess, t, plane, max_steps=max_steps, few=few, patience=patience
+    )
     # The last points of a chunk continue in a smaller chunk, whose steps take less time.
     taken = int(result.steps.max())
     left = np.flatnonzero((result.error > TOLERANCE) & (result.steps == taken))
@@ -277,10 +278,6 @@ def solve(
         for part, rest in run_chunks(again, (problem, result.orbit), left, FEW):
             put(result, part, rest._replace(steps=rest.steps + taken))
     return result
-
-
-def _fixed(problem: Problem, _: Float) -> tuple[Problem, None]:
-    return problem, None
 
 
 #: Numbers of intervals.

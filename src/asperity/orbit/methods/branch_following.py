@@ -20,7 +20,6 @@ from asperity.orbit.batches import put, run_chunks, take
 from asperity.orbit.mesh.arclength import (
     MOVING,
     BranchStep,
-    ContinuationPoint,
     ParameterLine,
     PointPair,
     amplitude_line,
@@ -29,7 +28,6 @@ from asperity.orbit.mesh.arclength import (
     straight,
 )
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
-from asperity.orbit.mesh.newton import Change
 from asperity.orbit.methods.collocation import refine
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -74,35 +72,27 @@ _DOUBT = 1.5
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 
 
-def follow_from_steady_sliding(problem: Problem, index: Index, mesh: BranchMesh) -> SteadyBranches:
-    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
+def follow_from_steady_sliding(problem: Problem, mesh: BranchMesh) -> SteadyBranches:
+    """Follow all points of `problem` (NumPy arrays) from steady sliding.
 
     The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
     before the branch is lost.
     """
-    line, points = amplitude_line(problem), len(problem.system.V)
-    branches = SteadyBranches(line, _steady_pair(line, points, index, mesh.intervals))
-    follow(branches, np.full(points, _FIRST), rows=index, most=mesh.most_steps)
-    return branches
-
-
-def _steady_pair(line: ParameterLine, points: int, index: Index, intervals: int) -> PointPair:
-    system = line.origin.system
-    orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
-    orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
+    line, system = amplitude_line(problem), problem.system
+    points = len(system.V)
+    orbit = Orbit.empty(scheme_for(system), system.size, mesh.intervals, points)
+    orbit.mesh[:] = np.linspace(0, 2 * np.pi, mesh.intervals + 1)[:, None]
     steady = jax.jit(lambda s: s.steady())(system)
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
-    t = np.zeros(points)
-    tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
-    start = ContinuationPoint(orbit, t, tangent, np.zeros_like(orbit.centre))
-    pair = jax.tree.map(np.array, PointPair(orbit, t, start))
 
     def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
         return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
 
-    for part, begun in run_chunks(begin, (line, orbit, t), index, CHUNK):
-        put(pair, part, begun)
-    return pair
+    everyone, start = np.arange(points), (line, orbit, np.zeros(points))
+    parts = [pair for _, pair in run_chunks(begin, start, everyone, CHUNK)]
+    branches = SteadyBranches(line, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts))
+    follow(branches, np.full(points, _FIRST), most=mesh.most_steps)
+    return branches
 
 
 def continues(share: Float, fastest: Float) -> Bool:
@@ -296,14 +286,13 @@ def solve_along_branches(
     bool array, shape (points,)
         Whether the outcome does not depend on the mesh.
     """
-    points = len(solution.outcome)
-    branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
+    branch = follow_from_steady_sliding(problem, mesh)
     arrived, folded = branch.arrived, branch.folded
     ran_away = ~arrived & ~folded & (branch.end < 1)
     # Of 19 branches with this below 1, none has an orbit on the finer mesh: the pulses of 15 run
     # away, at most 1.1 times as far beyond the last orbit as the limit, and 3 branches turn back.
     beyond = branch.share + _DOUBT * (branch.end - branch.share)
-    amplitude = np.broadcast_to(problem.load.amplitude, (points,))
+    amplitude = np.broadcast_to(problem.load.amplitude, arrived.shape)
     solution.detail[:] = branch.farthest
     for which, outcome, share in (
         (folded, Outcome.FOLDED, branch.fold),
