@@ -172,10 +172,11 @@ class ResponseFunction:
                 _add_searched_derivatives(table, padded, orbits, names)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
+        derivative = partial(
+            ResponseValues.of_columns, outcome=values.outcome, harmonics=self._program.harmonics
+        )
         columns = zip(self._program.equations.names, cut, strict=True)
-        return values, {
-            n: _derivative(c, values) for n, c in columns if names is None or n in names
-        }
+        return values, {n: derivative(c) for n, c in columns if names is None or n in names}
 
     def _orbits(
         self,
@@ -413,8 +414,8 @@ def _with_searched(values: ResponseValues, orbits: _Orbits) -> ResponseValues:
     whole = ResponseValues(*(np.array(a) for a in values))
     missing = whole.outcome == Outcome.NO_ORBIT
     whole.outcome[missing] = searched.outcome[missing]
-    for index, found in searched.parts:
-        values = values_of(found, multipliers=orbits.program.multipliers)
+    for index, on_mesh in searched.parts:
+        values = values_of(on_mesh, multipliers=orbits.program.multipliers)
         for target, part in zip(whole, values, strict=True):
             target[index] = part
     return whole
@@ -428,10 +429,10 @@ def _add_searched_derivatives(
 ) -> None:
     """Write derivatives at the orbits of the search into the result of `_differentiate`."""
     program = orbits.program
-    for index, found in orbits.searched.parts if orbits.searched else []:
+    for index, on_mesh in orbits.searched.parts if orbits.searched else []:
         part = {n: np.asarray(v)[index] for n, v in parameters.items()}
         table[:, index] = derivatives_of(
-            program.equations, part, found, multipliers=program.multipliers, names=names
+            program.equations, part, on_mesh, multipliers=program.multipliers, names=names
         )
 
 
@@ -476,56 +477,29 @@ def _differentiate(
 ) -> tuple[ResponseValues, Array]:
     """Values, and derivatives at each point to the parameters of that point.
 
-    The derivatives are of shape (parameters, points, columns), with a column for the mean, columns
-    for the real and the imaginary parts of the harmonics, and the same for the multipliers.
+    The derivatives are of shape (parameters, points, columns), with `ResponseValues.columns`.
     """
 
-    def evaluate(parameters: Parameters) -> tuple[Any, ResponseValues]:
+    def evaluate(parameters: Parameters) -> tuple[Array, ResponseValues]:
         values = _values(parameters, fast, wanted, program)
-        return tuple(_real(a) for a in values[:3]), values
+        return values.columns, values
 
     names = program.equations.names
     points = parameters[names[0]].shape[0]
-    shapes, values = jax.eval_shape(evaluate, parameters)
-    count = sum(s.shape[1] for s in shapes)
+    count = jax.eval_shape(evaluate, parameters)[0].shape[1]
     if count < len(names):
         _, pull, values = jax.vjp(evaluate, parameters, has_aux=True)
-        unit = _split(jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count)), shapes)
+        unit = jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count))
         (gradients,) = jax.vmap(pull)(unit)
         columns = {n: g.T for n, g in gradients.items()}
     else:
         _, push, values = jax.linearize(evaluate, parameters, has_aux=True)
         ones, zeros = jnp.ones(points), jnp.zeros(points)
         basis = {n: jnp.stack([ones if n == m else zeros for m in names]) for n in names}
-        tangents = jnp.concatenate(jax.vmap(push)(basis), axis=-1)
-        columns = dict(zip(names, tangents, strict=True))
+        columns = dict(zip(names, jax.vmap(push)(basis), strict=True))
     known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
     # One array: every output of a compiled program costs time.
     return values, known[:, None] * jnp.stack([columns[n] for n in names])
-
-
-def _real(a: Array) -> Array:
-    """Real columns, (points, columns)."""
-    flat = a.reshape(a.shape[0], -1)
-    return jnp.concatenate([flat.real, flat.imag], axis=1) if jnp.iscomplexobj(a) else flat
-
-
-def _split(a: Array, shapes: Any) -> tuple[Array, ...]:
-    ends = np.cumsum([s.shape[1] for s in shapes])[:-1]
-    return tuple(jnp.split(a, ends, axis=-1))
-
-
-def _derivative(columns: Any, values: ResponseValues) -> ResponseValues:
-    """Real columns, (points, columns) or (columns,), as a derivative of `values`."""
-    count = values.harmonics.shape[-1]
-    harmonics, logs = columns[..., 1 : 2 * count + 1], columns[..., 2 * count + 1 :]
-    states = logs.shape[-1] // 2
-    return ResponseValues(
-        columns[..., 0],
-        harmonics[..., :count] + 1j * harmonics[..., count:],
-        logs[..., :states] + 1j * logs[..., states:],
-        values.outcome,
-    )
 
 
 #: Points that are differentiated at a time, which bounds the memory.

@@ -279,11 +279,7 @@ def searched_values(parameters: Parameters, wanted: Array, program: Program) -> 
     Second derivatives are NaN. Points that are not wanted have `Outcome.NO_ORBIT`.
     """
     columns, outcome = _columns(program, parameters, wanted)
-    states = program.states if program.multipliers else 0
-    cuts = np.cumsum([1, program.harmonics, program.harmonics, states])
-    mean, *pairs = jnp.split(columns, cuts, axis=1)
-    harmonics, logs = pairs[0] + 1j * pairs[1], pairs[2] + 1j * pairs[3]
-    return ResponseValues(mean[:, 0], harmonics, logs, outcome)
+    return ResponseValues.of_columns(columns, outcome, program.harmonics)
 
 
 def _count(program: Program) -> int:
@@ -337,9 +333,7 @@ def _response(
     columns = np.zeros((points, count))
     table = np.zeros((len(equations.names) * derivatives, points, count))
     for index, part in orbits.parts:
-        values = values_of(part, multipliers=program.multipliers)
-        parts = [a for z in values[1:3] for a in (z.real, z.imag)]
-        columns[index] = np.hstack([values.mean_friction[:, None], *parts])
+        columns[index] = values_of(part, multipliers=program.multipliers).columns
         if derivatives:
             here = {n: v[index] for n, v in parameters.items()}
             table[:, index] = derivatives_of(equations, here, part, multipliers=program.multipliers)

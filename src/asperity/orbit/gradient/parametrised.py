@@ -203,6 +203,22 @@ class ResponseValues(NamedTuple):
     log_multipliers: Array
     outcome: Array
 
+    @classmethod
+    def of_columns(cls, columns: Any, outcome: Any, harmonics: int) -> ResponseValues:
+        """The inverse of `columns`, of shape (..., columns), for a number of harmonics."""
+        states = (columns.shape[-1] - 1) // 2 - harmonics
+        ends = np.cumsum([1, harmonics, harmonics, states])
+        xp = columns.__array_namespace__()
+        mean, real, imaginary, growth, turn = xp.split(columns, ends, axis=-1)
+        return cls(mean[..., 0], real + 1j * imaginary, growth + 1j * turn, outcome)
+
+    @property
+    def columns(self) -> Any:
+        """Mean, real and imaginary parts of the harmonics, then of the multipliers, as columns."""
+        parts = [a for z in (self.harmonics, self.log_multipliers) for a in (z.real, z.imag)]
+        columns = [self.mean_friction[:, None], *parts]
+        return self.mean_friction.__array_namespace__().concatenate(columns, axis=1)
+
 
 class Program(NamedTuple):
     """Static data of a compiled program: equations, outputs, and whether it may use the search."""
