@@ -312,12 +312,12 @@ def bifurcations_between(
     turned = start.direction * end.direction < 0
     if turned:
         index = min(before, after) if before != after else 0
-        critical_orbit = follower.crossing(start, _direction, (length, end))
+        critical_orbit = follower.crossing(start, criterion("fold", index), (length, end))
         if critical_orbit is not None:
             yield LocatedBifurcation("fold", critical_orbit, index, before, after)
     index, last = min(before, after), max(before, after)
     while index < last:
-        critical_orbit = follower.crossing(start, _log_modulus(index), (length, end))
+        critical_orbit = follower.crossing(start, criterion(None, index), (length, end))
         if critical_orbit is None:
             return
         kind = kind_of(critical_orbit.logs[index])
@@ -336,14 +336,11 @@ def kind_of(log: complex) -> Kind:
     return "branch point" if kind == FOLD else kind
 
 
-def criterion(kind: Kind, index: int) -> Callable[[BranchOrbit], float]:
-    """The test function of a bifurcation, which vanishes there."""
-    return _direction if kind == "fold" else _log_modulus(index)
+def criterion(kind: Kind | None, index: int) -> Callable[[BranchOrbit], float]:
+    """The test function of a bifurcation, which vanishes there.
 
-
-def _direction(branch_orbit: BranchOrbit) -> float:
-    return branch_orbit.direction
-
-
-def _log_modulus(index: int) -> Callable[[BranchOrbit], float]:
-    return lambda branch_orbit: float(branch_orbit.logs[index].real)
+    It is the direction of a fold, and otherwise ln|m| of the multiplier of this index.
+    """
+    if kind == "fold":
+        return lambda orbit: orbit.direction
+    return lambda orbit: float(orbit.logs[index].real)

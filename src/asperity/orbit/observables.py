@@ -65,8 +65,6 @@ class Observables(NamedTuple):
         monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
         # Of multipliers near 1 a matrix of their logarithms keeps more digits.
         known = np.isfinite(exponent).all((0, 1))
-        if known.all():
-            return log_multipliers_of_exponent(exponent, log_determinant)
         logs = np.empty(monodromy.shape[1:], complex)
         logs[:, known] = log_multipliers_of_exponent(exponent[..., known], log_determinant[known])
         others = monodromy[..., ~known], log_scale[~known], log_determinant[~known]

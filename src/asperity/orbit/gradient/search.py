@@ -432,13 +432,10 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
             return None
         if part.checkpoint.segment == len(programme.segments) - 1:
             parts.append(part.dense_output)
-    whole = DenseOutput(
-        np.concatenate([p.begin for p in parts]),
-        np.concatenate([p.length for p in parts]),
-        np.concatenate([p.coefficients[:, :-1] for p in parts], axis=-1),
-    )
+    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)))
     start = (_PERIODS - 1) * period
-    one, other = whole.evaluate(np.array([start, _PERIODS * period])).T
+    # The last component is the displacement, which is no state of the equations.
+    one, other = whole.evaluate(np.array([start, _PERIODS * period]))[:-1].T
     if not np.abs(other - one).max() < _SETTLED:
         return None
     last = slice(int(np.searchsorted(whole.begin, start, side="right")) - 1, None)
@@ -446,7 +443,7 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
     return DenseOutput(
         (whole.begin[last] - start) / radian,
         whole.length[last] / radian,
-        whole.coefficients[..., last],
+        whole.coefficients[:, :-1, last],
     )
 
 

@@ -14,7 +14,7 @@ the grid, and advances z and the states of the law as `asperity.orbit.methods.fo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
@@ -161,12 +161,8 @@ class BalanceEquations(Equations):
         """The next unknowns for a change of the friction, and the change of the means."""
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction + moved
         rates = self._rates(problem, cycle, slow, g)
-
-        def push(*changes: Array) -> States:
-            return apply(at.rates, changes)
-
         mean, zero_mean, change = advance(
-            cycle, at.mean_inverse, unknowns.mean, rates, push, largest
+            cycle, at.mean_inverse, unknowns.mean, rates, lambda *c: apply(at.rates, c), largest
         )
         (with_means,) = apply([list(at.friction)], change)
         return BalanceUnknowns(mean, zero_mean, g + with_means), change
@@ -341,9 +337,7 @@ def _iterate(
 ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
     """Unknowns, the linearisation that their last step used, estimated error, number of steps."""
     cycle = equations.cycle(problem)
-
-    def prepare(unknowns: BalanceUnknowns) -> Prepared:
-        return equations.linearised(problem, unknowns)
+    prepare = partial(equations.linearised, problem)
 
     def step(state: tuple[BalanceUnknowns, Prepared], last: Array) -> tuple[Any, Array]:
         unknowns, at = state

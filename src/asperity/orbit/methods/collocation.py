@@ -72,10 +72,19 @@ def refine(
         orbit, index = finer, index[~resolved[index]]
         if not len(index):
             return
+    _finish(problem, solution, orbit, index)
+
+
+def _finish(problem: Problem, solution: Solution, orbit: Orbit, index: Index) -> None:
+    """Resolve multipliers that are not resolved yet, and store the points `index` or discard them.
+
+    Outcomes of these points say which of the three they need.
+    """
     stiff = index[solution.outcome[index] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     resolve_multipliers(problem, solution, orbit, stiff)
-    _store_orbits(problem, solution, orbit, stiff[solution.converged[stiff]])
-    solution.discard(index[~solution.converged[index]])
+    converged = solution.converged[index]
+    _store_orbits(problem, solution, orbit, index[converged])
+    solution.discard(index[~converged])
 
 
 def _store_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Index) -> None:
@@ -110,18 +119,13 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     evaluate = partial(read_orbit, harmonics=options.harmonics)
     chunk = mesh_chunk(problem.system.size)
     points = np.arange(orbit.centre.shape[1])
-    stiff = []
     for part, observables in run_chunks(evaluate, (problem, orbit), points, chunk):
         logs = observables.log_multipliers
         known = extreme_multipliers(observables, logs)
         solution.store(part, observables, logs)
         solution.iterations[part] = intervals
-        stiff.append(part[~known])
-    index = np.concatenate(stiff)
-    solution.outcome[index] = Outcome.MULTIPLIERS_NOT_RESOLVED
-    resolve_multipliers(problem, solution, orbit, index)
-    _store_orbits(problem, solution, orbit, np.flatnonzero(solution.converged))
-    solution.discard(np.flatnonzero(~solution.converged))
+        solution.outcome[part[~known]] = Outcome.MULTIPLIERS_NOT_RESOLVED
+    _finish(problem, solution, orbit, points)
 
 
 def _compare(
