@@ -72,7 +72,7 @@ _DOUBT = 1.5
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 
 
-def follow_from_steady_sliding(problem: Problem, mesh: BranchMesh) -> SteadyBranches:
+def follow_from_steady_sliding(problem: Problem, mesh: BranchMesh) -> MovingBranches:
     """Follow all points of `problem` (NumPy arrays) from steady sliding.
 
     The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
@@ -84,14 +84,20 @@ def follow_from_steady_sliding(problem: Problem, mesh: BranchMesh) -> SteadyBran
     orbit.mesh[:] = np.linspace(0, 2 * np.pi, mesh.intervals + 1)[:, None]
     steady = jax.jit(lambda s: s.steady())(system)
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
+    return followed_branches(line, orbit, mesh.most_steps)
+
+
+def followed_branches(line: ParameterLine, orbit: Orbit, most_steps: int) -> MovingBranches:
+    """Branches followed from orbits at the beginning of a line of parameters towards its end."""
 
     def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
         return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
 
+    points = orbit.centre.shape[1]
     everyone, start = np.arange(points), (line, orbit, np.zeros(points))
     parts = [pair for _, pair in run_chunks(begin, start, everyone, CHUNK)]
-    branches = SteadyBranches(line, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts))
-    follow(branches, np.full(points, _FIRST), most=mesh.most_steps)
+    branches = MovingBranches(line, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts))
+    follow(branches, np.full(points, _FIRST), most=most_steps)
     return branches
 
 
@@ -102,7 +108,7 @@ def continues(share: Float, fastest: Float) -> Bool:
     return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
 
 
-class SteadyBranches(Curves):
+class MovingBranches(Curves):
     """Branches from steady sliding in the amplitude, predicted from their last two points.
 
     Attributes
