@@ -109,7 +109,9 @@ def continues(share: Float, fastest: Float) -> Bool:
 
 
 class MovingBranches(Curves):
-    """Branches from steady sliding in the amplitude, predicted from their last two points.
+    """Branches along lines of parameters on moving meshes, predicted from their last two points.
+
+    A share is the coordinate on the line: of the amplitude, for branches from steady sliding.
 
     Attributes
     ----------
@@ -119,8 +121,7 @@ class MovingBranches(Curves):
     span : array, shape (points,)
         Distance between these two.
     fold : array, shape (points,)
-        Share of the amplitude at the fold that is farthest from steady sliding, NaN where there
-        was none.
+        Share at the fold that is farthest from the beginning, NaN where there was none.
     farthest : array, shape (points,)
         Largest share on the branch.
     fastest : array, shape (points,)
@@ -144,7 +145,7 @@ class MovingBranches(Curves):
     )
 
     def __init__(self, line: ParameterLine, pair: PointPair) -> None:
-        """At steady sliding."""
+        """At the beginning of the line."""
         self.line, self.pair = line, pair
         zero = np.zeros_like(pair.t_before)
         self.span, self.fold, self.limit = zero + _FIRST, zero + np.nan, zero + np.inf
@@ -153,12 +154,12 @@ class MovingBranches(Curves):
 
     @property
     def share(self) -> Float:
-        """Share of the amplitude reached; about 1 where a branch succeeded."""
+        """Share reached; about 1 where a branch succeeded."""
         return self.pair.point.t
 
     @property
     def arrived(self) -> Bool:
-        """Whether the requested amplitude was reached."""
+        """Whether the end of the line was reached."""
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
@@ -174,7 +175,7 @@ class MovingBranches(Curves):
         return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
 
     def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
-        """Lengths that are not predicted to pass the requested amplitude.
+        """Lengths that are not predicted to pass the end of the line.
 
         The length is negative where the last step has passed it. After several failures along the
         secant the next step is predicted along the tangent.
