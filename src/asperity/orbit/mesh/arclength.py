@@ -26,7 +26,7 @@ that one compiled program serves for all of them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -293,11 +293,12 @@ def branch_step(
             line.with_slope, guess, t_guess, plane, max_steps=max_steps, tolerance=tolerance
         )
         orbit, t = result.orbit, result.t
+        before: Any = tangent.nodes
         if remeshing.moves:
-            new, before = relaid(orbit, units), tangent.nodes
+            new = relaid(orbit, units)
         else:
             new = remeshed(line.at(t), orbit, len(orbit.mesh) - 1)
-            before = interpolated(tangent.nodes, orbit.mesh, new.mesh)
+            before = interpolated(before, orbit.mesh, new.mesh)
         following, cosine, fastest = turned(line, new, t, before, tangent.t)
         step = _distance(units, guess, t_guess, point.orbit, point.t)
         t_slope = following.tangent.t

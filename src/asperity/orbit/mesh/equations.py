@@ -261,15 +261,15 @@ def read_orbit(problem: Problem, orbit: Orbit, harmonics: int) -> Observables:
         maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
         monodromy, log_scale = scaled_product(maps)
         # Where rates are so small that the order in which they act does not matter, their mean.
-        exponent = (weights * values.jacobian).sum((2, 3))
-        small = spectral_radius(exponent) < _SMALL_EXPONENT
-        log_determinant = np.trace(exponent)
+        mean_jacobian = (weights * values.jacobian).sum((2, 3))
+        small = spectral_radius(mean_jacobian) < _SMALL_EXPONENT
+        exponent = np.where(small, mean_jacobian, np.nan)
+        log_determinant = np.trace(mean_jacobian)
         # The largest eigenvalue is at least the mean of all: elsewhere it need not be known.
         growth = np.full(mean.shape, np.inf)
         for k in np.flatnonzero(log_determinant < VANISHING_GROWTH * size):
             rate = spectral_abscissa(values.jacobian[..., k])
             growth[k] = (weights[..., k] * rate).sum()
-    exponent = np.where(small, exponent, np.nan)
     return Observables(
         mean, phasors, monodromy, log_scale, log_determinant, exponent, growth, orbit.start
     )

@@ -278,8 +278,10 @@ def fourier_orbit(
         return (mean, new), _largest_change(moved, new, zero_mean, system.kappa)
 
     start = averaged.centre, zero
-    unknowns, error, steps = iterated(step, start, points, tolerance, _ROUND_OFF, max_steps)
-    return FourierOrbit(*unknowns, error, steps, grading)
+    (mean, zero_mean), error, steps = iterated(
+        step, start, points, tolerance, _ROUND_OFF, max_steps
+    )
+    return FourierOrbit(mean, zero_mean, error, steps, grading)
 
 
 def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:
