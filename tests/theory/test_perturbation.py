@@ -205,8 +205,8 @@ def test_derivative_with_respect_to_a_parameter():
         p = SmallModulation(0.5, A, BASE["B"], BASE["D0"], K, W0, 1e-6, 240 * jnp.pi)
         return ageing_response(p).mean_curvature
 
-    found, exact = (jax.jit(jax.grad(f))(0.013) for f in (curvature, expected))
-    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    derivative, exact = (jax.jit(jax.grad(f))(0.013) for f in (curvature, expected))
+    np.testing.assert_allclose(derivative, exact, rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["rice-ruina", "elasto-plastic"])
