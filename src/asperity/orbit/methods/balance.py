@@ -364,17 +364,11 @@ def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
 
 def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
     """The averaged limit of a slider that swings on its asperities without slip."""
-    system, load = problem
+    system = problem.system
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
-    cycle, c = equations.cycle(problem), _coefficients(problem)
-    swing = 1 / (cycle.at.w + c.ratio)
-    if isinstance(load, Harmonic):
-        turn = 1j * SWING_ORDERS[:, None]
-        impedance = turn * c.elastic * (turn * c.inertness + c.damping)
-        elastic, _ = elastic_swing(load, impedance, 1 + c.ratio, cycle.theta[:, None])
-        usable = (elastic * (1 + c.ratio) > LEAST_SWING).all(0)
-        swing = jnp.where(usable, elastic, swing)
-    at = cycle.at._replace(w=1 / swing - c.ratio)
+    cycle = equations.cycle(problem)
+    swing, _ = sticking_joint(problem, cycle.at, cycle.theta[:, None])
+    at = cycle.at._replace(w=1 / swing - system.compliance_ratio)
     averaged = averaged_limit(quasi_static, at, cycle.share, tolerance=_AVERAGED_TOLERANCE)
     zero = jnp.zeros_like(swing)
     friction = swing * (averaged.centre[0] + cycle.at.shear)
@@ -382,35 +376,47 @@ def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
 
 
 #: Orders of the harmonics of the elastic swing.
-SWING_ORDERS = np.arange(1, 13)
+_ORDERS = np.arange(1, 13)
 #: Smallest value of the elastic swing relative to rigid asperities; a smaller value means that the
 #: modulation is faster than the resonance of the elastic asperities, and the swing is not used.
-LEAST_SWING = 0.2
+_LEAST_SWING = 0.2
 
 
-def elastic_swing(
-    load: Harmonic, impedance: Array, carried: ArrayLike, theta: np.ndarray
+def sticking_joint(
+    problem: Problem, at: Excitation, theta: np.ndarray, softening: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
-    """F_i/W of a joint that sticks, over the force that stretches spring and joint.
+    """The swing of a slider on a joint that sticks, for a unit of elongation z of spring and joint.
 
-    Its harmonics obey (carried + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0}, a
-    three-term recurrence, whose minimal solution is a continued fraction.
+    Under a harmonic load the harmonics of F_i/W obey
+
+        (1 + l + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0},
+
+    a three-term recurrence, whose minimal solution is a continued fraction. Another load is carried
+    as without inertia and damping.
 
     Parameters
     ----------
-    load : Harmonic
-    impedance : complex array, shape (orders, points)
-        Impedance of `SWING_ORDERS`.
-    carried : array, shape (points,)
-        The same at rest.
+    problem : Problem
+    at : Excitation
+        Samples of the load, arrays of shape (nodes, points).
     theta : array, shape (nodes, 1)
+    softening : array, shape (points,)
+        Mean change of ln(v_pl) with F_i/W, by which slip relaxes the joint.
 
     Returns
     -------
-    swing : array, shape (nodes, points)
-    waves : complex array, shape (orders, nodes, points)
-        Its parts, of which the real parts count.
+    friction : array, shape (nodes, points)
+        F_i/W.
+    velocity : array, shape (nodes, points)
+        Velocity of the slider over V, less its mean.
     """
+    load, c = problem.load, _coefficients(problem)
+    rigid = 1 / (at.w + c.ratio)
+    if not isinstance(load, Harmonic):
+        return rigid, jnp.zeros_like(rigid)
+    turn, carried = 1j * _ORDERS[:, None], 1 + c.ratio
+    relaxing = turn * c.elastic + softening
+    impedance = (turn * c.inertness + c.damping) * relaxing
     half, ratios = 0.5 * load.epsilon, []
     last = jnp.zeros_like(impedance[0])
     for at_order in impedance[::-1]:
@@ -418,5 +424,8 @@ def elastic_swing(
         ratios.append(last)
     mean = 1 / (carried + 2 * half * last.real)
     harmonics = 2 * mean * jnp.cumprod(jnp.stack(ratios[::-1]), axis=0)
-    waves = harmonics[:, None] * np.exp(1j * SWING_ORDERS[:, None, None] * theta)
-    return mean + waves.real.sum(0), waves
+    waves = harmonics[:, None] * np.exp(1j * _ORDERS[:, None, None] * theta)
+    friction = mean + waves.real.sum(0)
+    usable = (friction * carried > _LEAST_SWING).all(0)
+    velocity = (waves * relaxing[:, None]).real.sum(0)
+    return jnp.where(usable, friction, rigid), jnp.where(usable, velocity, 0.0)

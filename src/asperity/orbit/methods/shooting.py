@@ -31,11 +31,11 @@ from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import solve_columns, value_and_jacobian
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.loads import Excitation, Harmonic
+from asperity.loads import Excitation
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
-from asperity.orbit.methods.balance import LEAST_SWING, SWING_ORDERS, elastic_swing
+from asperity.orbit.methods.balance import sticking_joint
 from asperity.orbit.observables import Observables, response_gap, waveform_of
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
@@ -54,23 +54,16 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     theta = 2 * np.pi * np.arange(_NODES)[:, None] / _NODES
     points = jnp.ones(jax.tree.leaves(problem)[0].shape[-1])
     at = load.at(jnp.asarray(theta))
-    w, velocity = at.w * points, jnp.zeros((_NODES, 1))
+    at = at._replace(w=at.w * points)
     softening = _softening(problem, points)
-    if isinstance(load, Harmonic):
-        relaxing = 1j * SWING_ORDERS[:, None] + system.strain * softening
-        drag = 1j * SWING_ORDERS[:, None] / system.mobility + system.damping
-        swing, waves = elastic_swing(load, drag * relaxing / system.strain, 1.0, theta)
-        usable = (swing > LEAST_SWING).all(0)
-        # Without inertia the joint carries z / (w + l): the load under which that is z G / (1 + l).
-        ratio = quasi_static.compliance_ratio
-        w = jnp.where(usable, (1 + ratio) / jnp.where(usable, swing, 1.0) - ratio, w)
-        moving = (waves * relaxing[:, None]).real.sum(0) / system.strain
-        velocity = jnp.where(usable, moving, 0.0)
+    swing, velocity = sticking_joint(problem, at, theta, softening)
+    # The load under which a joint without inertia carries as much.
+    w = 1 / swing - quasi_static.compliance_ratio
     centre = averaged_limit(quasi_static, at._replace(w=w), np.full(_NODES, 1 / _NODES)).centre
     Y = jnp.stack(centre)[:, None]
     force = quasi_static.force(Y, Excitation(points)) + 0 * w
     friction = quasi_static.friction(Y, Excitation(w))
-    mechanical = force + system.damping, 1 + velocity * force, friction
+    mechanical = force + system.damping, 1 + velocity * Y[0], friction
     states = jnp.stack(jnp.broadcast_arrays(*mechanical, *quasi_static.law_state(Y)))
     # The states of the law follow the elastic motion, by a small amount.
     orders = np.arange(1, _NODES // 2)[:, None]
