@@ -181,14 +181,7 @@ class PeriodicResponse(Drawn):
     def floquet_max(self) -> Float:
         """Largest modulus of the multipliers; 0 for a law without dynamics."""
         with np.errstate(over="ignore"):
-            return np.exp(self._leading.real)
-
-    @property
-    def _leading(self) -> Complex:
-        """Logarithm of the leading multiplier; of a law without dynamics that of 0."""
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, complex(-np.inf, np.nan))
-        return self.log_multipliers[..., 0]
+            return np.exp(_leading(self.log_multipliers).real)
 
     @property
     def converged(self) -> Bool:
@@ -207,7 +200,7 @@ class PeriodicResponse(Drawn):
 
         "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
         """
-        return kind_of_crossing(self._leading)
+        return kind_of_crossing(_leading(self.log_multipliers))
 
     @property
     def mode_frequency(self) -> Float:
@@ -215,12 +208,14 @@ class PeriodicResponse(Drawn):
 
         Known from the monodromy up to multiples of the modulation frequency f and up to its sign.
         """
-        return np.asarray(np.abs(self._leading.imag) / (2 * np.pi) * self.frequency)
+        return np.asarray(
+            np.abs(_leading(self.log_multipliers).imag) / (2 * np.pi) * self.frequency
+        )
 
     @property
     def growth_rate(self) -> Float:
         """Rate at which the leading mode grows (1/s); negative where the orbit is stable."""
-        return np.asarray(self._leading.real * self.frequency)
+        return np.asarray(_leading(self.log_multipliers).real * self.frequency)
 
     @property
     def result(self) -> NDArray[np.object_]:
@@ -320,6 +315,13 @@ class PeriodicResponse(Drawn):
             "modulation": self.load.formula,
             "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",
         }
+
+
+def _leading(logs: Complex) -> Complex:
+    """Logarithm of the leading multiplier; of a law without dynamics that of 0."""
+    if logs.shape[-1] == 0:
+        return np.full(logs.shape[:-1], complex(-np.inf, np.nan))
+    return logs[..., 0]
 
 
 def dimension_names(
