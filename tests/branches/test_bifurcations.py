@@ -69,10 +69,10 @@ def test_folds_agree_with_shooting(hysteresis, resonance):
         # Starts off the answer, so that it is not simply left where it is.
         force, age = fold.critical.point.orbit.centre[:, 0]
         start = [force * (1 + 1e-5), age + 1e-3, fold.value * 1.002]
-        found, _, flag, _ = fsolve(defect, start, full_output=True, xtol=1e-13)
+        at_fold, _, flag, _ = fsolve(defect, start, full_output=True, xtol=1e-13)
         assert flag in (1, 4, 5)  # 4, 5: no progress beyond round-off
-        assert np.abs(defect(found)).max() < 1e-9
-        assert fold.value == pytest.approx(found[2], rel=LOCATION)
+        assert np.abs(defect(at_fold)).max() < 1e-9
+        assert fold.value == pytest.approx(at_fold[2], rel=LOCATION)
 
 
 def test_period_doubling_agrees_with_shooting(hysteresis, resonance):

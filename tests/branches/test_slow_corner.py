@@ -79,7 +79,7 @@ def test_folds_of_the_amplitude_are_those_of_the_continuation(shooting):
     p = dataclasses.replace(shooting(K=1.05 * shooting(K=1.0).Kc), frequency=0.37)
     motion = equation_of_motion(p.slider, np.array([p.V]), 2 * np.pi * np.array([p.frequency]))
     problem, _ = flatten(Problem(motion, Harmonic(np.array([0.01]))))
-    followed = follow_from_steady_sliding(problem, np.arange(1), MESHES[0])
+    followed = follow_from_steady_sliding(problem, MESHES[0])
     assert followed.arrived[0]
     branch = asp.continuation(
         p.slider, parameter="epsilon", span=(0, 0.01), velocity=p.V, frequency=p.frequency

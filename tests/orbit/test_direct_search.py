@@ -53,8 +53,8 @@ def integrated(epsilon):
 
     def period(start):
         first = [*start, *np.zeros(6)]
-        found = solve_ivp(rates, (0, 2 * np.pi), first, "LSODA", rtol=1e-11, atol=1e-13)
-        return found.y[:, -1]
+        run = solve_ivp(rates, (0, 2 * np.pi), first, "LSODA", rtol=1e-11, atol=1e-13)
+        return run.y[:, -1]
 
     # Sliding is stable, so that a few periods lead to the orbit.
     start = np.array([steady * (1 + epsilon), 0.0])

@@ -51,32 +51,32 @@ def similar(triangle):
 )
 def test_two_multipliers_are_the_eigenvalues_of_the_matrix(triangle, expected):
     triangle = np.array(triangle)
-    found = logs(similar(triangle), np.log(np.linalg.det(triangle)))
+    result = logs(similar(triangle), np.log(np.linalg.det(triangle)))
     # The root of a small difference: a double eigenvalue is known to half the digits.
-    np.testing.assert_allclose(found, np.log(np.array(expected, dtype=complex)), atol=1e-7)
-    np.testing.assert_allclose(from_logs(found), expected, atol=1e-7)
+    np.testing.assert_allclose(result, np.log(np.array(expected, dtype=complex)), atol=1e-7)
+    np.testing.assert_allclose(from_logs(result), expected, atol=1e-7)
 
 
 def test_a_pair_separated_by_more_than_round_off():
     # 1e5 and 1e-30: the matrix does not know the second any more, its determinant does.
     matrix = similar(np.diag([1e5, 1e-30]))
-    found = logs(matrix, np.log(1e5) + np.log(1e-30))
-    np.testing.assert_allclose(found.real, [np.log(1e5), np.log(1e-30)], rtol=EXACT)
+    result = logs(matrix, np.log(1e5) + np.log(1e-30))
+    np.testing.assert_allclose(result.real, [np.log(1e5), np.log(1e-30)], rtol=EXACT)
     negative = logs(-matrix, np.log(1e5) + np.log(1e-30))
     np.testing.assert_allclose(from_logs(negative), [-1e5, -1e-30], rtol=1e-11)
 
 
 def test_the_logarithmic_scale_of_the_matrix_adds_to_the_logarithms():
     matrix, scale = similar(np.diag([0.8, 0.1])), 50.0
-    found = logs(matrix, np.log(0.08) + 2 * scale, log_scale=scale)
-    np.testing.assert_allclose(found.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
+    result = logs(matrix, np.log(0.08) + 2 * scale, log_scale=scale)
+    np.testing.assert_allclose(result.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_multiplier_that_overflows_keeps_its_modulus_and_has_no_argument(sign):
     scale = 800.0
-    found = logs(sign * similar(np.diag([0.8, 0.1])), np.log(0.08) + 2 * scale, log_scale=scale)
-    kept = without_lost_arguments(found)
+    result = logs(sign * similar(np.diag([0.8, 0.1])), np.log(0.08) + 2 * scale, log_scale=scale)
+    kept = without_lost_arguments(result)
     np.testing.assert_allclose(kept.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
     assert np.isnan(kept.imag).all()
     assert np.isinf(from_logs(kept)).all()
@@ -114,10 +114,10 @@ def test_the_multiplier_of_one_state_is_the_determinant():
 def test_three_multipliers_are_the_eigenvalues_of_the_matrix():
     basis = np.array([[1.0, 0.2, 0.3], [0.0, 1.0, -0.5], [0.4, 0.1, 1.0]])
     block = np.array([[0.3, 0.4, 0.0], [-0.4, 0.3, 0.0], [0.0, 0.0, -0.9]])
-    found = from_logs(logs(basis @ block @ np.linalg.inv(basis), 0.0, log_scale=2.0))
+    result = from_logs(logs(basis @ block @ np.linalg.inv(basis), 0.0, log_scale=2.0))
     expected = np.array([-0.9, 0.3 + 0.4j, 0.3 - 0.4j]) * np.exp(2.0)
-    np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
-    np.testing.assert_allclose(sorted(found[1:], key=np.imag), sorted(expected[1:], key=np.imag))
+    np.testing.assert_allclose(result[0], expected[0], rtol=1e-12)
+    np.testing.assert_allclose(sorted(result[1:], key=np.imag), sorted(expected[1:], key=np.imag))
 
 
 def trace_integral(response, V, epsilon, frequency, elastic):
@@ -214,17 +214,17 @@ def test_multipliers_beyond_what_a_coarse_mesh_resolves(reference):
         epsilon[done, None],
         *response.waveform[:, done, :: SAMPLES // 256],
     )
-    found = response.log_multipliers[done]
+    result = response.log_multipliers[done]
     # 1e3 radians and e-foldings a period: of their logarithms round-off leaves 1e-9 or so.
     expected = shot.log_multipliers
-    resolved = np.isfinite(found.real).all(axis=-1)
+    resolved = np.isfinite(result.real).all(axis=-1)
     assert resolved.sum() >= 4
-    np.testing.assert_allclose(found[resolved].real, expected[resolved].real, rtol=1e-7)
-    argument = np.abs(np.exp(1j * (found.imag - expected.imag)) - 1)
-    known = found.real < LARGEST_LOG
+    np.testing.assert_allclose(result[resolved].real, expected[resolved].real, rtol=1e-7)
+    argument = np.abs(np.exp(1j * (result.imag - expected.imag)) - 1)
+    known = result.real < LARGEST_LOG
     assert argument[known & resolved[:, None]].max() < 1e-7
     # Where no mesh resolves them, the first is a lower bound that overflows all the same.
-    bound = found[~resolved, 0].real
+    bound = result[~resolved, 0].real
     assert np.all((bound > LARGEST_LOG) & (bound <= expected[~resolved, 0].real))
 
 

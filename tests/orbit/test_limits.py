@@ -38,7 +38,7 @@ def test_points_out_of_range_name_the_limit_and_are_not_searched(units):
     with np.errstate(over="ignore"):
         V = np.minimum(V * length / time, 1e308)
     counts = []
-    found = periodic_response(
+    response = periodic_response(
         slider(*units),
         velocity=V,
         epsilon=epsilon,
@@ -46,13 +46,13 @@ def test_points_out_of_range_name_the_limit_and_are_not_searched(units):
         progress=lambda done, _: counts.append(done),
     )
     outside = len(OUTSIDE)
-    assert (found.outcome[:outside] == Outcome.OUT_OF_RANGE).all()
-    assert (found.iterations[:outside] == 0).all()
-    assert np.isnan(found.mean_friction[:outside]).all()
-    for result, (*_, words) in zip(found.result, OUTSIDE, strict=False):
+    assert (response.outcome[:outside] == Outcome.OUT_OF_RANGE).all()
+    assert (response.iterations[:outside] == 0).all()
+    assert np.isnan(response.mean_friction[:outside]).all()
+    for result, (*_, words) in zip(response.result, OUTSIDE, strict=False):
         assert result.startswith("not searched: ")
         assert words in result
-    assert found.converged[outside:].all()
+    assert response.converged[outside:].all()
     assert counts[-1] == len(V)
 
 
@@ -61,21 +61,21 @@ def test_no_method_gets_a_point_out_of_range():
     problem, _ = flatten(
         checked_problem(slider(), velocity=V, epsilon=epsilon, frequency=frequency)
     )
-    found = find_orbits(problem, SearchOptions(2))
-    assert (found.method == "").all()
+    solution = find_orbits(problem, SearchOptions(2))
+    assert (solution.method == "").all()
 
 
 def test_slow_modulation_up_to_the_limit_is_steady_sliding_under_each_load():
     V, epsilon, frequency = INSIDE[1]
-    found = periodic_response(slider(), velocity=V, epsilon=epsilon, frequency=frequency)
-    assert found.mu1 == pytest.approx(0.5 * epsilon, rel=1e-9)
+    response = periodic_response(slider(), velocity=V, epsilon=epsilon, frequency=frequency)
+    assert response.mu1 == pytest.approx(0.5 * epsilon, rel=1e-9)
 
 
 def test_a_load_of_several_harmonics_must_leave_the_contacts_loaded():
     load = modulated(epsilon=0.9, load={3: (0.0995, 0.0)})
-    found = periodic_response(slider(), velocity=1e-6, modulation=load, frequency=120.0)
-    assert found.outcome == Outcome.OUT_OF_RANGE
-    assert "0.9995" in str(found.result)
+    response = periodic_response(slider(), velocity=1e-6, modulation=load, frequency=120.0)
+    assert response.outcome == Outcome.OUT_OF_RANGE
+    assert "0.9995" in str(response.result)
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -84,6 +84,6 @@ def test_the_response_function_has_the_same_outcome(compiled):
     V, epsilon, frequency = np.transpose([row[:3] for row in OUTSIDE[2:]])
     drive = {"V": V, "epsilon": epsilon, "frequency": frequency}
     respond = asp.response_function("rice-ruina")
-    found = (jax.jit(respond) if compiled else respond)({**numbers, **drive})
-    assert (np.asarray(found.outcome) == Outcome.OUT_OF_RANGE).all()
-    assert np.isnan(np.asarray(found.mean_friction)).all()
+    response = (jax.jit(respond) if compiled else respond)({**numbers, **drive})
+    assert (np.asarray(response.outcome) == Outcome.OUT_OF_RANGE).all()
+    assert np.isnan(np.asarray(response.mean_friction)).all()

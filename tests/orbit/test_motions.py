@@ -185,7 +185,7 @@ def first_states(case, start):
 
 # The last one repeats the stiff one, of which SciPy's implicit method takes longest.
 @pytest.fixture(scope="module", params=population(CASES, short=len(CASES) - 1))
-def found(request):
+def integrated(request):
     """A case, its response, and SciPy's solution over a period from the same start."""
     case = CASES[request.param]
     response = asp.periodic_response(
@@ -212,34 +212,40 @@ def integrate(rates, start, case, scale, stiff, **options):
     return solution
 
 
-def test_the_integrated_orbit_closes_after_a_period(found):
-    gap = (found.solution.y[:, -1] - found.start) / found.scale
+def test_the_integrated_orbit_closes_after_a_period(integrated):
+    gap = (integrated.solution.y[:, -1] - integrated.start) / integrated.scale
     assert np.abs(gap).max() < 1e-6
 
 
-def test_mean_and_harmonics_are_those_of_the_integrated_force(found):
-    t = np.arange(SAMPLES) / SAMPLES / found.case.f
-    spectrum = np.fft.rfft(found.force(t, found.solution.sol(t))) / SAMPLES
-    assert found.response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
+def test_mean_and_harmonics_are_those_of_the_integrated_force(integrated):
+    t = np.arange(SAMPLES) / SAMPLES / integrated.case.f
+    spectrum = np.fft.rfft(integrated.force(t, integrated.solution.sol(t))) / SAMPLES
+    assert integrated.response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
     # Dense output is less accurate than the steps.
-    np.testing.assert_allclose(found.response.harmonics[:2], 2 * spectrum[1:3], rtol=2e-7)
+    np.testing.assert_allclose(integrated.response.harmonics[:2], 2 * spectrum[1:3], rtol=2e-7)
 
 
-def test_multipliers_are_those_of_the_integrated_monodromy_matrix(found):
+def test_multipliers_are_those_of_the_integrated_monodromy_matrix(integrated):
     """By complex steps in the start; where SciPy's method must be implicit, by real ones."""
-    case, columns = found.case, []
-    for j, size in enumerate(found.scale):
-        unit = np.eye(len(found.scale))[j] * size
+    case, columns = integrated.case, []
+    for j, size in enumerate(integrated.scale):
+        unit = np.eye(len(integrated.scale))[j] * size
         ends = [
-            integrate(found.rates, found.start + h * unit, case, found.scale, found.stiff).y[:, -1]
-            for h in ((1e-5, -1e-5) if found.stiff else (1e-30j,))
+            integrate(
+                integrated.rates,
+                integrated.start + h * unit,
+                case,
+                integrated.scale,
+                integrated.stiff,
+            ).y[:, -1]
+            for h in ((1e-5, -1e-5) if integrated.stiff else (1e-30j,))
         ]
-        change = (ends[0] - ends[1]) / 2e-5 if found.stiff else ends[0].imag / 1e-30
+        change = (ends[0] - ends[1]) / 2e-5 if integrated.stiff else ends[0].imag / 1e-30
         columns.append(change / size)
     expected = np.linalg.eigvals(np.stack(columns, axis=1))
-    multipliers = found.response.multipliers
+    multipliers = integrated.response.multipliers
     for m in multipliers[np.abs(multipliers) > 1e-3]:
-        assert np.abs(expected - m).min() < (2e-5 if found.stiff else 1e-7) * np.abs(m)
+        assert np.abs(expected - m).min() < (2e-5 if integrated.stiff else 1e-7) * np.abs(m)
 
 
 @pytest.mark.parametrize("elastic", [True, False])

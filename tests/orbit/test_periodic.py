@@ -118,8 +118,8 @@ def case(request, reference):
     return name, solved(name), shot
 
 
-def multiplier_error(found, expected):
-    return np.abs(found - expected) / np.maximum(np.abs(expected), VANISHING)
+def multiplier_error(multipliers, expected):
+    return np.abs(multipliers - expected) / np.maximum(np.abs(expected), VANISHING)
 
 
 def test_every_registered_law_is_tested():

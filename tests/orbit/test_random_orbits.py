@@ -65,10 +65,10 @@ def test_laws_of_any_number_of_states_have_the_orbits_of_scipy(states):
     slider = asp.Slider(
         ageing_over_lengths(states - 1)(mu0=MU0, A=A, B=B, D0=D0, V0=V0), spring=4 * K, load=W0
     )
-    found = asp.periodic_response(
+    response = asp.periodic_response(
         slider, velocity=V, epsilon=epsilon, frequency=FREQUENCY, methods=("collocation",)
     )
-    assert found.result[()] == "converged"
+    assert response.result[()] == "converged"
 
     def rates(t, y):
         w = 1 + epsilon * np.cos(2 * np.pi * FREQUENCY * t)
@@ -79,18 +79,18 @@ def test_laws_of_any_number_of_states_have_the_orbits_of_scipy(states):
         span = (0, 1 / FREQUENCY)
         return solve_ivp(rates, span, start, "DOP853", rtol=1e-12, atol=1e-14, **options)
 
-    run = period(found.start, dense_output=True)
-    assert run.y[:, -1] == pytest.approx(found.start, abs=1e-9)
+    run = period(response.start, dense_output=True)
+    assert run.y[:, -1] == pytest.approx(response.start, abs=1e-9)
     force = run.sol(np.arange(SAMPLES) / SAMPLES / FREQUENCY)[0]
     spectrum = np.fft.rfft(force) / SAMPLES
-    assert found.mean_friction == pytest.approx(spectrum[0].real, rel=PROMISED)
-    np.testing.assert_allclose(found.harmonics[:2], 2 * spectrum[1:3], rtol=CLOSED)
-    ends = [period(found.start + 1e-30j * unit).y[:, -1].imag / 1e-30 for unit in np.eye(states)]
+    assert response.mean_friction == pytest.approx(spectrum[0].real, rel=PROMISED)
+    np.testing.assert_allclose(response.harmonics[:2], 2 * spectrum[1:3], rtol=CLOSED)
+    ends = [period(response.start + 1e-30j * unit).y[:, -1].imag / 1e-30 for unit in np.eye(states)]
     expected = np.linalg.eigvals(np.stack(ends, axis=1))
     expected = expected[np.argsort(-np.abs(expected))]
     largest = np.abs(expected) > 1e-6
     np.testing.assert_allclose(
-        np.abs(found.multipliers)[largest], np.abs(expected)[largest], rtol=PROMISED
+        np.abs(response.multipliers)[largest], np.abs(expected)[largest], rtol=PROMISED
     )
 
 
@@ -137,36 +137,36 @@ def random_orbit(law, seed):
     )
 
 
-def assert_orbit(found, motion):
+def assert_orbit(response, motion):
     """The states return after a period of these equations, and the force has these harmonics."""
-    load = found.load
+    load = response.load
     rates = jax.jit(lambda theta, Y: motion.rates(Y, load.at(theta)))
     force = jax.jit(jax.vmap(lambda theta, Y: motion.force(Y, load.at(theta))))
     span = (0, 2 * np.pi)
-    run = solve_ivp(rates, span, found.start, "LSODA", rtol=1e-11, atol=1e-13, dense_output=True)
+    run = solve_ivp(rates, span, response.start, "LSODA", rtol=1e-11, atol=1e-13, dense_output=True)
     assert run.success
     # What SciPy errs by grows as disturbances do.
-    accuracy = CLOSED * max(1.0, float(found.floquet_max))
+    accuracy = CLOSED * max(1.0, float(response.floquet_max))
     # Relative to the largest of the period: a velocity may pass zero where it begins.
-    gap = np.abs(run.y[:, -1] - found.start) / np.maximum(np.abs(run.y).max(1), 1e-3)
+    gap = np.abs(run.y[:, -1] - response.start) / np.maximum(np.abs(run.y).max(1), 1e-3)
     assert gap.max() < accuracy
     theta = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
     spectrum = np.fft.rfft(np.asarray(force(theta, run.sol(theta).T))) / SAMPLES
-    assert found.mean_friction == pytest.approx(spectrum[0].real, rel=accuracy)
-    assert np.abs(found.harmonics[:2] - 2 * spectrum[1:3]).max() < 100 * accuracy * found.mu1
+    assert response.mean_friction == pytest.approx(spectrum[0].real, rel=accuracy)
+    assert np.abs(response.harmonics[:2] - 2 * spectrum[1:3]).max() < 100 * accuracy * response.mu1
 
 
 @pytest.mark.parametrize("seed", population(10))
 @pytest.mark.parametrize("law", LAWS)
 def test_a_random_orbit_obeys_the_equations(law, seed):
-    found = random_orbit(law, seed)
-    assert found.result[()] == "converged"
-    assert_orbit(found, found.motion)
+    response = random_orbit(law, seed)
+    assert response.result[()] == "converged"
+    assert_orbit(response, response.motion)
 
 
 @pytest.mark.parametrize("planted", ["V", "omega"])
 def test_an_orbit_of_equations_changed_by_a_thousandth_is_detected(planted):
-    found = random_orbit("rice-ruina", 0)
-    other = {planted: 1.001 * getattr(found.motion, planted)}
+    response = random_orbit("rice-ruina", 0)
+    other = {planted: 1.001 * getattr(response.motion, planted)}
     with pytest.raises(AssertionError):
-        assert_orbit(found, dataclasses.replace(found.motion, **other))
+        assert_orbit(response, dataclasses.replace(response.motion, **other))

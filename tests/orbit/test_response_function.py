@@ -208,9 +208,9 @@ class TestElastoPlastic:
         wide = response_function("elasto-plastic", least_points=5)
         assert [wide.compiled_points(n) for n in (1, 8, 9)] == [8, 8, 16]
         few = {n: v[:3] if np.ndim(v) else v for n, v in self.parameters.items()}
-        expected, found = self.model(few), wide(few)
-        np.testing.assert_allclose(force(found), force(expected), rtol=ROUND_OFF)
-        assert found.mean_friction.shape == (3,)
+        expected, padded = self.model(few), wide(few)
+        np.testing.assert_allclose(force(padded), force(expected), rtol=ROUND_OFF)
+        assert padded.mean_friction.shape == (3,)
 
     def test_a_point_without_an_orbit_is_nan_and_does_not_affect_others(self):
         # Slow modulation, which the fast method leaves to the search.
@@ -226,8 +226,8 @@ class TestElastoPlastic:
     def test_a_traced_value_that_breaks_its_rule_is_invalid(self):
         moved = self.arrays() | {"A": np.array([0.013, -0.013, 0.013, 0.013])}
         outcome = jax.jit(lambda p: self.plain(p).outcome)(moved)
-        found, invalid = Outcome.CONVERGED, Outcome.INVALID
-        assert np.asarray(outcome).tolist() == [found, invalid, found, found]
+        good, invalid = Outcome.CONVERGED, Outcome.INVALID
+        assert np.asarray(outcome).tolist() == [good, invalid, good, good]
 
     @pytest.mark.parametrize(
         ("change", "message"),
@@ -415,9 +415,9 @@ def test_each_orbit_of_the_search_is_differentiated_on_a_mesh_that_resolves_it(m
     searched = []
 
     def search(*arguments, **options):
-        found = search_orbits(*arguments, **options)
-        searched.extend(found.parts)
-        return found
+        orbits = search_orbits(*arguments, **options)
+        searched.extend(orbits.parts)
+        return orbits
 
     monkeypatch.setattr(differentiable, "search_orbits", search)
     monkeypatch.setattr(search_module, "MESHES", (16, 48))

@@ -79,7 +79,7 @@ def differences(name, drive):
 
 
 @pytest.fixture(scope="module", params=LAWS)
-def found(request):
+def case(request):
     """Sensitivities at all drives of a law, and its name."""
     numbers = numbers_of(request.param, np.transpose(DRIVES[request.param]))
     result = sensitivities(
@@ -91,8 +91,8 @@ def found(request):
     return request.param, result
 
 
-def test_derivatives_have_the_names_and_shapes_of_the_parameters(found):
-    name, result = found
+def test_derivatives_have_the_names_and_shapes_of_the_parameters(case):
+    name, result = case
     expected = (*law_parameters(LAWS[name][0]), "K", "W0", "M", "V", "frequency", "epsilon")
     assert result.parameters == expected
     assert result.converged.all()
@@ -101,9 +101,9 @@ def test_derivatives_have_the_names_and_shapes_of_the_parameters(found):
     assert result.log_multipliers.shape == (count, 2, len(expected))
 
 
-@pytest.mark.parametrize(("found", "row"), CASES, indirect=["found"])
-def test_every_derivative_agrees_with_differences(found, row):
-    name, result = found
+@pytest.mark.parametrize(("case", "row"), CASES, indirect=["case"])
+def test_every_derivative_agrees_with_differences(case, row):
+    name, result = case
     numbers = numbers_of(name, DRIVES[name][row])
     expected = differences(name, DRIVES[name][row])
     scalars = np.stack([getattr(result, output)[row] for output in SCALARS], axis=1)
@@ -117,16 +117,16 @@ def test_every_derivative_agrees_with_differences(found, row):
     assert worst.max() < DIFFERENCES, dict(zip(numbers, worst.max(1), strict=True))
 
 
-def test_derivatives_to_the_mass_vanish_without_inertia(found):
-    _, result = found
+def test_derivatives_to_the_mass_vanish_without_inertia(case):
+    _, result = case
     at = result.parameters.index("M")
     for output in (*SCALARS, "log_multipliers"):
         assert not getattr(result, output)[..., at].any()
 
 
-def test_derivatives_obey_scaling_of_length_time_and_force(found):
+def test_derivatives_obey_scaling_of_length_time_and_force(case):
     # F/W0 has no unit: lengths, times and forces may be scaled without any effect.
-    name, result = found
+    name, result = case
     numbers = numbers_of(name, np.transpose(DRIVES[name]))
     numbers["lambda"] = LAWS[name][1].get("lambda_")
     length = {"D0": 1, "V0": 1, "V": 1, "lambda": 1, "K": -1}
@@ -145,8 +145,8 @@ def test_derivatives_obey_scaling_of_length_time_and_force(found):
             assert (np.abs(terms.sum(0)) < 1e-9 * np.abs(terms).max(0)).all()
 
 
-def test_derivatives_at_small_modulation_are_those_of_perturbation_theory(found):
-    name, _ = found
+def test_derivatives_at_small_modulation_are_those_of_perturbation_theory(case):
+    name, _ = case
     epsilon = 1e-4
     numbers = numbers_of(name, (1e-5, 120.0, epsilon))
     drive = {"velocity": numbers["V"], "frequency": numbers["frequency"]}
@@ -166,8 +166,8 @@ def test_derivatives_at_small_modulation_are_those_of_perturbation_theory(found)
     assert by_name["V0"] == pytest.approx((0.026 - 0.013) / 1e-6, rel=1e-5)
 
 
-def test_one_point_has_no_axes(found):
-    name, several = found
+def test_one_point_has_no_axes(case):
+    name, several = case
     numbers = numbers_of(name, DRIVES[name][0])
     one = sensitivities(
         slider(name, numbers),
@@ -182,8 +182,8 @@ def test_one_point_has_no_axes(found):
     np.testing.assert_allclose(one.mu1 * size, terms, rtol=0, atol=1e-8 * np.abs(terms).max())
 
 
-def test_bad_input_is_refused(found):
-    name, _ = found
+def test_bad_input_is_refused(case):
+    name, _ = case
     chosen = slider(name, numbers_of(name, DRIVES[name][0]))
     with pytest.raises(InputError, match="epsilon must be at least 0 and below 1"):
         sensitivities(chosen, velocity=1e-6, epsilon=1.0, frequency=120.0)

@@ -50,9 +50,9 @@ def test_exact_response_equals_an_integration(reference, case):
     same = ("mu", "A", "B", "D0", "K", "W0", "V", "omega", "M", "alpha", "lambda_")
     p = cf.SmallModulation(**{name: getattr(printed, name) for name in same})
     response = ageing_response(p, printed.ageing)
-    found = np.array([response.mean_curvature, response.transfer, response.second_harmonic])
+    coefficients = np.array([response.mean_curvature, response.transfer, response.second_harmonic])
     # Two amplitudes of 1e-3 and 5e-4 leave (eps mu/A)^4 = 2e-6 of the coefficient.
-    np.testing.assert_allclose(found, reference.expansion(printed), rtol=2e-5)
+    np.testing.assert_allclose(coefficients, reference.expansion(printed), rtol=2e-5)
 
 
 def test_second_harmonic_derived_is_right_and_printed_is_not(reference):

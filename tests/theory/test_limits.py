@@ -39,9 +39,9 @@ def growth(stiffness, epsilon, frequency):
 @pytest.mark.parametrize("epsilon", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize("stiffness", [0.05, 0.7, 1.2])
 def test_growth_is_that_of_the_eigenvalues(stiffness, epsilon):
-    found = adiabatic_growth(problem(stiffness * KC, epsilon, 0.5))
+    exponent = adiabatic_growth(problem(stiffness * KC, epsilon, 0.5))
     # The rate has a kink where growth sets in.
-    assert found[0] == pytest.approx(growth(stiffness * KC, epsilon, 0.5), rel=1e-3, abs=1e-12)
+    assert exponent[0] == pytest.approx(growth(stiffness * KC, epsilon, 0.5), rel=1e-3, abs=1e-12)
 
 
 def test_states_are_steady_under_the_load_of_their_phase():

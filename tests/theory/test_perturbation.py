@@ -15,6 +15,7 @@ from asperity.laws import (
     RiceRuina,
     StrengthArea,
 )
+from asperity.laws.uneven_track import on_uneven_track
 from asperity.slider import QuasiStatic, Slider
 from asperity.theory.ageing_response import ageing_response
 from asperity.theory.closed_forms import (
@@ -204,8 +205,8 @@ def test_derivative_with_respect_to_a_parameter():
         p = SmallModulation(0.5, A, BASE["B"], BASE["D0"], K, W0, 1e-6, 240 * jnp.pi)
         return ageing_response(p).mean_curvature
 
-    found, exact = (jax.jit(jax.grad(f))(0.013) for f in (curvature, expected))
-    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    derivative, exact = (jax.jit(jax.grad(f))(0.013) for f in (curvature, expected))
+    np.testing.assert_allclose(derivative, exact, rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["rice-ruina", "elasto-plastic"])
@@ -254,3 +255,10 @@ def test_bad_input_is_named(bad, message):
     slider = Slider(LAWS["rice-ruina"][0], spring=K, load=W0)
     with pytest.raises(InputError, match=message):
         perturbation_response(slider, **({"velocity": 1e-6, "frequency": 120.0} | bad))
+
+
+def test_an_uneven_track_has_no_steady_sliding_to_expand_about():
+    law = on_uneven_track(RiceRuina(**BASE), amplitude=0.02, length="20 um", exponent=3.0)
+    slider = Slider(law, spring=K, load=W0)
+    with pytest.raises(InputError, match="must be the same everywhere"):
+        perturbation_response(slider, velocity=1e-6, frequency=120.0)

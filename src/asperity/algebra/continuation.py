@@ -137,9 +137,7 @@ class Curves(ABC):
         """
 
 
-def follow(
-    curves: Curves, length: Float, *, rows: Index | None = None, most: int | None = None
-) -> list[str]:
+def follow(curves: Curves, length: Float, *, most: int | None = None) -> list[str]:
     """Follow curves until each has ended.
 
     Parameters
@@ -148,8 +146,6 @@ def follow(
         At the beginnings of the curves; `accept` moves them.
     length : array, shape (curves,)
         Length of the first steps.
-    rows : array of int, optional
-        Curves that are followed; all by default.
     most : int, optional
         Largest number of steps of each curve, with failed ones.
 
@@ -157,12 +153,12 @@ def follow(
     -------
     list of str
         Why each curve ends: the reason from `accept`, `STUCK` where no step is short enough, or
-        `STEPS` after `most` steps. Empty for curves that are not followed.
+        `STEPS` after `most` steps.
     """
     control, length = curves.control, np.array(length, float)
     failures = np.zeros(length.size, int)
     why = [""] * length.size
-    going = np.arange(length.size) if rows is None else rows
+    going = np.arange(length.size)
     tried = 0
     while len(going) and (most is None or tried < most):
         tried += 1

@@ -16,34 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.algebra.small_systems import product, reflect, solve_points
-
-
-def _triangularise(rows: Array, columns: int) -> Array:
-    """Householder reflections that zero the first `columns` columns below the diagonal.
-
-    `rows` has shape (rows, all columns, points).
-    """
-    done, remaining = [], rows
-    for k in range(columns):
-        pivot, remaining = reflect(remaining)
-        zeros = jnp.zeros((k, *pivot.shape))
-        done.append(jnp.concatenate([zeros, pivot[None], remaining[0]]))
-        remaining = remaining[1:]
-    if not remaining.shape[0]:
-        return jnp.stack(done)
-    padding = jnp.zeros((remaining.shape[0], columns, *remaining.shape[2:]))
-    return jnp.concatenate([jnp.stack(done), jnp.concatenate([padding, remaining], axis=1)])
-
-
-def _back_substitute(triangle: Array, rhs: Array) -> Array:
-    """Solve with an upper triangle (n, n, points)."""
-    n = rhs.shape[0]
-    solution: list[Array] = [rhs[0]] * n
-    for k in reversed(range(n)):
-        known = sum(triangle[k, j] * solution[j] for j in range(k + 1, n))
-        solution[k] = (rhs[k] - known) / triangle[k, k]
-    return jnp.stack(solution)
+from asperity.algebra.small_systems import back_substitute, product, solve_points, triangularise
 
 
 class Border(NamedTuple):
@@ -142,7 +115,7 @@ def _eliminated(maps: Array, rhs: Array) -> tuple[Array, Array, Array]:
         zero = jnp.zeros_like(T)
         upper = jnp.concatenate([last, first, zero, right], axis=1)
         lower = jnp.concatenate([-T, zero, identity, r], axis=1)
-        rows = _triangularise(jnp.concatenate([upper, lower]), n)
+        rows = triangularise(jnp.concatenate([upper, lower]), n)
         remaining = rows[n:]
         return (remaining[:, n : 2 * n], remaining[:, 2 * n : 3 * n], remaining[:, 3 * n :]), rows[
             :n
@@ -156,7 +129,7 @@ def _eliminated(maps: Array, rhs: Array) -> tuple[Array, Array, Array]:
 
     def backward(after: Array, rows: Array) -> tuple[Array, Array]:
         known = jnp.concatenate([rows[:, 3 * n :], -rows[:, n : 2 * n]], axis=1)
-        here = _back_substitute(rows[:, :n], known - product(rows[:, 2 * n : 3 * n], after))
+        here = back_substitute(rows[:, :n], known - product(rows[:, 2 * n : 3 * n], after))
         return here, here
 
     _, inner = jax.lax.scan(backward, closed, rows, reverse=True)

@@ -153,25 +153,39 @@ def solve_columns(matrix: Array, rhs: Array) -> Array:
     if n == 2:
         (a, b), (c, d) = matrix
         return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
-    remaining = jnp.concatenate([matrix, rhs], axis=1)
+    rows = jnp.concatenate([matrix, rhs], axis=1)
     # Reflections mix rows: a row larger than the others by 1e16, as in fast motions, would lose
     # the digits of the others.
     size = jax.lax.stop_gradient(jnp.abs(matrix).max(1, keepdims=True))
-    remaining = remaining / jnp.where(size > 0, size, 1.0)
-    diagonal, rows = [], []
-    for _ in range(n):
+    rows = triangularise(rows / jnp.where(size > 0, size, 1.0), n)
+    return back_substitute(rows[:, :n], rows[:, n:])
+
+
+def triangularise(rows: Array, columns: int) -> Array:
+    """Householder reflections that zero the first `columns` columns below the diagonal.
+
+    `rows` has shape (rows, all columns, ...).
+    """
+    done, remaining = [], rows
+    for k in range(columns):
         pivot, remaining = reflect(remaining)
-        diagonal.append(pivot)
-        rows.append(remaining[0])
+        zeros = jnp.zeros((k, *pivot.shape))
+        done.append(jnp.concatenate([zeros, pivot[None], remaining[0]]))
         remaining = remaining[1:]
-    solution: list[Array] = []  # last unknown first
+    if not remaining.shape[0]:
+        return jnp.stack(done)
+    padding = jnp.zeros((remaining.shape[0], columns, *remaining.shape[2:]))
+    return jnp.concatenate([jnp.stack(done), jnp.concatenate([padding, remaining], axis=1)])
+
+
+def back_substitute(triangle: Array, rhs: Array) -> Array:
+    """Solve with an upper triangle (n, n, ...) for right-hand sides (n, columns, ...)."""
+    n = rhs.shape[0]
+    solution: list[Array] = [rhs[0]] * n
     for k in reversed(range(n)):
-        known = n - 1 - k
-        right = rows[k][known:]
-        for j in range(known):
-            right = right - rows[k][j] * solution[known - 1 - j]
-        solution.append(right / diagonal[k])
-    return jnp.stack(solution[::-1])
+        known = sum(triangle[k, j] * solution[j] for j in range(k + 1, n))
+        solution[k] = (rhs[k] - known) / triangle[k, k]
+    return jnp.stack(solution)
 
 
 def reflect(rows: Array) -> tuple[Array, Array]:
@@ -190,7 +204,7 @@ def reflect(rows: Array) -> tuple[Array, Array]:
     return -signed, rows[:, 1:] - v[:, None] * along
 
 
-def jacobian_columns(function: Callable[[Array], Array], Y: Array) -> tuple[Array, list[Array]]:
+def value_and_jacobian(function: Callable[[Array], Array], Y: Array) -> tuple[Array, Array]:
     """Value and derivative of an element-wise function of n states.
 
     Parameters
@@ -202,13 +216,13 @@ def jacobian_columns(function: Callable[[Array], Array], Y: Array) -> tuple[Arra
     Returns
     -------
     value : array, shape (m, ...)
-    columns : list of n arrays, shape (m, ...)
-        Derivative with respect to each state.
+    jacobian : array, shape (m, n, ...)
+        [row, column]: derivative of the row with respect to the state of the column.
     """
     value, push = jax.linearize(function, Y)
     n = Y.shape[0]
     unit = [jnp.stack([jnp.full(Y.shape[1:], float(i == j)) for j in range(n)]) for i in range(n)]
-    return value, [push(e) for e in unit]
+    return value, jnp.stack([push(e) for e in unit], axis=1)
 
 
 def product(a: Array, b: Array) -> Array:

@@ -33,8 +33,7 @@ from asperity.branches.steps import (
     BranchOrbit,
     LocatedBifurcation,
     ParameterBranch,
-    bifurcations_between,
-    polished,
+    criterion,
 )
 from asperity.errors import InputError, require
 from asperity.loads import Excitation, Modulation
@@ -60,84 +59,64 @@ _RESULTS = {
 }
 
 
-class BranchRecorder:
-    """Collects orbits and bifurcations along a branch."""
+def _followed(
+    follower: BranchFollower,
+    start: BranchOrbit,
+    moving: ContinuedParameter,
+    problem: Problem,
+    most_steps: int,
+    progress: Callable[[int, int], None] | None,
+    periods: int = 1,
+) -> Branch:
+    """Follow a branch until it leaves the span."""
+    followed = ParameterBranch(follower, start, most_steps, counted(progress, most_steps))
+    why = followed.follow()
+    followed.cut()
+    orbits = followed.orbits
+    values = moving.value(np.array([s.t for s in orbits]))
+    unit = f" {moving.unit}" if moving.unit else ""
+    return Branch(
+        name=moving.name,
+        unit=moving.unit,
+        parameter=values,
+        mean_friction=np.array([s.mean_friction for s in orbits]),
+        harmonics=np.stack([s.harmonics for s in orbits]),
+        log_multipliers=np.stack([s.logs for s in orbits]),
+        periods=periods,
+        bifurcations=tuple(
+            _bifurcation(follower, moving, located, at) for located, at in followed.bifurcations
+        ),
+        result=_RESULTS[why].format(value=values[-1], unit=unit, steps=len(orbits) - 1),
+        completed=why in ("end", "start"),
+        motion=problem.system,
+        fixed=fixed_parameters(problem, moving.name),
+        origin=BranchOrigin(follower, moving, problem),
+        last=orbits[-1].point,
+    )
 
-    def __init__(
-        self,
-        follower: BranchFollower,
-        moving: ContinuedParameter,
-        start: BranchOrbit,
-        report: Callable[[int], None],
-        periods: int = 1,
-    ) -> None:
-        """Begin a branch at `start`."""
-        self.follower, self.moving, self.report, self.periods = follower, moving, report, periods
-        self.branch_orbits = [start]
-        self.located: list[tuple[LocatedBifurcation, int]] = []
 
-    def follow_branch(self, most_steps: int) -> str:
-        """Follow the branch until it leaves the span; return a key of `_RESULTS`."""
-        return ParameterBranch(
-            self.follower, self.branch_orbits[0], self.visit, most_steps
-        ).follow()
-
-    def visit(self, here: BranchOrbit, length: float, there: BranchOrbit) -> None:
-        """Record a step of the branch; the last step is cut at the end of the span."""
-        if not 0 <= there.t <= 1:
-            edge = 1.0 if there.t > 1 else 0.0
-            reached = self.follower.crossing(here, length, lambda orbit: orbit.t - edge)
-            there, length = reached or (there, length)
-        at = len(self.branch_orbits) - 1
-        self.located += [
-            (located, at) for located in bifurcations_between(self.follower, here, length, there)
-        ]
-        self.branch_orbits.append(there)
-        self.report(1)
-
-    def branch(self, why: str, problem: Problem) -> Branch:
-        """The branch so far, as a result."""
-        values = self.moving.value(np.array([s.t for s in self.branch_orbits]))
-        unit = f" {self.moving.unit}" if self.moving.unit else ""
-        steps = len(self.branch_orbits) - 1
-        return Branch(
-            name=self.moving.name,
-            unit=self.moving.unit,
-            parameter=values,
-            mean_friction=np.array([s.mean_friction for s in self.branch_orbits]),
-            harmonics=np.stack([s.harmonics for s in self.branch_orbits]),
-            log_multipliers=np.stack([s.logs for s in self.branch_orbits]),
-            periods=self.periods,
-            bifurcations=tuple(self._bifurcation(located, at) for located, at in self.located),
-            result=_RESULTS[why].format(value=values[-1], unit=unit, steps=steps),
-            completed=why in ("end", "start"),
-            motion=problem.system,
-            fixed=fixed_parameters(problem, self.moving.name),
-            origin=BranchOrigin(self.follower, self.moving, problem),
-            last=self.branch_orbits[-1].point,
-        )
-
-    def _bifurcation(self, located: LocatedBifurcation, at: int) -> Bifurcation:
-        intervals = located.branch_orbit.point.orbit.mesh.shape[0] - 1
-        fine = polished(self.follower, located, 3 * intervals)
-        branch_orbit = fine or located.branch_orbit
-        value = float(self.moving.value(branch_orbit.t))
-        coarse = float(self.moving.value(located.branch_orbit.t))
-        omega = float(np.asarray(self.follower.line.at(np.array([branch_orbit.t])).system.omega)[0])
-        angle = abs(np.angle(np.exp(1j * branch_orbit.logs[located.critical].imag)))
-        fold = located.kind in ("fold", "branch point")
-        return Bifurcation(
-            kind=located.kind,
-            value=value,
-            error=abs(coarse - value) / abs(value) if fine else np.inf,
-            mean_friction=branch_orbit.mean_friction,
-            log_multipliers=branch_orbit.logs,
-            frequency=0.0 if fold else angle / (2 * np.pi) * omega / (2 * np.pi),
-            unstable_before=located.before,
-            unstable_after=located.after,
-            index=at,
-            critical=branch_orbit,
-        )
+def _bifurcation(
+    follower: BranchFollower, moving: ContinuedParameter, located: LocatedBifurcation, at: int
+) -> Bifurcation:
+    """The bifurcation after the orbit `at`, located again on a finer mesh."""
+    coarse, kind = located.branch_orbit, located.kind
+    refined = follower.finer(coarse.point, 3 * (coarse.point.orbit.mesh.shape[0] - 1))
+    fine = refined and follower.crossing(refined, criterion(kind, located.critical))
+    orbit = fine or coarse
+    value, before = float(moving.value(orbit.t)), float(moving.value(coarse.t))
+    fold = kind in ("fold", "branch point")
+    return Bifurcation(
+        kind=kind,
+        value=value,
+        error=abs(before - value) / abs(value) if fine else np.inf,
+        mean_friction=orbit.mean_friction,
+        log_multipliers=orbit.logs,
+        frequency=0.0 if fold else orbit.mode_frequency(located.critical),
+        unstable_before=located.before,
+        unstable_after=located.after,
+        index=at,
+        critical=orbit,
+    )
 
 
 @typed
@@ -221,8 +200,7 @@ def continuation(
         got = f"none at {moving.name} = {moving.start:g} {moving.unit}".rstrip()
         advice = "start elsewhere, such as at a small epsilon"
         raise InputError("span", "start where there is a periodic orbit", got, advice)
-    recorder = BranchRecorder(follower, moving, start, counted(progress, most_steps))
-    return recorder.branch(recorder.follow_branch(most_steps), problem)
+    return _followed(follower, start, moving, problem, most_steps, progress)
 
 
 #: Distances from the bifurcation at which a doubled orbit is tried (change of the log slip rate).
@@ -318,8 +296,7 @@ def doubled_branch(
     if start is None:
         rule, got = "have a doubled orbit next to it", "none by Newton's method"
         raise InputError("bifurcation", rule, got, "continue in another parameter")
-    recorder = BranchRecorder(twice, moving, start, counted(progress, most_steps), periods=2)
-    return recorder.branch(recorder.follow_branch(most_steps), problem)
+    return _followed(twice, start, moving, problem, most_steps, progress, periods=2)
 
 
 def _doubled_line(line: ParameterLine) -> ParameterLine:

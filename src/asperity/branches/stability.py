@@ -32,10 +32,8 @@ from asperity.branches.steps import (
     BranchOrbit,
     Kind,
     ParameterBranch,
-    bifurcations_between,
     criterion,
     kind_of,
-    root_near,
 )
 from asperity.errors import require
 from asperity.loads import Modulation
@@ -219,10 +217,11 @@ def critical_point(
     follower = plane.follower(guess, direction)
     # At a fold the orbit is not a regular function of the parameters: the parameter becomes an
     # unknown, and the plane perpendicular to the branch fixes the orbit.
-    start = follower.at(known.point, 0.0) if kind != "fold" else follower.across(known.point, 0.0)
+    solve = follower.across_origin if kind == "fold" else follower.at_origin
+    start = solve(known.point)
     if start is None:
         return None
-    critical = root_near(follower, start, criterion(kind, _critical_index(kind, start)))
+    critical = follower.crossing(start, criterion(kind, _critical_index(kind, start)))
     if critical is None:
         return None
     return BoundaryPoint(guess + critical.t * direction, critical)
@@ -474,18 +473,13 @@ def _crossings(
     start = follower.begin()
     if start is None:
         return []
-    points = []
-
-    def visit(here: BranchOrbit, length: float, neighbour: BranchOrbit) -> None:
-        for bifurcation in bifurcations_between(follower, here, length, neighbour):
-            branch_orbit = bifurcation.branch_orbit
-            if bifurcation.kind != "branch point" and 0 <= branch_orbit.t <= 1:
-                points.append(
-                    (bifurcation.kind, BoundaryPoint(at + branch_orbit.t * direction, branch_orbit))
-                )
-
-    ParameterBranch(follower, start, visit, _SCAN_STEPS).follow()
-    return points
+    branch = ParameterBranch(follower, start, _SCAN_STEPS)
+    branch.follow()
+    return [
+        (b.kind, BoundaryPoint(at + b.branch_orbit.t * direction, b.branch_orbit))
+        for b, _ in branch.bifurcations
+        if b.kind != "branch point"
+    ]
 
 
 def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:
@@ -507,15 +501,13 @@ def _boundary_curve(plane: ParameterPlane, curve: TracedBoundary) -> BoundaryCur
     at = np.array([p.at for p in curve.points])
     x, y = (p.value(at[:, i]) for i, p in enumerate(plane.parameters))
     logs = np.stack([p.branch_orbit.logs for p in curve.points])
-    critical = np.argmin(np.abs(logs.real), axis=1)
-    angle = np.abs(np.angle(np.exp(1j * logs.imag[np.arange(len(logs)), critical])))
-    omega = [
-        float(np.asarray(plane.follower(a, (0.0, 0.0)).line.at(np.zeros(1)).system.omega)[0])
-        for a in at
+    # The multipliers nearest to the unit circle are the critical ones.
+    growth = np.nan_to_num(logs.real)
+    order = np.argsort(np.abs(growth), axis=1, kind="stable")
+    mode = [
+        0.0 if curve.kind == "fold" else p.branch_orbit.mode_frequency(k)
+        for p, k in zip(curve.points, order[:, 0], strict=True)
     ]
-    mode = 0.0 if curve.kind == "fold" else angle / (2 * np.pi) * np.array(omega) / (2 * np.pi)
-    width = 2 if curve.kind == "Neimark-Sacker" else 1
-    distance = np.sort(np.where(np.abs(logs.real) > 0, logs.real, 0.0), axis=1)
-    others = [np.delete(row, np.argsort(np.abs(row))[:width]) for row in distance]
-    stable = np.array([bool(np.all(row < 0)) for row in others])
-    return BoundaryCurve(curve.kind, x, y, mode * np.ones(len(x)), logs, stable, curve.result)
+    others = order[:, 2 if curve.kind == "Neimark-Sacker" else 1 :]
+    stable = (np.take_along_axis(growth, others, axis=1) < 0).all(1)
+    return BoundaryCurve(curve.kind, x, y, np.array(mode), logs, stable, curve.result)

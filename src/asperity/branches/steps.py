@@ -11,8 +11,9 @@ R. Seydel, Practical Bifurcation and Stability Analysis, chapter 5.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import jax
 import numpy as np
@@ -23,23 +24,22 @@ from asperity.algebra.continuation import STEPS, Attempt, Curves, StepControl, f
 from asperity.arrays import Complex, Float, Index
 from asperity.orbit.floquet import FOLD, kind_of_crossing, log_multipliers
 from asperity.orbit.mesh.arclength import (
-    ArclengthStep,
+    EQUIDISTRIBUTED,
+    BranchStep,
     ContinuationPoint,
     ParameterLine,
-    arclength_step,
+    branch_step,
     first_point,
     interpolated,
+    straight,
 )
 from asperity.orbit.mesh.equations import read_orbit
-from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change, remeshed
 from asperity.orbit.search import find_orbits
 from asperity.orbit.solution import SearchOptions
 
 #: Mesh intervals of a branch of simple period; a bifurcation is solved on three times as many.
 INTERVALS = 216
-#: A step is accepted if Newton's last change is below this; the error is about its square.
-_CONVERGED = 1e-6
 _NEWTON_STEPS = 10
 #: First step, and longest step, as shares of the span.
 _FIRST, _LARGEST_PART = 1e-3, 0.04
@@ -58,6 +58,8 @@ class BranchOrbit(NamedTuple):
     harmonics : complex array, shape (harmonics,)
     logs : complex array, shape (states,)
         Logarithms of the multipliers, by falling modulus.
+    omega : float
+        Angular frequency of the modulation (rad/s).
     point : ContinuationPoint
         From where the next step starts.
     """
@@ -67,12 +69,18 @@ class BranchOrbit(NamedTuple):
     mean_friction: float
     harmonics: Complex
     logs: Complex
+    omega: float
     point: ContinuationPoint
 
     @property
     def unstable(self) -> int:
         """Number of multipliers outside the unit circle."""
         return int((self.logs.real > 0).sum())
+
+    def mode_frequency(self, index: int) -> float:
+        """Frequency (Hz) of a mode, from 0 to half of that of the modulation."""
+        angle = abs(np.angle(np.exp(1j * self.logs[index].imag)))
+        return float(angle * self.omega / (2 * np.pi) ** 2)
 
 
 class BranchFollower(NamedTuple):
@@ -83,49 +91,65 @@ class BranchFollower(NamedTuple):
 
     def step(
         self, point: ContinuationPoint, length: float
-    ) -> tuple[BranchOrbit | None, ArclengthStep]:
+    ) -> tuple[BranchOrbit | None, BranchStep]:
         """The orbit at the distance `length` from `point`, None where Newton's method fails."""
         spare_mappings()
-        step = arclength_step(self.line, point, np.array([length]), max_steps=_NEWTON_STEPS)
-        if not step.error[0] < _CONVERGED:
+        step = branch_step(
+            self.line,
+            straight(point, np.ones(1)),
+            np.array([length]),
+            remeshing=EQUIDISTRIBUTED,
+            max_steps=_NEWTON_STEPS,
+        )
+        if not np.isfinite(step.error[0]):
             return None, step
-        return self.branch_orbit(step.orbit, step.next), step
-
-    def branch_orbit(self, orbit: Orbit, point: ContinuationPoint) -> BranchOrbit:
-        """Evaluate the observables of an orbit."""
-        read = read_orbit(self.line.at(point.t), orbit, self.harmonics)
+        following = step.next.point
+        problem = self.line.at(following.t)
+        read = read_orbit(problem, step.orbit, self.harmonics)
         logs = log_multipliers(read.monodromy, read.log_scale, read.log_determinant)
-        return BranchOrbit(
-            float(point.t[0]),
-            float(point.tangent.t[0]),
+        orbit = BranchOrbit(
+            float(following.t[0]),
+            float(following.tangent.t[0]),
             float(read.mean_friction[0]),
             read.harmonics[:, 0],
             logs[:, 0],
-            point,
+            float(problem.system.omega[0]),
+            following,
         )
+        return orbit, step
 
     def crossing(
-        self, start: BranchOrbit, length: float, function: Callable[[BranchOrbit], float]
-    ) -> tuple[BranchOrbit, float] | None:
-        """The orbit within `length` of `start` at which a function vanishes, and its distance."""
-        # SciPy's optimisation loads slowly, and only continuation needs it.
-        from scipy.optimize import brentq
+        self,
+        start: BranchOrbit,
+        function: Callable[[BranchOrbit], float],
+        end: tuple[float, BranchOrbit] | None = None,
+    ) -> BranchOrbit | None:
+        """The orbit of the branch of `start` at which a function vanishes; None on failure.
 
-        seen: dict[float, BranchOrbit] = {}
+        It is found by Brent's method between `start` and `end`, the length of a step and the orbit
+        after it, or without an end near `start` by the secant method.
+        """
+        # SciPy's optimisation loads slowly, and only continuation needs it.
+        from scipy.optimize import root_scalar
+
+        solved = {0.0: start} | dict([end] if end else [])
 
         def value(distance: float) -> float:
-            branch_orbit, _ = self.step(start.point, distance)
-            if branch_orbit is None:
-                raise _UnsolvedError
-            seen[distance] = branch_orbit
-            return function(branch_orbit)
+            if distance not in solved:
+                orbit = self.step(start.point, distance)[0] if abs(distance) < 1 else None
+                if orbit is None:
+                    raise _UnsolvedError
+                solved[distance] = orbit
+            return function(solved[distance])
 
+        search: dict[str, Any] = _SECANT if end is None else {**_BRENT, "bracket": (0.0, end[0])}
         try:
-            root = float(brentq(value, 0.0, length, xtol=1e-14, rtol=1e-14))
+            with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+                root = root_scalar(value, **search).root
         except (_UnsolvedError, ValueError):
             return None
-        orbit = seen[root] if root in seen else self.step(start.point, root)[0]
-        return None if orbit is None else (orbit, root)
+        nearest = min(solved, key=lambda distance: abs(distance - root))
+        return solved[nearest] if abs(nearest - root) < _STALLED else None
 
     def begin(self) -> BranchOrbit | None:
         """An orbit at t = 0, in the direction of rising t; None where the search finds none."""
@@ -136,22 +160,22 @@ class BranchFollower(NamedTuple):
             return None
         orbit = remeshed(problem, solution.orbit, INTERVALS)
         tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
-        start = self.at(ContinuationPoint(orbit, zero, tangent, np.ones_like(orbit.centre)), 0.0)
+        start = self.at_origin(ContinuationPoint(orbit, zero, tangent, np.ones_like(orbit.centre)))
         if start is None:
             return None
         point = first_point(self.line, start.point.orbit, zero)
         return start._replace(direction=float(point.tangent.t[0]), point=point)
 
-    def at(self, point: ContinuationPoint, t: float) -> BranchOrbit | None:
-        """The orbit at the coordinate `t`, from the orbit of a point nearby."""
+    def at_origin(self, point: ContinuationPoint) -> BranchOrbit | None:
+        """The orbit at t = 0, from the orbit of a point nearby."""
         # With this tangent the plane of the corrector is that of constant t.
         nodes = np.zeros_like(point.tangent.nodes)
         tangent = Change(nodes, np.zeros_like(point.tangent.slopes), np.ones(1))
-        return self.step(point._replace(t=np.array([t]), tangent=tangent), 0.0)[0]
+        return self.across_origin(point._replace(tangent=tangent))
 
-    def across(self, point: ContinuationPoint, t: float) -> BranchOrbit | None:
-        """The orbit in the plane across the branch of a point nearby, from the guess `t`."""
-        return self.step(point._replace(t=np.array([t])), 0.0)[0]
+    def across_origin(self, point: ContinuationPoint) -> BranchOrbit | None:
+        """The orbit in the plane across the branch of a point nearby, from the guess t = 0."""
+        return self.step(point._replace(t=np.zeros(1)), 0.0)[0]
 
     def finer(self, point: ContinuationPoint, intervals: int) -> BranchOrbit | None:
         """The orbit in the plane across the branch at a point, on a mesh of `intervals`."""
@@ -160,6 +184,13 @@ class BranchFollower(NamedTuple):
         slopes = np.zeros(orbit.slopes.shape)  # a step of length zero does not use them
         tangent = Change(carried, slopes, point.tangent.t)
         return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
+
+
+#: Brent's method between two orbits, and the secant method from an orbit, on the distance from it.
+_BRENT = {"method": "brentq", "xtol": 1e-14, "rtol": 1e-14}
+_SECANT = {"method": "secant", "x0": 0.0, "x1": 1e-4, "xtol": 1e-12, "maxiter": 12}
+#: Largest last change of the distance that is attributed to round-off.
+_STALLED = 1e-9
 
 
 class _UnsolvedError(Exception):
@@ -173,9 +204,17 @@ class ParameterBranch(Curves):
     ----------
     follower : BranchFollower
     start : BranchOrbit
-    visit : callable
-        Called with an orbit, the length of the step from it, and the next orbit.
     most_steps : int
+    report : callable, optional
+        Called with 1 after each step.
+
+    Attributes
+    ----------
+    orbits : list of BranchOrbit
+    bifurcations : list of (LocatedBifurcation, int)
+        Those within the span, each with the index of the orbit before it.
+    last_length : float
+        Length of the last step.
     """
 
     control = StepControl(
@@ -193,10 +232,12 @@ class ParameterBranch(Curves):
         self,
         follower: BranchFollower,
         start: BranchOrbit,
-        visit: Callable[[BranchOrbit, float, BranchOrbit], None],
         most_steps: int,
+        report: Callable[[int], None] = lambda _: None,
     ) -> None:
-        self.follower, self.here, self.visit, self.left = follower, start, visit, most_steps
+        self.follower, self.most_steps, self.report = follower, most_steps, report
+        self.orbits, self.last_length = [start], 0.0
+        self.bifurcations: list[tuple[LocatedBifurcation, int]] = []
 
     def follow(self) -> str:
         """Follow the branch; why it ends: "end", "start", "steps" or "stuck"."""
@@ -205,35 +246,42 @@ class ParameterBranch(Curves):
 
     def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
         """No longer than a part of the span."""
-        return np.minimum(length, _LARGEST_PART / np.maximum(abs(self.here.direction), 1e-12))
+        return np.minimum(length, _LARGEST_PART / np.maximum(abs(self.orbits[-1].direction), 1e-12))
 
     def attempts(
         self, rows: Index, length: Float, failures: NDArray[np.int_]
     ) -> Iterator[tuple[Index, Attempt]]:
         """One step of the arclength."""
-        following, step = self.follower.step(self.here.point, float(length[0]))
+        following, step = self.follower.step(self.orbits[-1].point, float(length[0]))
         iterations, turn = float(step.iterations[0]), float(step.turn[0])
         yield rows, Attempt.of_one(following, float(length[0]), iterations=iterations, turn=turn)
 
     def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
-        """Visit the new orbit; the branch ends outside the span."""
-        following = attempt.next
-        self.visit(self.here, float(attempt.length[0]), following)
-        self.here, self.left = following, self.left - 1
-        if not 0 <= following.t <= 1:
-            return ["end" if following.t >= 0.5 else "start"]
-        return ["" if self.left else STEPS]
+        """Keep the new orbit and the bifurcations before it; the branch ends outside the span."""
+        here, there, self.last_length = self.orbits[-1], attempt.next, float(attempt.length[0])
+        for located in bifurcations_between(self.follower, here, self.last_length, there):
+            if 0 <= located.branch_orbit.t <= 1:
+                self.bifurcations.append((located, len(self.orbits) - 1))
+        self.orbits.append(there)
+        self.report(1)
+        if not 0 <= there.t <= 1:
+            return ["end" if there.t >= 0.5 else "start"]
+        return [STEPS if len(self.orbits) > self.most_steps else ""]
+
+    def cut(self) -> None:
+        """Replace a last orbit outside the span by that at the end of the span."""
+        last = self.orbits[-1]
+        if not 0 <= last.t <= 1:
+            edge = 1.0 if last.t > 1 else 0.0
+            step = self.last_length, last
+            reached = self.follower.crossing(self.orbits[-2], lambda orbit: orbit.t - edge, step)
+            self.orbits[-1] = reached or last
 
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branch point"]
 
 #: Arguments of multipliers below this, or this close to pi, count as real.
 _REAL = 1e-6
-#: Secant steps that carry a bifurcation over to a finer mesh, and their tolerance on t.
-_SECANT_STEPS = 12
-_TOLERANCE = 1e-12
-#: Largest last secant step that is attributed to round-off.
-_STALLED = 1e-9
 
 
 class LocatedBifurcation(NamedTuple):
@@ -264,15 +312,14 @@ def bifurcations_between(
     turned = start.direction * end.direction < 0
     if turned:
         index = min(before, after) if before != after else 0
-        crossing = follower.crossing(start, length, _direction)
-        if crossing is not None:
-            yield LocatedBifurcation("fold", crossing[0], index, before, after)
+        critical_orbit = follower.crossing(start, criterion("fold", index), (length, end))
+        if critical_orbit is not None:
+            yield LocatedBifurcation("fold", critical_orbit, index, before, after)
     index, last = min(before, after), max(before, after)
     while index < last:
-        crossing = follower.crossing(start, length, _log_modulus(index))
-        if crossing is None:
+        critical_orbit = follower.crossing(start, criterion(None, index), (length, end))
+        if critical_orbit is None:
             return
-        critical_orbit, _ = crossing
         kind = kind_of(critical_orbit.logs[index])
         if kind == "branch point" and turned:
             index += 1  # the multiplier of the fold itself
@@ -289,50 +336,11 @@ def kind_of(log: complex) -> Kind:
     return "branch point" if kind == FOLD else kind
 
 
-def criterion(kind: Kind, index: int) -> Callable[[BranchOrbit], float]:
-    """The test function of a bifurcation, which vanishes there."""
-    return _direction if kind == "fold" else _log_modulus(index)
+def criterion(kind: Kind | None, index: int) -> Callable[[BranchOrbit], float]:
+    """The test function of a bifurcation, which vanishes there.
 
-
-def _direction(branch_orbit: BranchOrbit) -> float:
-    return branch_orbit.direction
-
-
-def _log_modulus(index: int) -> Callable[[BranchOrbit], float]:
-    return lambda branch_orbit: float(branch_orbit.logs[index].real)
-
-
-def polished(
-    follower: BranchFollower, located: LocatedBifurcation, intervals: int
-) -> BranchOrbit | None:
-    """The bifurcation located again on a mesh of `intervals`, by the secant method."""
-    return root_near(
-        follower,
-        follower.finer(located.branch_orbit.point, intervals),
-        criterion(located.kind, located.critical),
-    )
-
-
-def root_near(
-    follower: BranchFollower, start: BranchOrbit | None, function: Callable[[BranchOrbit], float]
-) -> BranchOrbit | None:
-    """The orbit near `start` on its branch at which `function` vanishes; None on failure."""
-    if start is None:
-        return None
-    before, value_before = 0.0, function(start)
-    distance, branch_orbit = 1e-4, start
-    for _ in range(_SECANT_STEPS):
-        now, _ = follower.step(start.point, distance)
-        if now is None:
-            return None
-        branch_orbit, value = now, function(now)
-        if value == value_before:
-            return branch_orbit
-        change = -value * (distance - before) / (value - value_before)
-        before, value_before = distance, value
-        distance += change
-        if abs(change) < _TOLERANCE:
-            return branch_orbit
-        if abs(change) > 1.0:
-            return None
-    return branch_orbit if abs(change) < _STALLED else None
+    It is the direction of a fold, and otherwise ln|m| of the multiplier of this index.
+    """
+    if kind == "fold":
+        return lambda orbit: orbit.direction
+    return lambda orbit: float(orbit.logs[index].real)

@@ -19,6 +19,7 @@ from jax.typing import ArrayLike
 from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.parameters.arguments import at_least, shown, typed
+from asperity.parameters.parameter import obeying
 from asperity.units import to_radians, to_si
 
 
@@ -233,7 +234,7 @@ def modulated(
     """
     series = _load_series(epsilon, load)
     speed = _pair(to_si(pull, "dimensionless", "pull"), to_radians(pull_phase, "pull_phase"))
-    gain = np.tan(_checked_tilt(tilt))
+    gain = np.tan(obeying(to_radians(tilt, "tilt"), "tilt", "dimensionless", "below a right angle"))
     shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
     _require_contact(series)
     swing = (speed,) if any(np.any(part) for part in speed) else ()
@@ -320,15 +321,6 @@ def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]
     """Coefficients of cos and sin of amplitude cos(n theta + phase)."""
     size = np.asarray(amplitude, float)
     return size * np.cos(phase), -size * np.sin(phase)
-
-
-def _checked_tilt(value: Any) -> Float:
-    angle = np.asarray(to_radians(value, "tilt"), float)
-    bad = angle[~(np.abs(angle) < np.pi / 2)]
-    if bad.size:
-        advice = "give the angle from the normal, such as '5 deg'"
-        raise InputError("tilt", "be less than a right angle", f"{bad.flat[0]:g} rad", advice)
-    return angle
 
 
 def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Series:

@@ -12,11 +12,9 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
-
-Indices = NDArray[np.intp]
+from asperity.arrays import Index
 
 #: Points in a block of the fast method; not a power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
@@ -38,16 +36,14 @@ def points_of(tree: Any) -> int:
     return int(jax.tree.leaves(tree)[0].shape[-1])
 
 
-def take(tree: Any, index: Indices | slice) -> Any:
+def take(tree: Any, index: Index | slice) -> Any:
     """The points `index` of a pytree whose arrays carry the points along the last axis."""
     return jax.tree.map(lambda a: a[..., index], tree)
 
 
-def put(tree: Any, index: Indices, values: Any) -> None:
+def put(tree: Any, index: Index, values: Any) -> None:
     """Write `values` for the points `index` into a pytree of NumPy arrays."""
-    # Consecutive points are written as a block, in a seventh of the time.
-    block = len(index) > 0 and bool((np.diff(index) == 1).all())
-    where = slice(index[0], index[-1] + 1) if block else index
+    where = _as_slice(index)
 
     def write(target: np.ndarray, value: np.ndarray) -> None:
         target[..., where] = value
@@ -55,12 +51,18 @@ def put(tree: Any, index: Indices, values: Any) -> None:
     jax.tree.map(write, tree, values)
 
 
+def _as_slice(index: Index) -> Index | slice:
+    """Consecutive points as a slice, which reads and writes them in a seventh of the time."""
+    block = len(index) > 0 and bool((np.diff(index) == 1).all())
+    return slice(index[0], index[-1] + 1) if block else index
+
+
 def run_chunks(
     function: Callable[..., Any],
     inputs: tuple[Any, ...],
-    index: Indices,
+    index: Index,
     chunk: int | tuple[int, ...],
-) -> Iterator[tuple[Indices, Any]]:
+) -> Iterator[tuple[Index, Any]]:
     """Apply `function` to the points `index` of `inputs`.
 
     Parameters
@@ -84,7 +86,7 @@ def run_chunks(
     sizes = (chunk,) if isinstance(chunk, int) else chunk
     for start in range(0, len(index), _GATHERED * sizes[0]):
         gathered = index[start : start + _GATHERED * sizes[0]]
-        points = take(inputs, gathered)
+        points = take(inputs, _as_slice(gathered))
         for first in range(0, len(gathered), sizes[0]):
             spare_mappings()
             part = gathered[first : first + sizes[0]]
@@ -95,12 +97,12 @@ def run_chunks(
             yield part, outputs if full else take(outputs, slice(0, len(part)))
 
 
-def _filled(first: int, count: int, size: int) -> Indices:
+def _filled(first: int, count: int, size: int) -> Index:
     """Indices of `count` points from `first` on, filled up to `size` with the last of them."""
     return np.minimum(np.arange(first, first + size), first + count - 1)
 
 
-def chunk_of(index: Indices, most: int) -> int:
+def chunk_of(index: Index, most: int) -> int:
     """Points in a call that works on the points `index`: `FEW` if they are few, else `most`."""
     return FEW if len(index) <= FEW else most
 

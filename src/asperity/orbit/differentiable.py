@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large, spare_mappings
+from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError, closest, require
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
@@ -125,14 +126,9 @@ class ResponseFunction:
             `Outcome.INVALID`.
         """
         padded, points = self._padded(parameters)
-        self._check_known(known, points or 1, traced=_traced(padded))
-        if _traced(padded):
-            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
-        fast, searched = _orbits(self._program, padded, points or 1, known, motions=motions)
-        part = _fast_part(self._program)
-        values = _evaluate(padded, fast, None, program=part)
-        return _cut(_with_searched(values, searched, part), points)
+        orbits = self._orbits(padded, points or 1, known, motions=motions)
+        values = _evaluate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        return _cut(_with_searched(values, orbits), points)
 
     def value_and_jacobian(
         self,
@@ -165,31 +161,59 @@ class ResponseFunction:
             share is the sum over the points.
         """
         padded, points = self._padded(parameters)
-        self._check_known(known, points or 1, traced=_traced(padded))
+        orbits = self._orbits(padded, points or 1, known, every=every)
         table: Any
-        if _traced(padded):
-            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            whole, table = _differentiate(padded, fast, wanted, program=self._program)
-        else:
-            fast, searched = _orbits(self._program, padded, points or 1, known, every=every)
-            part = _fast_part(self._program)
-            whole, table = _differentiate(padded, fast, None, program=part)
-            whole = _with_searched(whole, searched, part)
+        whole, table = _differentiate(padded, orbits.fast, orbits.wanted, program=orbits.program)
+        whole = _with_searched(whole, orbits)
+        if not _traced(padded):
             outcome = np.asarray(whole.outcome)[: points or 1]
             table = np.array(table)
             if not every or (outcome == Outcome.CONVERGED).all():
-                _add_searched_derivatives(table, padded, searched, part, names)
+                _add_searched_derivatives(table, padded, orbits, names)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
+        derivative = partial(
+            ResponseValues.of_columns, outcome=values.outcome, harmonics=self._program.harmonics
+        )
         columns = zip(self._program.equations.names, cut, strict=True)
-        return values, {
-            n: _derivative(c, values) for n, c in columns if names is None or n in names
-        }
+        return values, {n: derivative(c) for n, c in columns if names is None or n in names}
 
-    def _check_known(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
+    def _orbits(
+        self,
+        parameters: Parameters,
+        points: int,
+        known: KnownOrbits | None,
+        *,
+        every: bool = False,
+        motions: bool | None = None,
+    ) -> _Orbits:
+        """Orbits of the first `points` points; further points are padding."""
+        program, traced = self._program, _traced(parameters)
+        if known is not None:
+            self._check_known(known, points, traced=traced)
+        if traced:
+            fast, wanted = _fast_orbits(program, jax.lax.stop_gradient(parameters))
+            return _Orbits(program, fast, wanted if program.search else None, None)
+        spare_mappings()
+        fast, wanted = _fast_orbits(program, parameters)
+        rows, searched = np.asarray(wanted) & (np.arange(len(wanted)) < points), None
+        if program.search and rows.any():
+            searched = search_orbits(
+                program.equations,
+                program.harmonics,
+                {n: np.asarray(v) for n, v in parameters.items()},
+                rows,
+                # A direct search does not resolve multipliers.
+                direct=program.search in ("direct", "coarse") and not program.multipliers,
+                coarse=program.search == "coarse",
+                motions=motions,
+                known=known,
+                every=every,
+            )
+        return _Orbits(program.without_search, fast, None, searched)
+
+    def _check_known(self, known: KnownOrbits, points: int, *, traced: bool) -> None:
         """Refuse known orbits that this call cannot take as initial guesses."""
-        if known is None:
-            return
         if traced or not self._program.search or self._program.multipliers:
             raise InputError(
                 "known must go with a search, no multipliers and parameters that are not traced; "
@@ -362,91 +386,53 @@ def _traced(parameters: Parameters) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(parameters))
 
 
-def _traced_orbits(
-    program: Program, parameters: Parameters
-) -> tuple[FastOrbits | None, Array | None]:
-    """Orbits of the fast method within a program, and a mask of the points left to the search.
+class _Orbits(NamedTuple):
+    """Orbits of all points, and the program that evaluates them."""
 
-    None for a method that the program does not have.
-    """
-    fast, wanted = _fast_orbits(program, parameters)
-    return fast, wanted if program.search else None
-
-
-def _orbits(
-    program: Program,
-    parameters: Parameters,
-    points: int,
-    known: KnownOrbits | None,
-    *,
-    every: bool = False,
-    motions: bool | None = None,
-) -> tuple[FastOrbits | None, SearchedOrbits | None]:
-    """Orbits of the first `points` points by the fast method and, of the others, by the search."""
-    spare_mappings()
-    fast, wanted = _fast_orbits(program, parameters)
-    # Further points are padding.
-    rows = np.asarray(wanted) & (np.arange(len(wanted)) < points)
-    if not program.search or not rows.any():
-        return fast, None
-    values = {n: np.asarray(v) for n, v in parameters.items()}
-    # A direct search does not resolve multipliers.
-    direct = program.search in ("direct", "coarse") and not program.multipliers
-    return fast, search_orbits(
-        program.equations,
-        program.harmonics,
-        values,
-        rows,
-        direct=direct,
-        coarse=program.search == "coarse",
-        motions=motions,
-        known=known,
-        every=every,
-    )
+    program: Program
+    #: Of the fast method; None without one.
+    fast: FastOrbits | None
+    #: Within a compiled program: mask of the points that are left to the search.
+    wanted: Array | None
+    #: Of the search, outside of compiled programs.
+    searched: SearchedOrbits | None
 
 
 def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits | None, Array]:
     """Orbits of the fast method (None without one), and a mask of the points left to the search."""
     if not has_fast_method(program):
         return None, program.equations.valid(parameters)
-    fast = fast_orbits(parameters, program=_fast_part(program))
+    fast = fast_orbits(parameters, program=program.without_search)
     return fast, fast.valid & ~fast.converged
 
 
-def _fast_part(program: Program) -> Program:
-    """The program without orbits of the search."""
-    return program._replace(search=False)
-
-
-def _with_searched(
-    values: ResponseValues, searched: SearchedOrbits | None, program: Program
-) -> ResponseValues:
+def _with_searched(values: ResponseValues, orbits: _Orbits) -> ResponseValues:
     """Values of the fast method and of the search together, NumPy arrays."""
+    searched = orbits.searched
     if searched is None:
         return values
     whole = ResponseValues(*(np.array(a) for a in values))
     missing = whole.outcome == Outcome.NO_ORBIT
     whole.outcome[missing] = searched.outcome[missing]
-    for index, orbits in searched.parts:
-        values = values_of(orbits, multipliers=program.multipliers)
+    for index, on_mesh in searched.parts:
+        values = values_of(on_mesh, multipliers=orbits.program.multipliers)
         for target, part in zip(whole, values, strict=True):
             target[index] = part
     return whole
 
 
 def _add_searched_derivatives(
-    table: NDArray[np.float64],
+    table: Float,
     parameters: Parameters,
-    searched: SearchedOrbits | None,
-    program: Program,
+    orbits: _Orbits,
     names: Collection[str] | None,
 ) -> None:
     """Write derivatives at the orbits of the search into the result of `_differentiate`."""
-    values = {n: np.asarray(v) for n, v in parameters.items()}
-    for index, orbits in searched.parts if searched else []:
-        part = {n: v[index] for n, v in values.items()}
+    program = orbits.program
+    for index, on_mesh in orbits.searched.parts if orbits.searched else []:
+        part = {n: np.asarray(v)[index] for n, v in parameters.items()}
         table[:, index] = derivatives_of(
-            program.equations, part, orbits, multipliers=program.multipliers, names=names
+            program.equations, part, on_mesh, multipliers=program.multipliers, names=names
         )
 
 
@@ -491,56 +477,29 @@ def _differentiate(
 ) -> tuple[ResponseValues, Array]:
     """Values, and derivatives at each point to the parameters of that point.
 
-    The derivatives are of shape (parameters, points, columns), with a column for the mean, columns
-    for the real and the imaginary parts of the harmonics, and the same for the multipliers.
+    The derivatives are of shape (parameters, points, columns), with `ResponseValues.columns`.
     """
 
-    def evaluate(parameters: Parameters) -> tuple[Any, ResponseValues]:
+    def evaluate(parameters: Parameters) -> tuple[Array, ResponseValues]:
         values = _values(parameters, fast, wanted, program)
-        return tuple(_real(a) for a in values[:3]), values
+        return values.columns, values
 
     names = program.equations.names
     points = parameters[names[0]].shape[0]
-    shapes, values = jax.eval_shape(evaluate, parameters)
-    count = sum(s.shape[1] for s in shapes)
+    count = jax.eval_shape(evaluate, parameters)[0].shape[1]
     if count < len(names):
         _, pull, values = jax.vjp(evaluate, parameters, has_aux=True)
-        unit = _split(jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count)), shapes)
+        unit = jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count))
         (gradients,) = jax.vmap(pull)(unit)
         columns = {n: g.T for n, g in gradients.items()}
     else:
         _, push, values = jax.linearize(evaluate, parameters, has_aux=True)
         ones, zeros = jnp.ones(points), jnp.zeros(points)
         basis = {n: jnp.stack([ones if n == m else zeros for m in names]) for n in names}
-        tangents = jnp.concatenate(jax.vmap(push)(basis), axis=-1)
-        columns = dict(zip(names, tangents, strict=True))
+        columns = dict(zip(names, jax.vmap(push)(basis), strict=True))
     known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
     # One array: every output of a compiled program costs time.
     return values, known[:, None] * jnp.stack([columns[n] for n in names])
-
-
-def _real(a: Array) -> Array:
-    """Real columns, (points, columns)."""
-    flat = a.reshape(a.shape[0], -1)
-    return jnp.concatenate([flat.real, flat.imag], axis=1) if jnp.iscomplexobj(a) else flat
-
-
-def _split(a: Array, shapes: Any) -> tuple[Array, ...]:
-    ends = np.cumsum([s.shape[1] for s in shapes])[:-1]
-    return tuple(jnp.split(a, ends, axis=-1))
-
-
-def _derivative(columns: Any, values: ResponseValues) -> ResponseValues:
-    """Real columns, (points, columns) or (columns,), as a derivative of `values`."""
-    count = values.harmonics.shape[-1]
-    harmonics, logs = columns[..., 1 : 2 * count + 1], columns[..., 2 * count + 1 :]
-    states = logs.shape[-1] // 2
-    return ResponseValues(
-        columns[..., 0],
-        harmonics[..., :count] + 1j * harmonics[..., count:],
-        logs[..., :states] + 1j * logs[..., states:],
-        values.outcome,
-    )
 
 
 #: Points that are differentiated at a time, which bounds the memory.
@@ -569,15 +528,15 @@ class Sensitivities:
 
     parameters: tuple[str, ...]
     outcome: NDArray[np.int64]
-    mean_friction: NDArray[np.float64]
-    mu1: NDArray[np.float64]
-    mu2: NDArray[np.float64]
-    phase1: NDArray[np.float64]
-    phase2: NDArray[np.float64]
-    log_multipliers: NDArray[np.complex128]
+    mean_friction: Float
+    mu1: Float
+    mu2: Float
+    phase1: Float
+    phase2: Float
+    log_multipliers: Complex
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Whether each point was solved."""
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
@@ -653,7 +612,7 @@ def sensitivities(
     )
 
 
-def _outputs(values: ResponseValues, change: ResponseValues) -> NDArray[np.complex128]:
+def _outputs(values: ResponseValues, change: ResponseValues) -> Complex:
     """Derivatives of the outputs to one parameter, (points, outputs)."""
     relative = change.harmonics / values.harmonics
     growth, turn = relative.real * np.abs(values.harmonics), relative.imag

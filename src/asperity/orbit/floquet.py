@@ -28,6 +28,7 @@ from asperity.algebra.small_systems import (
     product,
     subtract,
 )
+from asperity.arrays import Complex, Float
 
 #: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
 #: phases, is then unknown, too.
@@ -41,9 +42,6 @@ AGREEMENT = 2e-7
 #: the large ones hides the small ones.
 _VANISHING = (1e-12, 1e-6)
 _LOST_IN_ROUND_OFF = 1e-7
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 
 def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) -> Complex:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Complex, Float
 from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
@@ -55,18 +55,16 @@ class Observables(NamedTuple):
     start: Array
 
     @property
-    def numbers(self) -> NDArray[np.complex128]:
+    def numbers(self) -> Complex:
         """Mean, then harmonics, shape (1 + count, points)."""
         return np.concatenate([np.asarray(self.mean_friction)[None], self.harmonics])
 
     @property
-    def log_multipliers(self) -> NDArray[np.complex128]:
+    def log_multipliers(self) -> Complex:
         """Logarithms of the Floquet multipliers by falling modulus, shape (size, points)."""
         monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
         # Of multipliers near 1 a matrix of their logarithms keeps more digits.
         known = np.isfinite(exponent).all((0, 1))
-        if known.all():
-            return log_multipliers_of_exponent(exponent, log_determinant)
         logs = np.empty(monodromy.shape[1:], complex)
         logs[:, known] = log_multipliers_of_exponent(exponent[..., known], log_determinant[known])
         others = monodromy[..., ~known], log_scale[~known], log_determinant[~known]
@@ -74,9 +72,7 @@ class Observables(NamedTuple):
         return logs
 
 
-def response_gap(
-    before: NDArray[np.complex128], now: NDArray[np.complex128], *, each: int = 2
-) -> NDArray[np.float64]:
+def response_gap(before: Complex, now: Complex, *, each: int = 2) -> Float:
     """Largest relative difference of mean and harmonics, shape (points,); inf where not finite.
 
     Parameters
@@ -96,15 +92,13 @@ def response_gap(
     return np.where(np.isfinite(gap), gap, np.inf)
 
 
-def waveform(problem: Problem, orbit: Orbit | FourierOrbit, phases: int) -> NDArray[np.float64]:
+def waveform(problem: Problem, orbit: Orbit | FourierOrbit, phases: int) -> Float:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
     theta = even_phases(phases)
     return waveform_of(problem, orbit.states(theta), theta)
 
 
-def waveform_of(
-    problem: Problem, Y: NDArray[np.float64], theta: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def waveform_of(problem: Problem, Y: Float, theta: Float) -> Float:
     """F/W0 and ln(v_pl/V) of the states `Y`, (size, phases, points), at the phases `theta`."""
     at = excitation_at(problem.load, theta * np.ones(Y.shape[2]))
     values = values_at(problem.system, at, np.zeros_like(Y[:, 0]), Y)

@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Float
+
 
 class Outcome(IntEnum):
     """Outcome of a periodic solve.
@@ -124,7 +126,7 @@ def _out_of_range(detail: float) -> str:
     return _TOO_SLOW if detail > LARGEST_RATE else _UNLOADED
 
 
-def sentences(outcomes: NDArray[np.int_], details: NDArray[np.float64]) -> NDArray[np.object_]:
+def sentences(outcomes: NDArray[np.int_], details: Float) -> NDArray[np.object_]:
     """`sentence` for arrays."""
     texts = np.full(outcomes.shape, _SENTENCES[Outcome.CONVERGED], dtype=object)
     for i in map(tuple, np.argwhere(outcomes)):

@@ -8,14 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from asperity.arrays import Float
 from asperity.laws import Law, LinkerDieterich
 from asperity.loads import Harmonic
 from asperity.orbit.response import PeriodicResponse
 from asperity.parameters.arguments import typed
-
-Float = NDArray[np.float64]
 
 #: Newton steps for the state; friction is affine in the state for most laws.
 _STEPS = 12

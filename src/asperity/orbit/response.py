@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Complex, Float
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
@@ -29,8 +30,6 @@ from asperity.slider.named import equation_parameters, equation_values, equation
 if TYPE_CHECKING:
     import xarray
 
-
-Float = NDArray[np.float64]
 
 #: Variables of the dataset with one value a point.
 _VARIABLES = (
@@ -90,8 +89,8 @@ class PeriodicResponse(Drawn):
 
     mean_friction: Float
     mu_ss: Float
-    harmonics: NDArray[np.complex128]
-    log_multipliers: NDArray[np.complex128]
+    harmonics: Complex
+    log_multipliers: Complex
     start: Float
     waveform: Float
     iterations: NDArray[np.int64]
@@ -174,25 +173,23 @@ class PeriodicResponse(Drawn):
         return np.angle(self.harmonics[..., 1])
 
     @property
-    def multipliers(self) -> NDArray[np.complex128]:
+    def multipliers(self) -> Complex:
         """Floquet multipliers; beyond the range of doubles they are inf or 0."""
         return from_logs(self.log_multipliers)
 
     @property
     def floquet_max(self) -> Float:
         """Largest modulus of the multipliers; 0 for a law without dynamics."""
-        if self.log_multipliers.shape[-1] == 0:
-            return np.zeros(self.mean_friction.shape)
         with np.errstate(over="ignore"):
-            return np.exp(self.log_multipliers[..., 0].real)
+            return np.exp(_leading(self.log_multipliers).real)
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Whether each point was solved."""
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Bool:
         """Whether a small perturbation dies out."""
         with np.errstate(invalid="ignore"):
             return self.converged & np.asarray(self.floquet_max < 1)
@@ -203,9 +200,7 @@ class PeriodicResponse(Drawn):
 
         "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
         """
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, "", dtype=object)
-        return kind_of_crossing(self.log_multipliers[..., 0])
+        return kind_of_crossing(_leading(self.log_multipliers))
 
     @property
     def mode_frequency(self) -> Float:
@@ -213,17 +208,14 @@ class PeriodicResponse(Drawn):
 
         Known from the monodromy up to multiples of the modulation frequency f and up to its sign.
         """
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, np.nan)
-        turn = np.abs(self.log_multipliers[..., 0].imag) / (2 * np.pi)
-        return np.asarray(turn * self.frequency)
+        return np.asarray(
+            np.abs(_leading(self.log_multipliers).imag) / (2 * np.pi) * self.frequency
+        )
 
     @property
     def growth_rate(self) -> Float:
         """Rate at which the leading mode grows (1/s); negative where the orbit is stable."""
-        if self.log_multipliers.shape[-1] == 0:
-            return np.full(self.mean_friction.shape, -np.inf)
-        return np.asarray(self.log_multipliers[..., 0].real * self.frequency)
+        return np.asarray(_leading(self.log_multipliers).real * self.frequency)
 
     @property
     def result(self) -> NDArray[np.object_]:
@@ -323,6 +315,13 @@ class PeriodicResponse(Drawn):
             "modulation": self.load.formula,
             "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",
         }
+
+
+def _leading(logs: Complex) -> Complex:
+    """Logarithm of the leading multiplier; of a law without dynamics that of 0."""
+    if logs.shape[-1] == 0:
+        return np.full(logs.shape[:-1], complex(-np.inf, np.nan))
+    return logs[..., 0]
 
 
 def dimension_names(

@@ -107,7 +107,7 @@ def find_orbits(
     options : SearchOptions
     methods : tuple of Method
     """
-    solution = Solution.unsolved(problem, problem.system.V.shape[-1], options)
+    solution = Solution.unsolved(problem, options)
     mark_out_of_range(problem, solution)
     outside = solution.outcome == Outcome.OUT_OF_RANGE
     for method in methods:
@@ -138,7 +138,7 @@ def find_orbits_on_cores(
     Orbits on meshes are not returned.
     """
     points = problem.system.V.shape[-1]
-    solution = Solution.unsolved(problem, points, options)
+    solution = Solution.unsolved(problem, options)
     slices = [np.arange(k, min(k + _SLICE, points)) for k in range(0, points, _SLICE)]
     problems = [take(problem, index) for index in slices]
     silent = SearchOptions(options.harmonics, options.phases)

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, put, take
+from asperity.arrays import Bool, Complex, Float, Index
+from asperity.orbit.batches import put, take
 from asperity.orbit.mesh.mesh import GAUSS, Orbit, scheme_for
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 class Solution(NamedTuple):
@@ -40,8 +39,8 @@ class Solution(NamedTuple):
     """
 
     mean_friction: Float
-    harmonics: NDArray[np.complex128]
-    log_multipliers: NDArray[np.complex128]
+    harmonics: Complex
+    log_multipliers: Complex
     start: Float
     waveform: Float
     iterations: NDArray[np.int64]
@@ -51,9 +50,10 @@ class Solution(NamedTuple):
     orbit: Orbit
 
     @classmethod
-    def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
+    def unsolved(cls, problem: Problem, options: SearchOptions) -> Solution:
         """A solution of a problem in which every point is unsolved."""
-        return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
+        system = problem.system
+        return cls.empty(system.size, system.V.shape[-1], options, scheme_for(system))
 
     @classmethod
     def empty(
@@ -78,23 +78,21 @@ class Solution(NamedTuple):
         )
 
     @property
-    def converged(self) -> NDArray[np.bool_]:
+    def converged(self) -> Bool:
         """Which points are solved."""
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
     @property
-    def numbers(self) -> NDArray[np.complex128]:
+    def numbers(self) -> Complex:
         """Mean, then harmonics, shape (1 + count, points)."""
         return np.concatenate([self.mean_friction[None], self.harmonics])
 
     @property
-    def informed(self) -> NDArray[np.bool_]:
+    def informed(self) -> Bool:
         """Points at which a method found an orbit, or the reason why there is none."""
         return (self.outcome != Outcome.NO_ORBIT) | (self.detail > 0)
 
-    def store(
-        self, rows: Indices, observables: Observables, logs: NDArray[np.complex128] | None = None
-    ) -> None:
+    def store(self, rows: Index, observables: Observables, logs: Complex | None = None) -> None:
         """Write converged points; `logs` take the place of the observables' multipliers.
 
         Waveforms are sampled later, when an orbit is final.
@@ -105,12 +103,12 @@ class Solution(NamedTuple):
         self.start[:, rows] = observables.start
         self.outcome[rows] = Outcome.CONVERGED
 
-    def discard(self, rows: Indices) -> None:
+    def discard(self, rows: Index) -> None:
         """Set the numbers of failed points to NaN, which cannot be mistaken for answers."""
         for values in self[:5]:
             values[..., rows] = np.nan
 
-    def merge(self, rows: Indices, attempt: Solution, method: str = "") -> None:
+    def merge(self, rows: Index, attempt: Solution, method: str = "") -> None:
         """Write another attempt at the points `rows`; a failed one keeps the earlier outcome."""
         better = np.flatnonzero(attempt.informed)
         if len(better) < len(rows):
@@ -168,11 +166,11 @@ class Method(ABC):
     block: ClassVar[int] = 2048
     on_mesh: ClassVar[bool] = True
 
-    @abstractmethod
     def suits(self, problem: Problem) -> bool:
-        """Whether the method can solve these equations under this load."""
+        """Whether the method can solve these equations under this load; by default it can any."""
+        return True
 
-    def candidates(self, solution: Solution) -> Indices:
+    def candidates(self, solution: Solution) -> Index:
         """Points that the method may solve, by their outcome so far; by default all unsolved."""
         return np.flatnonzero(~solution.converged)
 

@@ -11,7 +11,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import spectral_radius
 from asperity.loads import Harmonic
-from asperity.orbit.batches import chunk_of, points_of, run_chunks
+from asperity.orbit.batches import chunk_of, points_of, put, run_chunks
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.limits import even_phases, slip_pulse
@@ -70,6 +70,5 @@ def steady_sliding(problem: Problem) -> SteadySliding:
     points = np.arange(problem.system.V.shape[-1])
     numbers = SteadySliding(*np.empty((3, len(points))))
     for part, values in run_chunks(_compiled, (problem,), points, chunk_of(points, _CHUNK)):
-        for target, value in zip(numbers, values, strict=True):
-            target[part] = value
+        put(numbers, part, values)
     return numbers

@@ -7,10 +7,12 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.small_systems import jacobian_columns
+from asperity.algebra.small_systems import value_and_jacobian
+from asperity.arrays import Bool
 from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
@@ -59,9 +61,10 @@ class Motion(eqx.Module):
         return 0.0
 
     @property
-    def linear(self) -> tuple[int, ...]:
-        """Indices of the states that are not logarithms."""
-        return tuple(i for i, log in enumerate(self.logarithmic) if not log)
+    def logarithms(self) -> Bool:
+        """Mask of the states that are logarithms: those of the law are, shape (size,)."""
+        of_law = [True] * (self.size - len(self.logarithmic))
+        return np.array([*self.logarithmic, *of_law])
 
     @property
     def kappa(self) -> Array:
@@ -135,8 +138,7 @@ class Motion(eqx.Module):
         """Derivatives [row, column] of the rates in steady sliding, shape (size, size, points)."""
         steady = self.steady()
         at = Excitation(jnp.ones(steady.shape[1:]))
-        _, columns = jacobian_columns(lambda Y: self.rates(Y, at), steady)
-        return jnp.stack(columns, axis=1)
+        return value_and_jacobian(lambda Y: self.rates(Y, at), steady)[1]
 
     def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
         """Factors, shape as Y, that make the rates times them as linear in Y as possible.

@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.algebra.small_systems import jacobian_columns
+from asperity.algebra.small_systems import value_and_jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation, Modulation
 from asperity.slider.motion import Motion
@@ -74,8 +74,7 @@ def _values(structure: Any) -> Callable[..., PointValues]:
         def rates_and_slip(Y: Array) -> Array:
             return jnp.concatenate([system.rates(Y, at), system.log_slip(Y, at)[None]])
 
-        values, columns = jacobian_columns(rates_and_slip, centre + deviations)
-        slopes = jnp.stack(columns, axis=1)
+        values, slopes = value_and_jacobian(rates_and_slip, centre + deviations)
         constant, rest = system.force_split(centre, deviations, at)
         constant, rest = (a * jnp.ones_like(values[0]) for a in (constant, rest))
         return PointValues(values[:-1], slopes[:-1], values[-1], slopes[-1], constant, rest)

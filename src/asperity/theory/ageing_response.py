@@ -29,7 +29,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.errors import require
+from asperity.parameters.arguments import one_of
 from asperity.theory.closed_forms import SmallModulation
 
 AgeVelocity: TypeAlias = Literal["slider", "plastic"]
@@ -86,10 +86,8 @@ def ageing_response(p: SmallModulation, age_velocity: AgeVelocity = "slider") ->
     InputError
         If `age_velocity` is neither of the two.
     """
-    holds, rule = age_velocity in ("slider", "plastic"), "be 'slider' or 'plastic'"
-    got = f"'{age_velocity}'"
-    require(holds, "ageing_response.age_velocity", rule, got, "choose one of the two")
-    plastic = age_velocity == "plastic"
+    known = ("slider", "plastic")
+    plastic = one_of(age_velocity, known, "ageing_response.age_velocity") == "plastic"
     one, two = _order(p, 1, plastic), _order(p, 2, plastic)
     nu = p.V / (p.omega * p.D0)
 

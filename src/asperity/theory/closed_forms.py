@@ -23,8 +23,9 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError
 from asperity.laws.parameter import checked
+from asperity.parameters.arguments import one_of
 
 Form: TypeAlias = Literal["derived", "as_printed"]
 
@@ -90,7 +91,7 @@ def steady_position(p: SmallModulation, t: ArrayLike, form: Form = "derived") ->
 
     The spring carries F = mu W0, so that x_st = V t - mu W0 / K; the printed form lacks mu.
     """
-    mu = _by_form(form, derived=p.mu, as_printed=1.0)
+    mu = 1.0 if _as_printed(form) else p.mu
     return p.V * t - mu * p.W0 / p.K
 
 
@@ -100,8 +101,7 @@ def determinant(p: SmallModulation, form: Form = "derived") -> Array:
     Derived: (K - M omega^2 + i omega A W0/V)(V/D0 + i omega) - i omega B W0/D0. The printed form
     has K/Kc where factoring this out gives Kc/K, and, like omega_c, needs B > A.
     """
-    _check_form(form)
-    if form == "derived":
+    if not _as_printed(form):
         mechanical = p.K - p.M * p.omega**2 + 1j * p.omega * p.A * p.W0 / p.V
         return mechanical * (p.V / p.D0 + 1j * p.omega) - 1j * p.omega * p.B * p.W0 / p.D0
     ratio = p.K / critical_stiffness(p)
@@ -164,7 +164,7 @@ def second_harmonic(p: SmallModulation, epsilon: ArrayLike, form: Form = "derive
 
     Derived: (V K/(omega W0)) mu (mu + 2A)/(8 A^2) eps^2; printed: with mu^2/(2 A^2) in its place.
     """
-    factor = _by_form(form, derived=p.mu * (p.mu + 2 * p.A) / 8, as_printed=p.mu**2 / 2)
+    factor = p.mu**2 / 2 if _as_printed(form) else p.mu * (p.mu + 2 * p.A) / 8
     return p.kappa * factor / p.A**2 * jnp.square(epsilon)
 
 
@@ -197,8 +197,7 @@ def age_to_velocity_ratio(p: SmallModulation, form: Form = "derived") -> Array:
     Derived: 1/sqrt(1 + (omega D0/V)^2), from Eq. (14) alone. Printed: omega_c/omega, which is its
     high-frequency limit only where (B - A)/A = 1, as it is at the paper's central values.
     """
-    _check_form(form)
-    if form == "derived":
+    if not _as_printed(form):
         return 1 / jnp.hypot(1.0, p.omega * p.D0 / p.V)
     return critical_pulsation(p) / p.omega
 
@@ -240,9 +239,8 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
         "plastic": (B - A) W0/(D0 - (B - A) lambda), the spring and the asperities in series.
     """
     lengths = {"slider": p.D0 + p.A * p.lambda_, "plastic": p.D0 - (p.B - p.A) * p.lambda_}
-    rule, got, advice = "be 'slider' or 'plastic'", f"'{age_velocity}'", "choose one of the two"
-    require(age_velocity in lengths, "critical_stiffness_elastic.age_velocity", rule, got, advice)
-    return (p.B - p.A) * p.W0 / lengths[age_velocity]
+    chosen = one_of(age_velocity, lengths, "critical_stiffness_elastic.age_velocity")
+    return (p.B - p.A) * p.W0 / lengths[chosen]
 
 
 def critical_stiffness_form(
@@ -266,11 +264,5 @@ def critical_stiffness_form(
     return None
 
 
-def _check_form(form: str) -> None:
-    rule, advice = "be 'derived' or 'as_printed'", "choose one of the two"
-    require(form in ("derived", "as_printed"), "closed form", rule, f"'{form}'", advice)
-
-
-def _by_form(form: str, *, derived: Array, as_printed: Array | float) -> Array | float:
-    _check_form(form)
-    return derived if form == "derived" else as_printed
+def _as_printed(form: str) -> bool:
+    return one_of(form, ("derived", "as_printed"), "closed form") == "as_printed"

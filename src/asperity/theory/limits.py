@@ -30,8 +30,8 @@ from asperity.algebra.small_systems import (
     averaged,
     inverse_points,
     jacobian,
-    jacobian_columns,
     spectral_abscissa,
+    value_and_jacobian,
 )
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
@@ -127,24 +127,6 @@ def averaged_limit(
     points = at.w.shape[1]
     n = system.size
 
-    def unfinished(carry: tuple) -> Array:
-        *_, change, steps = carry
-        return (steps < max_steps) & jnp.any(change > tolerance)
-
-    def body(carry: tuple) -> tuple:
-        centre, _, _, steps = carry
-        return (*_newton_step(system, centre, at, weights), steps + 1)
-
-    none = [[jnp.zeros(points)] * n] * n
-    start = (tuple(laplace_estimate(system, at)), none, jnp.full(points, jnp.inf), 0)
-    centre, matrix, _, _ = jax.lax.while_loop(unfinished, body, start)
-    return AveragedLimit(centre, matrix)
-
-
-def _newton_step(
-    system: QuasiStatic, centre: tuple[Array, ...], at: Excitation, weights: Array
-) -> tuple:
-    """The new means, the matrix used, and the largest logarithmic change."""
     # For constant states, terms with the slopes of load and shear force have zero mean.
     flat = jnp.zeros_like(at.w)
     constant = Excitation(at.w, flat, at.shear)
@@ -152,15 +134,27 @@ def _newton_step(
     def rates(*Y: Array) -> tuple[Array, ...]:
         return tuple(system.rates(jnp.stack(Y), constant))
 
-    value, push = jax.linearize(rates, *(c + flat for c in centre))
-    matrix = averaged(jacobian(push, value), weights)
-    mean = [weights @ rate for rate in value]
-    slip = 1 - mean[0] / system.kappa
-    mean[0] = -system.kappa * slip * jnp.log(slip)
-    change = [-c for c in apply(inverse_points(matrix), mean)]
-    change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
-    moved = jnp.stack([jnp.log(slip), *change[1:]])
-    return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, jnp.abs(moved).max(0)
+    def unfinished(carry: tuple) -> Array:
+        *_, change, steps = carry
+        return (steps < max_steps) & jnp.any(change > tolerance)
+
+    def newton(carry: tuple) -> tuple:
+        """New means, the matrix used, the largest logarithmic change, and the number of steps."""
+        centre, _, _, steps = carry
+        value, push = jax.linearize(rates, *(c + flat for c in centre))
+        matrix = averaged(jacobian(push, value), weights)
+        mean = [weights @ rate for rate in value]
+        slip = 1 - mean[0] / system.kappa
+        mean[0] = -system.kappa * slip * jnp.log(slip)
+        change = [-c for c in apply(inverse_points(matrix), mean)]
+        change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
+        largest = jnp.abs(jnp.stack([jnp.log(slip), *change[1:]])).max(0)
+        return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, largest, steps + 1
+
+    none = [[jnp.zeros(points)] * n] * n
+    start = (tuple(laplace_estimate(system, at)), none, jnp.full(points, jnp.inf), 0)
+    centre, matrix, _, _ = jax.lax.while_loop(unfinished, newton, start)
+    return AveragedLimit(centre, matrix)
 
 
 _NODES = 192
@@ -189,6 +183,6 @@ def adiabatic_growth(problem: Problem) -> Array:
     system, load = problem
     Y = adiabatic_states(problem, nodes=_NODES)
     at = load.at(even_phases(_NODES) * jnp.ones(Y.shape[2]))
-    _, columns = jacobian_columns(lambda y: system.rates(y, at), Y)
-    rate = spectral_abscissa(jnp.stack(columns, axis=1))
+    _, slopes = value_and_jacobian(lambda y: system.rates(y, at), Y)
+    rate = spectral_abscissa(slopes)
     return 2 * jnp.pi * jnp.maximum(rate, 0.0).mean(0)

@@ -20,7 +20,7 @@ amplitudes of most experiments.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
@@ -29,11 +29,11 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.algebra.small_systems import jacobian_columns, solve_points
+from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.loads import Excitation
-from asperity.parameters import DRIVE, MACHINE, obeying
 from asperity.parameters.arguments import broadcast_shape, typed
-from asperity.slider import Motion, Slider, equation_of_motion
+from asperity.slider import Motion, Slider
+from asperity.slider.problem import checked_problem
 
 #: (Y, w, dw/dtheta): the three arguments of the rates.
 RateArguments: TypeAlias = tuple[Array, Array, Array]
@@ -84,12 +84,6 @@ class PerturbationResponse(eqx.Module):
     omega: Array
 
     @property
-    def _arrays(self) -> Any:
-        """NumPy, or JAX within its transformations."""
-        omega: Any = self.omega
-        return np if isinstance(omega, np.ndarray) else jnp
-
-    @property
     def eigenvalues_per_radian(self) -> Array:
         """Growth rates per radian of the modulation, shape (..., states)."""
         return self.eigenvalues / self.omega[..., None]
@@ -97,16 +91,16 @@ class PerturbationResponse(eqx.Module):
     @property
     def multipliers(self) -> Array:
         """Floquet multipliers in the limit eps -> 0, shape (..., states)."""
-        return self._arrays.exp(2 * np.pi * self.eigenvalues_per_radian)
+        return self.omega.__array_namespace__().exp(2 * np.pi * self.eigenvalues_per_radian)
 
     @property
     def stable(self) -> Array:
         """Whether unmodulated sliding is stable, shape (...)."""
-        return self._arrays.all(self.eigenvalues.real < 0, axis=-1)
+        return self.omega.__array_namespace__().all(self.eigenvalues.real < 0, axis=-1)
 
     def at(self, epsilon: ArrayLike) -> PerturbedHarmonics:
         """Leading-order response at the amplitude `epsilon` (broadcasts with the points)."""
-        arrays = self._arrays
+        arrays = self.omega.__array_namespace__()
         first = arrays.asarray(epsilon)
         second = first**2
         c1, c2 = first * self.transfer, second * self.second_harmonic
@@ -161,13 +155,15 @@ def perturbation_response(
     >>> slider = asp.Slider(pmma.law("rice-ruina"), spring="0.2 N/um", load=pmma.W0)
     >>> asp.perturbation_response(slider, velocity="1 um/s", frequency="120 Hz").transfer
     """
-    V = jnp.asarray(DRIVE["V"].check(velocity))
-    f = jnp.asarray(DRIVE["frequency"].check(frequency))
-    eta = None
-    if radiation_damping is not None:
-        eta = obeying(radiation_damping, MACHINE["eta"].label, "damping", "positive")
-    motion = equation_of_motion(slider, V, 2 * jnp.pi * f, inertia=inertia, eta=eta)
-    return jax.tree.map(np.asarray, perturb(motion))
+    problem = checked_problem(
+        slider,
+        velocity=velocity,
+        epsilon=0.0,
+        frequency=frequency,
+        inertia=inertia,
+        radiation_damping=radiation_damping,
+    )
+    return jax.tree.map(np.asarray, perturb(problem.system))
 
 
 def perturb(system: Motion) -> PerturbationResponse:
@@ -209,8 +205,8 @@ def _expand(system: Motion) -> PerturbationResponse:
     def force(point: RateArguments) -> Array:
         return system.force(point[0], Excitation(*point[1:]))[None]
 
-    jacobian = jnp.stack(jacobian_columns(lambda Y: rates((Y, *steady[1:])), Y0)[1], axis=1)
-    force_gradient = jnp.stack(jacobian_columns(lambda Y: force((Y, *steady[1:])), Y0)[1])[:, 0]
+    _, jacobian = value_and_jacobian(lambda Y: rates((Y, *steady[1:])), Y0)
+    _, (force_gradient,) = value_and_jacobian(lambda Y: force((Y, *steady[1:])), Y0)
     load = (jnp.zeros_like(Y0) + 0j, one + 0j, 1j * one)
     Y1 = _harmonic_response(jacobian, _first(rates, steady, load), 1)
     u: RateArguments = (Y1, load[1], load[2])

@@ -88,8 +88,7 @@ class SegmentEquations(eqx.Module):
         An error of a logarithm is a relative error already. The displacement, which grows without
         bound, keeps the error of the force as long as its digits allow it.
         """
-        free = np.ones(self.motion.size + 1, bool)
-        free[list(self.motion.linear)] = False
+        free = np.append(self.motion.logarithms, True)
         scale = jnp.where(free, rtol, atol + rtol * jnp.abs(Y))
         scale = scale.at[-1].max(_DIGITS * jnp.abs(Y[-1]))
         names = self.motion.mechanical

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.runge_kutta import radau_iia
-from asperity.algebra.small_systems import jacobian_columns, solve_columns, spectral_radius
+from asperity.algebra.small_systems import solve_columns, spectral_radius, value_and_jacobian
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
@@ -126,8 +126,8 @@ def _step(
     table = _tableau()
     n = Y.shape[0] - 1
     now, at = system.at(t), system.at(t + jnp.asarray(table.c) * h)
-    value, columns = jacobian_columns(lambda y: _stacked(system, now, y), Y[:n])
-    jacobian = jnp.stack([c[:n] for c in columns], axis=1)
+    value, slopes = value_and_jacobian(lambda y: _stacked(system, now, y), Y[:n])
+    jacobian = slopes[:n]
     values = jnp.asarray(table.eigenvalues)
     identity = jnp.eye(n)[:, :, None]
     matrices = identity * values / h - jacobian[:, :, None]

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.algebra.small_systems import jacobian_columns, solve_points
+from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.errors import Argument, InputError, require
 from asperity.laws import Law, State
 from asperity.laws.uneven_track import POSITION
@@ -162,8 +162,8 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
         return jnp.where(moves, packed - start, jnp.stack(law.state_rate(v, v, tuple(packed), w)))
 
     def step(_: int, packed: Array) -> Array:
-        value, columns = jacobian_columns(rates, packed)
-        change = solve_points(jnp.stack(columns, axis=1), -value)
+        value, jacobian = value_and_jacobian(rates, packed)
+        change = solve_points(jacobian, -value)
         return packed + jnp.clip(change, -_LEAP, _LEAP)
 
     # Under w = 1 the initial guess is exact to the last digit.

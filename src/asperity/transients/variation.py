@@ -25,7 +25,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.runge_kutta import radau_iia
-from asperity.algebra.small_systems import jacobian_columns
+from asperity.algebra.small_systems import value_and_jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation
 from asperity.slider import Motion
@@ -108,6 +108,6 @@ def _directions(structure: Any, names: tuple[str, ...]) -> list[Any]:
 @jax.jit
 def _slopes(motion: Motion, directions: list[Any], Y: Array) -> tuple[Array, list[Array]]:
     at = Excitation(jnp.ones(Y.shape[1:]))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), Y)
+    _, jacobian = value_and_jacobian(lambda Y: motion.rates(Y, at), Y)
     sides = [jax.jvp(lambda m: m.rates(Y, at), (motion,), (d,))[1] for d in directions]
-    return jnp.stack(columns, axis=1), sides
+    return jacobian, sides

@@ -74,22 +74,22 @@ def each(a):
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_solve_columns_agrees_with_lapack(n, complex_):
     matrix, right = matrices(n, complex_=complex_), normal(n, COLUMNS, POINTS, seed=9)
-    found, one = map(each, solve_columns_and_points(matrix, right))
-    np.testing.assert_allclose(found, np.linalg.solve(each(matrix), each(right)), rtol=1e-9)
-    np.testing.assert_allclose(one, found[:, :, 0], rtol=EXACT)
+    solution, one = map(each, solve_columns_and_points(matrix, right))
+    np.testing.assert_allclose(solution, np.linalg.solve(each(matrix), each(right)), rtol=1e-9)
+    np.testing.assert_allclose(one, solution[:, :, 0], rtol=EXACT)
 
 
 def test_solve_columns_handles_a_zero_pivot():
     matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 3.0]])
-    found, _ = solve_columns_and_points(repeated(matrix), repeated(np.eye(3, COLUMNS)))
-    np.testing.assert_allclose(each(found)[0, :, :3], np.linalg.inv(matrix), atol=EXACT)
+    solution, _ = solve_columns_and_points(repeated(matrix), repeated(np.eye(3, COLUMNS)))
+    np.testing.assert_allclose(each(solution)[0, :, :3], np.linalg.inv(matrix), atol=EXACT)
 
 
 def test_a_singular_matrix_gives_no_finite_solution():
-    for found in solve_columns_and_points(
+    for solution in solve_columns_and_points(
         repeated([[1.0, 2.0], [2.0, 4.0]]), repeated(np.ones((2, COLUMNS)))
     ):
-        assert not np.isfinite(found).any()
+        assert not np.isfinite(solution).any()
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -131,15 +131,15 @@ def test_steady_sliding_on_asperities_is_stable_with_inertia():
 def dense_cyclic(maps, right):
     """The periodic recurrence d_{i+1} - T_i d_i = r_i as one matrix."""
     n, _, count, points = maps.shape
-    found = np.zeros_like(right)
+    solution = np.zeros_like(right)
     for p in range(points):
         matrix = np.zeros((count, n, count, n))
         for i in range(count):
             matrix[i, :, (i + 1) % count] += np.eye(n)
             matrix[i, :, i] -= maps[:, :, i, p]
         flat = matrix.reshape(count * n, -1)
-        found[..., p] = np.linalg.solve(flat, right[..., p].T.ravel()).reshape(count, n).T
-    return found
+        solution[..., p] = np.linalg.solve(flat, right[..., p].T.ravel()).reshape(count, n).T
+    return solution
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -147,10 +147,10 @@ def dense_cyclic(maps, right):
 def test_solve_cyclic_agrees_with_a_dense_solution(n, count):
     maps = normal(n, n, count, 6) + np.eye(n)[:, :, None, None]
     sides = normal(n, 2, count, 6, seed=8)
-    found = solve_cyclic(maps, sides)
+    solution = solve_cyclic(maps, sides)
     for k in range(2):
         expected = dense_cyclic(maps, sides[:, k])
-        np.testing.assert_allclose(found[:, k], expected, rtol=1e-8, atol=1e-10)
+        np.testing.assert_allclose(solution[:, k], expected, rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -174,9 +174,9 @@ def test_solve_cyclic_where_one_direction_grows_and_another_decays():
     after = np.roll(basis, -1, axis=2)
     maps = np.einsum("ijmp,jk,lkmp->ilmp", after, stretch, basis)
     right = normal(2, 40, 2)
-    found = np.asarray(solve_cyclic(maps, right[:, None]))[:, 0]
-    np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-9, atol=1e-12)
-    assert np.abs(found).max() < 100
+    solution = np.asarray(solve_cyclic(maps, right[:, None]))[:, 0]
+    np.testing.assert_allclose(solution, dense_cyclic(maps, right), rtol=1e-9, atol=1e-12)
+    assert np.abs(solution).max() < 100
 
 
 #: Irregular on purpose. On a mesh that is a smooth map of an even one, quadratures of periodic

@@ -158,28 +158,28 @@ def tides(turns, epsilon):
     law = RiceRuina(mu0=MU0, A=a, B=b, D0=D0, V0=V0)
     slider = asp.Slider(law, spring=1.05 * (b - a) * W0 / D0, load=W0)
     drive = {"velocity": v0, "epsilon": epsilon, "frequency": v0 / (np.asarray(turns) * D0)}
-    found = asp.periodic_response(slider, **drive, waveform=SAMPLES)
-    return found, a, b, MU0 - (b - a) * np.log(v0 / V0)
+    response = asp.periodic_response(slider, **drive, waveform=SAMPLES)
+    return response, a, b, MU0 - (b - a) * np.log(v0 / V0)
 
 
 def test_a_weak_modulation_near_resonance_has_the_linear_gain():
     """v = 1 + dv e^(i theta) in f' = kappa (1 - v), phi' = chi (e^(-phi) - v), to first order."""
     turns = np.array([4.6, 8.0, 9.0])
-    found, a, b, mu = tides(turns, 1e-4)
-    assert found.converged.all()
+    response, a, b, mu = tides(turns, 1e-4)
+    assert response.converged.all()
     chi = turns / (2 * np.pi)
     kappa = chi * 1.05 * (b - a)
     gain = kappa / np.abs(a - 1j * kappa - b * chi / (1j + chi))
     assert gain[1] == pytest.approx(5.1, abs=0.05)
     # The next order is that of the swing of the exponent squared.
     swing = gain * mu * 1e-4 / kappa
-    assert (np.abs(found.mu1 / (1e-4 * mu) / gain - 1) < swing**2).all()
+    assert (np.abs(response.mu1 / (1e-4 * mu) / gain - 1) < swing**2).all()
 
 
 def test_modulated_at_half_the_critical_period_the_fault_is_unstable():
     """The monodromy matrix by another integrator, from the orbit's own first states."""
     epsilon = 0.002
-    found, a, b, mu = tides([4.6, 8.0], epsilon)
+    response, a, b, mu = tides([4.6, 8.0], epsilon)
     for k, turns in enumerate((4.6, 8.0)):
         chi = turns / (2 * np.pi)
         kappa = chi * 1.05 * (b - a)
@@ -201,5 +201,5 @@ def test_modulated_at_half_the_critical_period_the_fault_is_unstable():
             y = y - np.linalg.solve(monodromy - np.eye(2), period(y) - y)
         assert period(y) == pytest.approx(y, abs=1e-10)
         largest = np.abs(np.linalg.eigvals(monodromy)).max()
-        assert np.exp(found.log_multipliers[k, 0].real) == pytest.approx(largest, rel=1e-5)
-        assert found.stable[k] == (largest < 1) == (turns == 8.0)
+        assert np.exp(response.log_multipliers[k, 0].real) == pytest.approx(largest, rel=1e-5)
+        assert response.stable[k] == (largest < 1) == (turns == 8.0)

@@ -65,10 +65,10 @@ def test_agrees_with_collocation():
     for name in ("mean_friction", "mu1", "mu2"):
         gap = np.abs(getattr(fast, name)[solved] / getattr(robust, name) - 1)
         assert gap.max() < 2 * PROMISED
-    for found, expected in zip(fast.multipliers[solved], robust.multipliers, strict=True):
+    for of_fast, expected in zip(fast.multipliers[solved], robust.multipliers, strict=True):
         size = np.abs(expected)
         size = np.maximum(size, max(VANISHING, DROWNED * size.max()))
-        gap = np.abs(found[:, None] - expected).min(0) / size
+        gap = np.abs(of_fast[:, None] - expected).min(0) / size
         assert gap.max() < 2 * PROMISED
 
 
@@ -82,10 +82,12 @@ def shoot(drive=DRIVE, mass=1.6):
     problem, shape = flatten(checked_problem(slider, inertia=True, **drive))
     points = int(np.prod(shape))
     reported = []
-    found = shooting_method.Shooting().solve(problem, SearchOptions(HARMONICS, 0, reported.append))
-    left = np.flatnonzero(~found.converged)
+    solution = shooting_method.Shooting().solve(
+        problem, SearchOptions(HARMONICS, 0, reported.append)
+    )
+    left = np.flatnonzero(~solution.converged)
     assert sum(reported) == points - len(left)
-    return found, left
+    return solution, left
 
 
 def test_waveform_has_the_harmonics_and_the_mean_slip():
@@ -111,9 +113,9 @@ def plant(monkeypatch, mistake):
 
 
 def test_no_mistake_no_alarm():
-    found, left = shoot()
+    solution, left = shoot()
     assert len(left) == 0
-    assert np.isfinite(found.log_multipliers).all()
+    assert np.isfinite(solution.log_multipliers).all()
 
 
 def observed(mistake):
@@ -143,20 +145,20 @@ def observed(mistake):
 )
 def test_planted_mistakes_in_an_integration_pass_are_detected(monkeypatch, mistake):
     plant(monkeypatch, mistake)
-    found, left = shoot()
+    solution, left = shoot()
     assert len(left) == 3
-    assert np.isnan(found.mean_friction).all()
-    assert np.isnan(found.log_multipliers).all()
+    assert np.isnan(solution.mean_friction).all()
+    assert np.isnan(solution.log_multipliers).all()
 
 
 def test_shooting_leaves_points_that_it_cannot_solve():
     """A resonance far above what the steps resolve, and slip that relaxes within one of them."""
     assert len(shoot(mass=1e-7)[1]) == 3
     fast = {"velocity": [1e-3, 1e-6], "epsilon": 0.3, "frequency": [20.0, 120.0]}
-    found, left = shoot(fast)
+    solution, left = shoot(fast)
     assert list(left) == [0]
-    assert np.isnan(found.mean_friction[0])
-    assert np.isfinite(found.mean_friction[1])
+    assert np.isnan(solution.mean_friction[0])
+    assert np.isfinite(solution.mean_friction[1])
 
 
 def test_points_that_shooting_cannot_solve_go_to_collocation():

@@ -11,9 +11,10 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, require
 from asperity.loads.modulation import Excitation
 from asperity.loads.programme.segment import ProgrammeSegment, Scalar
+from asperity.parameters.arguments import one_of
 from asperity.units import to_si
 
 _FIELDS = {"force": "load", "velocity": "velocity"}
@@ -168,10 +169,7 @@ def _pieces(interpolant: str, name: str) -> Any:
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     known = {"pchip": PchipInterpolator, "spline": CubicSpline}
-    if interpolant not in known:
-        got = f"'{interpolant}'"
-        raise InputError(f"{name}.interpolant", "be known", got, closest(interpolant, known))
-    return known[interpolant]
+    return known[one_of(interpolant, known, f"{name}.interpolant")]
 
 
 def _check_time(time: np.ndarray, name: str) -> None:

@@ -19,9 +19,10 @@ from asperity._jax import jit_large
 from asperity.algebra.contraction import Equations, contracted, implicit_solution
 from asperity.algebra.mirrored_grid import grid
 from asperity.algebra.small_systems import Matrix, apply, averaged, inverse_points, jacobian
+from asperity.orbit.batches import points_of
 from asperity.orbit.floquet import floquet_form, log_multipliers_along
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
-from asperity.orbit.methods.balance import BalanceEquations, balanced_orbit
+from asperity.orbit.methods.balance import BalanceEquations
 from asperity.orbit.methods.fourier import (
     LARGEST_CONTRACTING_RATE,
     LoadCycle,
@@ -47,8 +48,6 @@ _DAMPED_NODES, _INERTIAL_NODES = 32, 64
 #: Estimated error that must be reached.
 _ERROR = 1e-9
 _TOLERANCE, _MOST_STEPS = 1e-10, 40
-#: Tolerance with inertia or damping, where harmonics may be much smaller than the states'.
-_BALANCED_TOLERANCE = 1e-11
 
 
 class FastOrbits(NamedTuple):
@@ -79,7 +78,10 @@ def _quasi_static(program: Program) -> bool:
     return program.equations.motion is QuasiStatic
 
 
-def _balance(program: Program) -> BalanceEquations:
+def _equations(program: Program) -> Any:
+    """Equations of the method; multipliers are of `FourierEquations` alone."""
+    if _quasi_static(program):
+        return FourierEquations(_NODES, _GRADING)
     nodes = _INERTIAL_NODES if program.equations.massive else _DAMPED_NODES
     return BalanceEquations(nodes, _GRADING)
 
@@ -95,85 +97,29 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
     # Points that the method is not for take no steps.
     problem = problem._replace(load=jax.tree.map(lambda a: jnp.where(good, a, 0.0), problem.load))
-    solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
-    return solve(problem, program, valid, good)
+    equations = _equations(program)
+    unknowns, prepared, error, steps = equations.orbits(problem, program.harmonics)
+    good &= error < _ERROR
+    if program.multipliers:
+        good &= floquet_form(*equations.linearised_in_tau(problem, unknowns), factor=True).converged
+    # Other points get states with finite equations, so that no NaN reaches a good point.
+    steady = equations.steady(problem)
+    unknowns = jax.tree.map(lambda a, s: jnp.where(good, a, s), unknowns, steady)
+    prepared = jax.tree.map(lambda a: jnp.where(good, a, 0.0), prepared)
+    return FastOrbits(unknowns, (prepared, jnp.where(good.any(), steps, 0)), valid, good)
 
 
 def fast_values(parameters: Parameters, fast: FastOrbits, program: Program) -> ResponseValues:
     """Response of the orbits, with its derivatives to the parameters."""
     problem = program.equations.problem(only_where(fast.converged, parameters))
-    evaluate = _fourier_values if _quasi_static(program) else _balanced_values
-    mean, harmonics, logs = evaluate(problem, fast, program)
-    outcome = jnp.where(fast.converged, int(Outcome.CONVERGED), int(Outcome.NO_ORBIT))
-    return ResponseValues(mean, harmonics.T, logs.T, outcome)
-
-
-def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Array) -> FastOrbits:
-    system, load = problem
-    orbit = fourier_orbit(
-        *problem,
-        valid.shape[0],
-        nodes=_NODES,
-        grading=_GRADING,
-        tolerance=_TOLERANCE,
-        max_steps=_MOST_STEPS,
-    )
-    cycle = load_cycle(load, _NODES, _GRADING)
-    good &= orbit_error(system, cycle, orbit, program.harmonics) < _ERROR
-    unknowns = FourierUnknowns(orbit.mean, orbit.zero_mean)
-    if program.multipliers:
-        J = FourierEquations(_NODES, _GRADING).jacobian(problem, unknowns)
-        good &= floquet_form(stretched(cycle, J), cycle.integral, factor=True).converged
-    # Other points get states with finite equations, so that no NaN reaches a good point.
-    steady = system.steady()
-    mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
-    zero_mean = tuple(jnp.where(good, a, 0.0) for a in orbit.zero_mean)
-    steps = jnp.where(good.any(), orbit.steps, 0)
-    return FastOrbits(FourierUnknowns(mean, zero_mean), (steps,), valid, good)
-
-
-def _fourier_values(
-    problem: Problem, fast: FastOrbits, program: Program
-) -> tuple[Array, Array, Array]:
-    equations = FourierEquations(_NODES, _GRADING)
-    unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
-    cycle = equations.cycle(problem)
-    mean, harmonics = force_spectrum(
-        problem.system, cycle, unknowns.mean, unknowns.zero_mean, program.harmonics
-    )
-    logs = jnp.zeros((0, *mean.shape), dtype=complex)
-    if program.multipliers:
-        J = stretched(cycle, equations.jacobian(problem, unknowns))
-        logs = log_multipliers_along(J, cycle.integral)
-    return mean, harmonics, logs
-
-
-def _balanced_orbits(problem: Problem, program: Program, valid: Array, good: Array) -> FastOrbits:
-    equations = _balance(program)
-    orbit = balanced_orbit(
-        problem,
-        nodes=equations.nodes,
-        grading=equations.grading,
-        harmonics=program.harmonics,
-        tolerance=_BALANCED_TOLERANCE,
-        max_steps=_MOST_STEPS,
-    )
-    good &= orbit.error < _ERROR
-    # As above.
-    steady = equations.steady(problem)
-    unknowns = jax.tree.map(lambda a, s: jnp.where(good, a, s), orbit.unknowns, steady)
-    prepared = jax.tree.map(lambda a: jnp.where(good, a, 0.0), orbit.prepared)
-    steps = jnp.where(good.any(), orbit.steps, 0)
-    return FastOrbits(unknowns, (prepared, steps), valid, good)
-
-
-def _balanced_values(
-    problem: Problem, fast: FastOrbits, program: Program
-) -> tuple[Array, Array, Array]:
-    equations = _balance(program)
+    equations = _equations(program)
     unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
     mean, harmonics = equations.force_spectrum(problem, unknowns, program.harmonics)
-    return mean, harmonics, jnp.zeros((0, *mean.shape), dtype=complex)
+    logs = jnp.zeros((0, *mean.shape), dtype=complex)
+    if program.multipliers:
+        logs = log_multipliers_along(*equations.linearised_in_tau(problem, unknowns))
+    outcome = jnp.where(fast.converged, int(Outcome.CONVERGED), int(Outcome.NO_ORBIT))
+    return ResponseValues(mean, harmonics.T, logs.T, outcome)
 
 
 #: Iterations of a linear system in addition to those that the orbit took.
@@ -189,7 +135,7 @@ class FourierUnknowns(NamedTuple):
 
 @dataclass(frozen=True)
 class FourierEquations(Equations):
-    """Orbit equations on a grid; the parameters are (problem, steps that the orbit took).
+    """Orbit equations on a grid; the parameters are (problem, (), steps that the orbit took).
 
     Parameters
     ----------
@@ -204,6 +150,39 @@ class FourierEquations(Equations):
         """The load on the grid."""
         return load_cycle(problem.load, self.nodes, self.grading)
 
+    def orbits(
+        self, problem: Problem, harmonics: int
+    ) -> tuple[FourierUnknowns, tuple[()], Array, Array]:
+        """Unknowns, no data of linear systems, estimated error (points,), and steps."""
+        orbit = fourier_orbit(
+            *problem,
+            points_of(problem),
+            nodes=self.nodes,
+            grading=self.grading,
+            tolerance=_TOLERANCE,
+            max_steps=_MOST_STEPS,
+        )
+        error = orbit_error(problem.system, self.cycle(problem), orbit, harmonics)
+        return FourierUnknowns(orbit.mean, orbit.zero_mean), (), error, orbit.steps
+
+    def steady(self, problem: Problem) -> FourierUnknowns:
+        """Steady sliding under the mean load."""
+        mean = tuple(problem.system.steady())
+        return FourierUnknowns(mean, (jnp.zeros((self.nodes, 1)),) * len(mean))
+
+    def force_spectrum(
+        self, problem: Problem, unknowns: FourierUnknowns, harmonics: int
+    ) -> tuple[Array, Array]:
+        """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
+        return force_spectrum(problem.system, self.cycle(problem), *unknowns, harmonics)
+
+    def linearised_in_tau(
+        self, problem: Problem, unknowns: FourierUnknowns
+    ) -> tuple[Matrix, np.ndarray]:
+        """Derivatives of the rates per unit of tau, and the integrating matrix of the grid."""
+        cycle = self.cycle(problem)
+        return stretched(cycle, self.jacobian(problem, unknowns)), cycle.integral
+
     def jacobian(self, problem: Problem, unknowns: FourierUnknowns) -> Matrix:
         """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""
         states = together(*unknowns)
@@ -211,22 +190,22 @@ class FourierEquations(Equations):
         return jacobian(push, states)
 
     def prepare(
-        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns
+        self, parameters: tuple[Problem, tuple[()], Array], unknowns: FourierUnknowns
     ) -> tuple[tuple[Matrix, Matrix], Array]:
         """Jacobian and the inverse of its mean; steps."""
-        problem, steps = parameters
+        problem, _, steps = parameters
         J = self.jacobian(problem, unknowns)
         inverse = inverse_points(averaged(J, self.cycle(problem).share))
         return (inverse, J), steps + _MORE_STEPS
 
     def residual(
         self,
-        parameters: tuple[Problem, Array],
+        parameters: tuple[Problem, tuple[()], Array],
         unknowns: FourierUnknowns,
         at: tuple[Matrix, Matrix],
     ) -> FourierUnknowns:
         """The unknowns minus the result of one iteration step from them."""
-        problem, _ = parameters
+        problem = parameters[0]
         cycle = self.cycle(problem)
         rates = rates_on(problem.system, cycle)(*together(*unknowns))
 

@@ -25,6 +25,7 @@ from asperity._jax import jit_large
 from asperity._processes import kept_processes
 from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
+from asperity.arrays import Bool, Complex, Float
 from asperity.orbit.batches import mesh_chunk, run_chunks
 from asperity.orbit.gradient.parametrised import (
     Parameters,
@@ -44,9 +45,6 @@ from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.outcome import Outcome
 from asperity.slider.pointwise import curvature_along, slopes_along
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Number of right-hand sides that are solved together; shorter sets are padded.
 _SIDES = 8
@@ -93,12 +91,14 @@ def orbit_derivatives(
         directions = equations.directions(given, points)
         values = collocated(problem, orbit)
         sides, forces, gradient = _slopes(problem, orbit, directions)
-        changes = _orbit_changes(orbit, values, sides)
+        response, constant = _condensed(values.jacobian, sides, orbit)
+        changes = _orbit_changes(orbit, response, constant)
         forces = forces + np.einsum("nkmb,dnkmb->dkmb", gradient, changes)
         mean, phasors = fourier_coefficients(forces, orbit, harmonics)
         columns = [np.moveaxis(np.stack([mean, *phasors.real, *phasors.imag]), 0, -1)]
         if logs is not None:
-            columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
+            linearised = values.jacobian, response
+            columns += _multiplier_columns(problem, orbit, linearised, directions, changes, logs)
         part = np.concatenate(columns, axis=-1)
     table[[name in given for name in equations.names]] = part
     return table
@@ -130,15 +130,14 @@ def _solved(
     return jnp.moveaxis(nodes[:, None] + widths * jnp.einsum("jk,nksmb->njsmb", a, bent), 2, 0)
 
 
-def _orbit_changes(orbit: Orbit, values: Any, sides: Float) -> Float:
+def _orbit_changes(orbit: Orbit, response: Float, constant: Float) -> Float:
     """Changes of the states at the collocation points, (directions, size, STAGES, ...)."""
-    response, constant = _condensed(values.jacobian, sides, orbit)
     coefficients = np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)
     parts = []
-    for start in range(0, sides.shape[2], _SIDES):
+    for start in range(0, constant.shape[2], _SIDES):
         padded = _filled(constant[:, :, start : start + _SIDES])
         parts.append(np.asarray(_solved(response, padded, orbit.widths, coefficients)))
-    return np.concatenate(parts)[: sides.shape[2]]
+    return np.concatenate(parts)[: constant.shape[2]]
 
 
 def _filled(sides: Float) -> Float:
@@ -161,18 +160,19 @@ def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Floa
 def _multiplier_columns(
     problem: Problem,
     orbit: Orbit,
-    values: Any,
+    linearised: tuple[Float, Float],
     directions: Problem,
     changes: Float,
     logs: Complex,
 ) -> list[Float]:
-    """Changes of the logarithms of the multipliers, real and imaginary parts."""
-    size, points = logs.shape
+    """Changes of the logarithms of the multipliers, real and imaginary parts.
+
+    `linearised` are the Jacobian and the response of the slopes to a change at the left node.
+    """
+    (jacobian, response), (size, points) = linearised, logs.shape
     # Two multipliers: the smaller is lost in the round-off of the larger; Liouville's sum gives it.
     pair = size == 2
     theta, states = orbit.stage_phases, orbit.stage_states
-    none = np.zeros((*orbit.slopes.shape[:2], 1, *orbit.widths.shape))
-    response, _ = condensed_jacobian(values.jacobian, none, orbit)
     maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
     right, left, gap = _eigenvectors(maps, logs)
 
@@ -182,14 +182,15 @@ def _multiplier_columns(
 
     result = np.zeros((len(changes), size, points), complex)
     for j in range(size - pair):
-        bent = np.einsum("nkcmb,cmb->nkmb", response, right[j])
-        inner = right[j][:, None] + orbit.widths * orbit.stage_sums(bent)
+        v, w = right[:, j], left[:, j]
+        bent = np.einsum("nkcmb,cmb->nkmb", response, v)
+        inner = v[:, None] + orbit.widths * orbit.stage_sums(bent)
         sides = [along(k, part) for k in range(len(changes)) for part in (inner.real, inner.imag)]
-        _, constant = _condensed(values.jacobian, np.stack(sides, axis=2), orbit)
+        _, constant = _condensed(jacobian, np.stack(sides, axis=2), orbit)
         moved = orbit.widths * np.einsum("k,nkcmb->cnmb", orbit.scheme.b, constant)
         moved = moved[0::2] + 1j * moved[1::2]
-        after = np.einsum("ncmb,cmb->nmb", maps, right[j])
-        share = (left[j] * moved).sum(1) / (left[j] * after).sum(0)
+        after = np.einsum("ncmb,cmb->nmb", maps, v)
+        share = (w * moved).sum(1) / (w * after).sum(0)
         result[:, j] = share.sum(1)
     if pair:
         units = np.broadcast_to(np.eye(size)[..., None, None, None], (size, *states.shape))
@@ -207,14 +208,14 @@ def _multiplier_columns(
     return [np.moveaxis(both, 1, 2)]
 
 
-def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Complex], Float]:
+def _eigenvectors(maps: Float, logs: Complex) -> tuple[Complex, Complex, Float]:
     """Eigenvectors that belong to `logs`, carried along the maps.
 
     Returns
     -------
-    right : list of complex array, shape (size, intervals, points)
-        At the left node of each interval, to any scale.
-    left : list of complex array
+    right : complex array, shape (size, size, intervals, points)
+        [component, multiplier] at the left node of each interval, to any scale.
+    left : complex array
         The same at the right node.
     gap : array, shape (size, points)
         Relative difference of the multipliers of the maps from the known ones.
@@ -224,27 +225,21 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
     finite = np.asarray(np.isfinite(whole).all((0, 1)))
     matrix = np.moveaxis(np.where(finite, whole, np.eye(size)[..., None]), -1, 0)
     multipliers, vectors = np.linalg.eig(matrix.astype(complex))
-    duals = np.linalg.inv(vectors)
     mesh_logs = np.where(finite[:, None], np.log(multipliers) + log_scale[:, None], np.nan)
     distance = np.abs(np.expm1(mesh_logs[:, None] - logs.T[:, :, None]))  # (points, known, mesh)
     nearest = np.argmin(np.nan_to_num(distance, nan=np.inf), axis=2)
     gap = np.take_along_axis(distance, nearest[..., None], 2)[..., 0].T
-    at = np.arange(points)
-    right, left = [], []
-    for j in range(size):
-        v, w = vectors[at, :, nearest[:, j]].T, duals[at, nearest[:, j]].T
-        forward = np.empty((size, intervals, points), complex)
-        backward = np.empty_like(forward)
-        for i in range(intervals):
-            forward[:, i] = v
-            v = np.einsum("nmb,mb->nb", maps[:, :, i], v)
-            v = v / np.abs(v).max(0)
-        for i in reversed(range(intervals)):
-            backward[:, i] = w
-            w = np.einsum("nmb,nb->mb", maps[:, :, i], w)
-            w = w / np.abs(w).max(0)
-        right.append(forward)
-        left.append(backward)
+    v = np.take_along_axis(vectors, nearest[:, None], 2).transpose(1, 2, 0)
+    w = np.take_along_axis(np.linalg.inv(vectors), nearest[..., None], 1).transpose(2, 1, 0)
+    right, left = np.empty((2, size, size, intervals, points), complex)
+    for i in range(intervals):
+        right[:, :, i] = v
+        v = np.einsum("nmb,mjb->njb", maps[:, :, i], v)
+        v = v / np.abs(v).max(0)
+    for i in reversed(range(intervals)):
+        left[:, :, i] = w
+        w = np.einsum("nmb,njb->mjb", maps[:, :, i], w)
+        w = w / np.abs(w).max(0)
     return right, left, gap
 
 
@@ -284,11 +279,7 @@ def searched_values(parameters: Parameters, wanted: Array, program: Program) -> 
     Second derivatives are NaN. Points that are not wanted have `Outcome.NO_ORBIT`.
     """
     columns, outcome = _columns(program, parameters, wanted)
-    states = program.states if program.multipliers else 0
-    cuts = np.cumsum([1, program.harmonics, program.harmonics, states])
-    mean, *pairs = jnp.split(columns, cuts, axis=1)
-    harmonics, logs = pairs[0] + 1j * pairs[1], pairs[2] + 1j * pairs[3]
-    return ResponseValues(mean[:, 0], harmonics, logs, outcome)
+    return ResponseValues.of_columns(columns, outcome, program.harmonics)
 
 
 def _count(program: Program) -> int:
@@ -331,7 +322,7 @@ def _in_another_process(function: Any, *arguments: Any) -> Any:
 
 
 def _response(
-    program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_], derivatives: bool
+    program: Program, parameters: dict[str, Float], wanted: Bool, derivatives: bool
 ) -> tuple[Float, NDArray[np.int64], Float]:
     """Real columns (points, count) of the response, the outcome, and derivatives of the columns.
 
@@ -342,9 +333,7 @@ def _response(
     columns = np.zeros((points, count))
     table = np.zeros((len(equations.names) * derivatives, points, count))
     for index, part in orbits.parts:
-        values = values_of(part, multipliers=program.multipliers)
-        parts = [a for z in values[1:3] for a in (z.real, z.imag)]
-        columns[index] = np.hstack([values.mean_friction[:, None], *parts])
+        columns[index] = values_of(part, multipliers=program.multipliers).columns
         if derivatives:
             here = {n: v[index] for n, v in parameters.items()}
             table[:, index] = derivatives_of(equations, here, part, multipliers=program.multipliers)

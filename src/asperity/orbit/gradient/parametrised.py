@@ -19,9 +19,9 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.parameters import RULES, Parameter, law_parameters, point_parameters
-from asperity.slider import Motion, QuasiStatic, Slider
+from asperity.slider import Motion, QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.named import equation_parameters, with_value
+from asperity.slider.named import equation_parameters, slider_from, slider_values, with_value
 from asperity.slider.problem import Problem
 
 #: Series of a `Periodic` load, as the names of their coefficients begin.
@@ -107,13 +107,7 @@ class ParametrisedProblem:
         parameters : mapping of str to array, shape (points,)
             All of `names`, in SI.
         """
-        fields = {f.name: parameters[f.name.rstrip("_")] for f in dataclasses.fields(self.law)}
-        slider = Slider(
-            self.law(**fields),
-            spring=parameters["K"],
-            load=parameters["W0"],
-            mass=parameters["M"],
-        )
+        slider = slider_from(self.law, parameters)
         drive: tuple[Any, ...] = (slider, parameters["V"], 2 * jnp.pi * parameters["frequency"])
         if self.motion is not QuasiStatic:
             none = 0 * jnp.asarray(parameters["V"])
@@ -130,9 +124,7 @@ class ParametrisedProblem:
     def values(self, problem: Problem) -> dict[str, Any]:
         """Parameters of a problem by name: the inverse of `problem`."""
         system, load = problem
-        law = system.slider.law
-        values = {f.name.rstrip("_"): getattr(law, f.name) for f in dataclasses.fields(law)}
-        values |= {name: getattr(system.slider, name) for name in ("K", "W0", "M")}
+        values = slider_values(system.slider)
         values |= {"V": system.V, "frequency": system.omega / (2 * jnp.pi)}
         if self.damped:
             values["eta"] = system.eta
@@ -211,6 +203,22 @@ class ResponseValues(NamedTuple):
     log_multipliers: Array
     outcome: Array
 
+    @classmethod
+    def of_columns(cls, columns: Any, outcome: Any, harmonics: int) -> ResponseValues:
+        """The inverse of `columns`, of shape (..., columns), for a number of harmonics."""
+        states = (columns.shape[-1] - 1) // 2 - harmonics
+        ends = np.cumsum([1, harmonics, harmonics, states])
+        xp = columns.__array_namespace__()
+        mean, real, imaginary, growth, turn = xp.split(columns, ends, axis=-1)
+        return cls(mean[..., 0], real + 1j * imaginary, growth + 1j * turn, outcome)
+
+    @property
+    def columns(self) -> Any:
+        """Mean, real and imaginary parts of the harmonics, then of the multipliers, as columns."""
+        parts = [a for z in (self.harmonics, self.log_multipliers) for a in (z.real, z.imag)]
+        columns = [self.mean_friction[:, None], *parts]
+        return self.mean_friction.__array_namespace__().concatenate(columns, axis=1)
+
 
 class Program(NamedTuple):
     """Static data of a compiled program: equations, outputs, and whether it may use the search."""
@@ -224,6 +232,11 @@ class Program(NamedTuple):
     def states(self) -> int:
         """Number of states of the equations of motion."""
         return len(self.equations.motion.mechanical) + len(self.equations.law.state_names)
+
+    @property
+    def without_search(self) -> Program:
+        """The program without orbits of the search."""
+        return self._replace(search=False)
 
 
 Parameters = dict[str, Array]

@@ -18,8 +18,9 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arrays import Bool, Complex, Float, Index
 from asperity.loads import Modulate, Programme
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
+from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
@@ -35,9 +36,6 @@ from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.inputs import checked_integration, first_checkpoint
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
 MESHES = (216, 648, 1944)
@@ -104,9 +102,9 @@ class SearchedOrbits(NamedTuple):
     """
 
     outcome: NDArray[np.int64]
-    parts: list[tuple[Indices, MeshOrbits]]
+    parts: list[tuple[Index, MeshOrbits]]
 
-    def add(self, index: Indices, orbits: MeshOrbits) -> None:
+    def add(self, index: Index, orbits: MeshOrbits) -> None:
         """Add converged orbits of the points `index`."""
         self.outcome[index] = Outcome.CONVERGED
         for k, (others, before) in enumerate(self.parts):
@@ -137,13 +135,13 @@ class KnownOrbits:
 
     points: int
     orbit: Orbit | None = None
-    known: NDArray[np.bool_] = field(init=False)
-    near: NDArray[np.bool_] = field(init=False)
+    known: Bool = field(init=False)
+    near: Bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.known, self.near = np.zeros((2, self.points), bool)
 
-    def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
+    def keep(self, problem: Problem, index: Index, orbit: Orbit) -> None:
         """Keep the orbits of the points `index` of a problem, on `FIRST_MESH` intervals."""
         size = problem.system.size
         if self.orbit is None:
@@ -158,7 +156,7 @@ class KnownOrbits:
             put(self.orbit, index[part], kept)
 
     def complete(
-        self, other: KnownOrbits, index: Indices | None = None, *, near: bool = False
+        self, other: KnownOrbits, index: Index | None = None, *, near: bool = False
     ) -> None:
         """Copy orbits from `other` to the points without one; `index` are the points of `other`."""
         rows = np.arange(self.points) if index is None else index
@@ -171,7 +169,7 @@ class KnownOrbits:
         put(self.orbit, rows[new], take(other.orbit, new))
         self.known[rows[new]], self.near[rows[new]] = True, near
 
-    def picked(self, index: Indices) -> KnownOrbits:
+    def picked(self, index: Index) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
         others = KnownOrbits(len(index), orbit)
@@ -182,13 +180,13 @@ class KnownOrbits:
 def followed_orbits(
     problem: Problem,
     guess: Orbit,
-    index: Indices,
+    index: Index,
     harmonics: int,
     meshes: tuple[int, ...],
     numbers: Complex | None = None,
     *,
     patient: bool = True,
-) -> Iterator[tuple[Indices, MeshOrbits]]:
+) -> Iterator[tuple[Index, MeshOrbits]]:
     """Orbits that Newton's method reaches from a guess, on the first mesh that is accurate.
 
     Parameters
@@ -246,7 +244,7 @@ def search_orbits(
     equations: ParametrisedProblem,
     harmonics: int,
     parameters: dict[str, Float],
-    wanted: NDArray[np.bool_],
+    wanted: Bool,
     *,
     direct: bool = False,
     coarse: bool = False,
@@ -280,7 +278,7 @@ def search_orbits(
     points, index = len(wanted), np.flatnonzero(wanted)
     result = SearchedOrbits(np.full(points, int(Outcome.NO_ORBIT)), [])
 
-    def keep(some: Indices, orbits: MeshOrbits) -> None:
+    def keep(some: Index, orbits: MeshOrbits) -> None:
         result.add(some, orbits)
         if known is not None:
             known.keep(problem, some, orbits.orbit)
@@ -300,7 +298,7 @@ def search_orbits(
 
     ended = np.zeros(points, bool)
 
-    def left() -> Indices:
+    def left() -> Index:
         done = np.isin(result.outcome[index], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
         return index[~(done | ended[index])]
 
@@ -309,7 +307,7 @@ def search_orbits(
     meshes = () if coarse else MESHES
     motions = not coarse if motions is None else motions
 
-    def follow(guess: Orbit, rows: Indices) -> None:
+    def follow(guess: Orbit, rows: Index) -> None:
         for some, orbits in followed_orbits(
             problem, guess, rows, harmonics, meshes, patient=motions
         ):
@@ -365,10 +363,10 @@ def settled_orbits(
     equations: ParametrisedProblem,
     parameters: Mapping[str, Float],
     problem: Problem,
-    index: Indices,
+    index: Index,
     *,
     every: bool = False,
-) -> tuple[Orbit, Indices]:
+) -> tuple[Orbit, Index]:
     """Initial guesses for Newton's method: the last period of transients from steady sliding.
 
     Parameters
@@ -436,13 +434,10 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
             return None
         if part.checkpoint.segment == len(programme.segments) - 1:
             parts.append(part.dense_output)
-    whole = DenseOutput(
-        np.concatenate([p.begin for p in parts]),
-        np.concatenate([p.length for p in parts]),
-        np.concatenate([p.coefficients[:, :-1] for p in parts], axis=-1),
-    )
+    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)))
     start = (_PERIODS - 1) * period
-    one, other = whole.evaluate(np.array([start, _PERIODS * period])).T
+    # The last component is the displacement, which is no state of the equations.
+    one, other = whole.evaluate(np.array([start, _PERIODS * period]))[:-1].T
     if not np.abs(other - one).max() < _SETTLED:
         return None
     last = slice(int(np.searchsorted(whole.begin, start, side="right")) - 1, None)
@@ -450,7 +445,7 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
     return DenseOutput(
         (whole.begin[last] - start) / radian,
         whole.length[last] / radian,
-        whole.coefficients[..., last],
+        whole.coefficients[:, :-1, last],
     )
 
 

@@ -26,19 +26,18 @@ that one compiled program serves for all of them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
-from asperity.orbit.mesh.equations import CondensedEquations, condensed
-from asperity.orbit.mesh.mesh import Orbit
+from asperity.arrays import Float
+from asperity.orbit.mesh.equations import condensed
+from asperity.orbit.mesh.mesh import STAGES, Orbit, on_mesh, spread
 from asperity.orbit.mesh.newton import (
     ACCEPTED,
     TOLERANCE,
     Change,
-    NewtonResult,
     Plane,
     moved,
     newton_step,
@@ -48,8 +47,6 @@ from asperity.orbit.mesh.newton import (
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 
 class ParameterLine(NamedTuple):
@@ -74,6 +71,10 @@ class ParameterLine(NamedTuple):
     def slope(self, t: Float) -> Problem:
         """Derivatives of the parameters by t."""
         return jax.tree.map(lambda x, a, g: (a + g * (x + a * t)) * np.exp(g * t), *self)
+
+    def with_slope(self, t: Float) -> tuple[Problem, Problem]:
+        """Parameters at the coordinate `t`, and their derivatives."""
+        return self.at(t), self.slope(t)
 
 
 def still(problem: Problem) -> Problem:
@@ -108,34 +109,10 @@ class ContinuationPoint(NamedTuple):
     units: Float
 
 
-class ArclengthStep(NamedTuple):
-    """A step along a branch.
-
-    Attributes
-    ----------
-    orbit : Orbit
-        The orbit at the new point, on the mesh of the old one.
-    next : ContinuationPoint
-        The orbit on an equidistributed mesh, with its tangent.
-    error : array, shape (points,)
-        Last change in Newton's method, inf where it was not finite.
-    iterations : array, shape (points,)
-    turn : array, shape (points,)
-        Cosine of the angle between the tangents before and after.
-    """
-
-    orbit: Orbit
-    next: ContinuationPoint
-    error: Float
-    iterations: NDArray[np.int_]
-    turn: Float
-
-
 def slip_units(system: Motion, values: PointValues) -> Float:
     """1/s_k, shape (n, points), from the equations at the collocation points."""
     units = np.abs(values.slip_gradient).mean((1, 2))
-    logarithmic = ~np.isin(np.arange(len(units)), system.linear)
-    return np.where(logarithmic[:, None], 1.0, units)
+    return np.where(system.logarithms[:, None], 1.0, units)
 
 
 def weighted_row(orbit: Orbit, nodes: Float, units: Float) -> Float:
@@ -143,77 +120,32 @@ def weighted_row(orbit: Orbit, nodes: Float, units: Float) -> Float:
     return orbit.widths / (2 * np.pi) * units[:, None] ** 2 * nodes
 
 
-def correct(
-    line: ParameterLine,
-    guess: Orbit,
-    t: Float,
-    plane: Plane,
-    *,
-    max_steps: int,
-    tolerance: float = TOLERANCE,
-) -> NewtonResult:
-    """Newton's method on a plane through (guess, t) across a branch."""
-    return solve_in_plane(
-        lambda t: (line.at(t), line.slope(t)),
-        guess,
-        t,
-        plane,
-        max_steps=max_steps,
-        tolerance=tolerance,
-    )
-
-
-class Turn(NamedTuple):
-    """The tangent at a new point.
-
-    Attributes
-    ----------
-    point : ContinuationPoint
-    values : PointValues
-        The equations at its collocation points.
-    cosine : array, shape (points,)
-        Cosine of the angle with the tangent before.
-    """
-
-    point: ContinuationPoint
-    values: PointValues
-    cosine: Float
-
-
 def first_point(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
     """A regular point of a branch, with its tangent in the direction of rising t."""
-    with np.errstate(all="ignore"):
-        equations = condensed(line.at(t), orbit, line.slope(t), closed=False)
-        units = slip_units(line.origin.system, equations.values)
-        plane = Plane.of_fixed_parameters(orbit)
-        tangent = _unit_tangent(line, orbit, equations, plane, units)
-    return ContinuationPoint(orbit, t, tangent, units)
+    return turned(line, orbit, t, np.zeros_like(orbit.nodes), np.ones_like(t))[0]
 
 
-def turned(line: ParameterLine, orbit: Orbit, t: Float, before: Float, before_t: Float) -> Turn:
-    """A new point with the tangent that continues the one `before` (nodes, t)."""
+def turned(
+    line: ParameterLine, orbit: Orbit, t: Float, before: Float, before_t: Float
+) -> tuple[ContinuationPoint, Float, Float]:
+    """A new point with the tangent that continues the tangent before, of nodes and t.
+
+    Also returned are the cosine of the angle between the two tangents, and the largest exponent of
+    the slip rate, both (points,).
+    """
     with np.errstate(all="ignore"):
         equations = condensed(line.at(t), orbit, line.slope(t), closed=False)
         units = slip_units(line.origin.system, equations.values)
         row = weighted_row(orbit, before, units)
-        tangent = _unit_tangent(line, orbit, equations, Plane(row, before_t), units)
+        plane = Plane(row, before_t)
+        # The change that leaves the plane forwards, reduced to unit length.
+        raw = newton_step(line.origin.system, equations, orbit, plane, 1.0, closed=False).change
+        square = (weighted_row(orbit, raw.nodes, units) * raw.nodes).sum((0, 1)) + raw.t**2
+        tangent = Change(*(a / np.sqrt(square) for a in raw))
         size = np.sqrt((row * before).sum((0, 1)) + before_t**2)
         cosine = ((row * tangent.nodes).sum((0, 1)) + before_t * tangent.t) / size
-    return Turn(ContinuationPoint(orbit, t, tangent, units), equations.values, cosine)
-
-
-def _unit_tangent(
-    line: ParameterLine,
-    orbit: Orbit,
-    equations: CondensedEquations,
-    plane: Plane,
-    units: Float,
-) -> Change:
-    """The direction along the branch, of unit length, that leaves the plane forwards."""
-    step = newton_step(line.origin.system, equations, orbit, plane, 1.0, closed=False)
-    raw = step.change
-    square = (weighted_row(orbit, raw.nodes, units) * raw.nodes).sum((0, 1)) + raw.t**2
-    return Change(*(a / np.sqrt(square) for a in raw))
+        fastest = equations.values.log_slip.max((0, 1))
+    return ContinuationPoint(orbit, t, tangent, units), cosine, fastest
 
 
 def interpolated(nodes: Float, old: Float, new: Float) -> Float:
@@ -225,23 +157,157 @@ def interpolated(nodes: Float, old: Float, new: Float) -> Float:
     return result
 
 
-def arclength_step(
-    line: ParameterLine, point: ContinuationPoint, length: Float, *, max_steps: int
-) -> ArclengthStep:
-    """A step of the length `length` along each branch; valid where `error` is small."""
+#: Smallest ratio of the predicted width of an interval to its present width.
+_NARROWEST = 0.3
+
+
+class PointPair(NamedTuple):
+    """Two successive points of a branch, the first without its tangent."""
+
+    before: Orbit
+    t_before: Float
+    point: ContinuationPoint
+
+
+class BranchStep(NamedTuple):
+    """One step along each of several branches.
+
+    Attributes
+    ----------
+    orbit : Orbit
+        The orbit at the new point, on the predicted mesh.
+    next : PointPair
+        The old point, and the new one on a mesh made for it.
+    error : array, shape (points,)
+        Last change in Newton's method, inf where the step failed.
+    iterations : array, shape (points,)
+    turn : array, shape (points,)
+        Cosine of the angle between the tangents before and after.
+    miss : array, shape (points,)
+        Distance of the new point from the predicted one, in steps.
+    length : array, shape (points,)
+        Distance of the new point from the previous point, for each interval.
+    fastest : array, shape (points,)
+        Largest exponent of the slip rate of the new orbit.
+    """
+
+    orbit: Orbit
+    next: PointPair
+    error: Float
+    iterations: Float
+    turn: Float
+    miss: Float
+    length: Float
+    fastest: Float
+
+
+def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
+    """Extrapolation by `ratio` times the last step."""
+    before, now = pair.before, pair.point.orbit
+    longer = now.widths + ratio * (now.widths - before.widths)
+    widths = np.maximum(longer, _NARROWEST * now.widths)
+    widths = widths * (2 * np.pi / widths.sum(0))
+    mesh = np.concatenate([np.zeros_like(widths[:1]), np.cumsum(widths, axis=0)])
+    mesh[-1] = 2 * np.pi
+    rises = now.slopes * now.widths
+    rises = rises + ratio * (rises - before.slopes * before.widths)
+    return now._replace(
+        mesh=mesh,
+        centre=now.centre + ratio * (now.centre - before.centre),
+        nodes=now.nodes + ratio * (now.nodes - before.nodes),
+        slopes=rises / np.diff(mesh, axis=0),
+    ), pair.point.t + ratio * (pair.point.t - pair.t_before)
+
+
+def _distance(units: Float, a: Orbit, s: Float, b: Orbit, t: Float) -> Float:
+    """Distance interval by interval, of states, phases and coordinate."""
+    states = (a.centre - b.centre)[:, None] + a.nodes - b.nodes
+    square = ((units[:, None] * states) ** 2).sum(0).mean(0)
+    return np.sqrt(square + ((a.mesh - b.mesh) ** 2).mean(0) + (s - t) ** 2)
+
+
+def relaid(orbit: Orbit, units: Float) -> Orbit:
+    """The orbit on a mesh with intervals of equal length in the space of phase and states.
+
+    Along a branch this mesh changes as smoothly as the orbit does, so that it can be extrapolated;
+    a mesh that spreads an error estimate evenly does not.
+    """
+    widths = orbit.widths
+    rises = widths * np.abs(orbit.slopes).mean(1) * units[:, None]
+    top = np.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
+    local = (np.abs(top) * widths * units[:, None]).max(0)
+    error = (local + 1e-10) ** (1 / (STAGES + 1))
+    for _ in range(2):
+        error = (np.roll(error, 1, 0) + 2 * error + np.roll(error, -1, 0)) / 4
+    length = np.sqrt(widths**2 + (rises**2).sum(0))
+    density = sum(a / a.sum(0) for a in (error, length, widths)) / widths
+    return on_mesh(orbit, spread(orbit.mesh, density, len(widths), smoothings=3))
+
+
+def straight(point: ContinuationPoint, length: Float) -> PointPair:
+    """A pair that extrapolates along the tangent, by the given length."""
+    return PointPair(*moved(point.orbit, point.t, point.tangent, -length), point)
+
+
+class Remeshing(NamedTuple):
+    """How a new point gets its mesh.
+
+    Attributes
+    ----------
+    moves : bool
+        Whether the mesh moves with the orbit, as `relaid` lays it, so that the next step can
+        extrapolate the phases of each interval. Otherwise the mesh spreads the error evenly.
+    tolerance, accepted : float
+        Change at which Newton's method ends, and largest last change of a step that counts.
+    """
+
+    moves: bool
+    tolerance: float
+    accepted: float
+
+
+#: Of branches whose orbits are results, and of branches followed to an initial guess: there the
+#: error, about the square of the change, is that of the next search.
+EQUIDISTRIBUTED = Remeshing(moves=False, tolerance=TOLERANCE, accepted=ACCEPTED)
+MOVING = Remeshing(moves=True, tolerance=1e-5, accepted=1e-5)
+
+
+# Under slow modulation the orbit follows an unstable state of sliding for part of the period and
+# leaves it in a jump (a canard). Along the branch the jump moves through the period, while the
+# parameter hardly changes. At a fixed phase the states then change strongly; at a fixed interval of
+# a mesh that moves with the orbit they hardly change. The prediction therefore extrapolates the
+# states and the phases of each interval from the last two points.
+
+
+def branch_step(
+    line: ParameterLine, pair: PointPair, ratio: Float, *, remeshing: Remeshing, max_steps: int
+) -> BranchStep:
+    """One step of `ratio` times the last one along each branch."""
+    point = pair.point
+    tangent, units = point.tangent, point.units
     with np.errstate(all="ignore"):
-        guess, t = moved(point.orbit, point.t, point.tangent, length)
-        plane = Plane(weighted_row(point.orbit, point.tangent.nodes, point.units), point.tangent.t)
-        result = correct(line, guess, t, plane, max_steps=max_steps)
+        guess, t_guess = _predicted(pair, ratio)
+        plane = Plane(weighted_row(guess, tangent.nodes, units), tangent.t)
+        tolerance = remeshing.tolerance
+        result = solve_in_plane(
+            line.with_slope, guess, t_guess, plane, max_steps=max_steps, tolerance=tolerance
+        )
         orbit, t = result.orbit, result.t
-        equidistributed = remeshed(line.at(t), orbit, len(orbit.mesh) - 1)
-        before = interpolated(point.tangent.nodes, orbit.mesh, equidistributed.mesh)
-        turn = turned(line, equidistributed, t, before, point.tangent.t)
-        good = usable(equidistributed, turn.cosine) & (result.error < ACCEPTED)
-    error = np.where(good, result.error, np.inf)
-    return ArclengthStep(orbit, turn.point, error, result.steps, turn.cosine)
-
-
-def usable(orbit: Orbit, cosine: Float) -> NDArray[np.bool_]:
-    """Whether a new mesh and tangent are finite."""
-    return np.isfinite(orbit.slopes).all((0, 1, 2)) & np.isfinite(cosine)
+        before: Any = tangent.nodes
+        if remeshing.moves:
+            new = relaid(orbit, units)
+        else:
+            new = remeshed(line.at(t), orbit, len(orbit.mesh) - 1)
+            before = interpolated(before, orbit.mesh, new.mesh)
+        following, cosine, fastest = turned(line, new, t, before, tangent.t)
+        step = _distance(units, guess, t_guess, point.orbit, point.t)
+        t_slope = following.tangent.t
+        forward = ratio * (t - point.t) * (tangent.t + t_slope)
+        # A step that is shorter than round-off, towards a bifurcation, may seem to go backward.
+        backward = remeshing.moves & (tangent.t * t_slope > 0) & (forward < 0)
+        miss = _distance(units, orbit, t, guess, t_guess) / step
+        length = _distance(units, new, t, point.orbit, point.t)
+        fine = np.isfinite(new.slopes).all((0, 1, 2)) & np.isfinite(cosine) & ~backward
+        error = np.where(fine & (result.error <= remeshing.accepted), result.error, np.inf)
+    moved_on = PointPair(point.orbit, point.t, following)
+    return BranchStep(orbit, moved_on, error, result.steps, cosine, miss, length, fastest)

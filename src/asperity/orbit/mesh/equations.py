@@ -12,13 +12,12 @@ one axis.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import (
@@ -28,7 +27,9 @@ from asperity.algebra.small_systems import (
     spectral_abscissa,
     spectral_radius,
 )
+from asperity.arrays import Complex, Float
 from asperity.loads import Excitation
+from asperity.orbit.batches import run_chunks
 from asperity.orbit.mesh.mesh import STAGES, Orbit, split
 from asperity.orbit.observables import Observables
 from asperity.slider.pointwise import PointValues, excitation_at, slopes_along, values_at
@@ -132,10 +133,8 @@ def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
     return identity + widths * sum(b[k] * response[:, k] for k in range(STAGES))
 
 
-Float = NDArray[np.float64]
-
-#: Numbers of intervals that are condensed in a call, for small and large numbers of them.
-_FEW, _MANY = 576, 1728
+#: Numbers of intervals that are condensed in a call.
+_BLOCKS = (1728, 576)
 
 _condense = jit_large(condense)
 
@@ -209,30 +208,13 @@ def condensed(
 def condensed_jacobian(jacobian: Float, right: Float, orbit: Orbit) -> tuple[Float, Float]:
     """`condense` of NumPy arrays (..., intervals, points) on the mesh of an orbit."""
     a, shape = np.asarray(orbit.scheme.a), orbit.widths.shape
-    block = _FEW if shape[0] * shape[1] <= _FEW else _MANY
-    jacobian, right, widths = (_flat(a, block) for a in (jacobian, right, orbit.widths))
-    solved = []
-    for start in range(0, widths.shape[-1], block):
-        at = slice(start, start + block)
-        solved.append(_condense(jacobian[..., at], right[..., at], widths[at], a))
-    response, constant = (_joined(parts, shape) for parts in zip(*solved, strict=True))
+    parts = jacobian, right, orbit.widths
+    flat = tuple(np.reshape(part, (*part.shape[:-2], -1)) for part in parts)
+    everything = np.arange(shape[0] * shape[1])
+    blocks = [block for _, block in run_chunks(partial(_condense, a=a), flat, everything, _BLOCKS)]
+    solved = (np.concatenate(block, axis=-1) for block in zip(*blocks, strict=True))
+    response, constant = (block.reshape(*block.shape[:-1], *shape) for block in solved)
     return response, constant
-
-
-def _flat(array: Float, block: int) -> Float:
-    """Intervals and points along one axis, padded to whole blocks with the last interval."""
-    flat = np.reshape(array, (*array.shape[:-2], -1))
-    missing = -flat.shape[-1] % block
-    if not missing:
-        return flat
-    filling = np.broadcast_to(flat[..., -1:], (*flat.shape[:-1], missing))
-    return np.concatenate([flat, filling], axis=-1)
-
-
-def _joined(parts: tuple[Any, ...], shape: tuple[int, ...]) -> Float:
-    """Blocks as one array (..., intervals, points)."""
-    whole = np.asarray(parts[0]) if len(parts) == 1 else np.concatenate(parts, axis=-1)
-    return whole[..., : shape[0] * shape[1]].reshape(*whole.shape[:-1], *shape)
 
 
 #: Modulus of the logarithms of the multipliers below which the mean Jacobian gives them better
@@ -244,9 +226,7 @@ _SMALL_EXPONENT = 1e-5
 VANISHING_GROWTH = -200.0
 
 
-def fourier_coefficients(
-    force: Float, orbit: Orbit, harmonics: int
-) -> tuple[Float, NDArray[np.complex128]]:
+def fourier_coefficients(force: Float, orbit: Orbit, harmonics: int) -> tuple[Float, Complex]:
     """Mean (..., points) and harmonics (count, ..., points) of a force, peak amplitudes.
 
     Parameters
@@ -266,75 +246,33 @@ def fourier_coefficients(
     return weighted.sum((-3, -2)), np.stack(phasors)
 
 
-def mean_and_harmonics(
-    values: PointValues, orbit: Orbit, harmonics: int
-) -> tuple[Float, NDArray[np.complex128]]:
+def mean_and_harmonics(values: PointValues, orbit: Orbit, harmonics: int) -> tuple[Float, Complex]:
     """Mean (points,) and harmonics (count, points) of F/W0, peak amplitudes."""
     mean, phasors = fourier_coefficients(values.force_rest, orbit, harmonics)
     return values.force_mean[0, 0] + mean, phasors
 
 
-def orbit_observables(
-    values: PointValues, response: Array, orbit: Orbit, harmonics: int
-) -> Observables:
-    """Observables of a converged orbit, without its growth.
-
-    Parameters
-    ----------
-    values : PointValues
-        At the collocation points.
-    response : array, shape (n, STAGES, n, intervals, points)
-        As in `CondensedEquations`.
-    orbit : Orbit
-    harmonics : int
-    """
-    weights = quadrature(orbit) / (2 * np.pi)
-    mean, phasors = mean_and_harmonics(values, orbit, harmonics)
-    maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
-    monodromy, log_scale = scaled_product(maps)
-    trace = sum(values.jacobian[i, i] for i in range(len(orbit.centre)))
-    # Where rates are so small that the order in which they act does not matter, their mean.
-    mean_jacobian = 2 * np.pi * (weights * values.jacobian).sum((2, 3))
-    small = spectral_radius(mean_jacobian) < _SMALL_EXPONENT
-    return Observables(
-        mean,
-        phasors,
-        monodromy,
-        log_scale,
-        2 * np.pi * (weights * trace).sum((0, 1)),
-        np.where(small, mean_jacobian, np.nan),
-        np.full(mean.shape, np.inf),
-        orbit.start,
-    )
-
-
-def read_orbit(
-    problem: Problem,
-    orbit: Orbit,
-    harmonics: int,
-    equations: CondensedEquations | None = None,
-) -> Observables:
-    """Observables of a converged orbit, NumPy arrays.
-
-    Parameters
-    ----------
-    problem : Problem
-    orbit : Orbit
-    harmonics : int
-    equations : CondensedEquations, optional
-        Condensed equations of the orbit, where they are known.
-    """
+def read_orbit(problem: Problem, orbit: Orbit, harmonics: int) -> Observables:
+    """Observables of a converged orbit, NumPy arrays."""
+    size, weights = len(orbit.centre), quadrature(orbit)
     with np.errstate(all="ignore"):
-        if equations is None:
-            equations = condensed(problem, orbit)
-        observed = orbit_observables(equations.values, equations.response, orbit, harmonics)
+        values, response, _ = condensed(problem, orbit)
+        mean, phasors = mean_and_harmonics(values, orbit, harmonics)
+        maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
+        monodromy, log_scale = scaled_product(maps)
+        # Where rates are so small that the order in which they act does not matter, their mean.
+        mean_jacobian = (weights * values.jacobian).sum((2, 3))
+        small = spectral_radius(mean_jacobian) < _SMALL_EXPONENT
+        exponent = np.where(small, mean_jacobian, np.nan)
+        log_determinant = np.trace(mean_jacobian)
         # The largest eigenvalue is at least the mean of all: elsewhere it need not be known.
-        vanishing = observed.log_determinant < VANISHING_GROWTH * len(orbit.centre)
-        growth = np.full(vanishing.shape, np.inf)
-        for k in np.flatnonzero(vanishing):
-            rate = spectral_abscissa(equations.values.jacobian[..., k])
-            growth[k] = (quadrature(orbit)[..., k] * rate).sum()
-    return observed._replace(growth=growth)
+        growth = np.full(mean.shape, np.inf)
+        for k in np.flatnonzero(log_determinant < VANISHING_GROWTH * size):
+            rate = spectral_abscissa(values.jacobian[..., k])
+            growth[k] = (weights[..., k] * rate).sum()
+    return Observables(
+        mean, phasors, monodromy, log_scale, log_determinant, exponent, growth, orbit.start
+    )
 
 
 def quadrature(orbit: Orbit) -> Array:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme, gauss_legendre, radau_iia
+from asperity.arrays import Float
 from asperity.slider import Motion, RadiatingAsperities, StiffInertial
 
 #: Collocation points in an interval.
@@ -27,8 +27,6 @@ def scheme_for(system: Motion) -> CollocationScheme:
     """The method for an equation of motion: Radau IIA where modes decay within an interval."""
     return RADAU if isinstance(system, StiffInertial | RadiatingAsperities) else GAUSS
 
-
-Float = NDArray[np.float64]
 
 #: Share of the intervals that is spread evenly, independent of the error estimate.
 _EVEN_SHARE = 0.3

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import jax
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
+from asperity.arrays import Bool, Float
 from asperity.orbit.batches import FEW, put, run_chunks
 from asperity.orbit.mesh.equations import (
     CondensedEquations,
@@ -40,7 +41,6 @@ from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues, excitation_at
 from asperity.slider.problem import Problem
 
-Float = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Newton's method ends at this change; the error is then about the square of the change.
@@ -122,7 +122,7 @@ def _step(
     plane: Plane,
     value: Array,
     coefficients: tuple[Array, Array],
-    linear: Array,
+    logarithms: Array,
     least_swing: Array,
 ) -> NewtonStep:
     """Solve the linearised equations; `orbit` is (widths, nodes, slopes)."""
@@ -140,13 +140,13 @@ def _step(
     stages = moved[:, None] + widths * jnp.einsum("jk,nkmb->njmb", a, bent)
     exponent = jnp.abs((slip_gradient * stages).sum(0)).max((0, 1))
     each = jnp.abs(stages).max((1, 2))
-    mask = linear[:, None]
-    largest = jnp.maximum(exponent, jnp.where(mask, 0.0, each).max(0))
+    mask = logarithms[:, None]
+    largest = jnp.maximum(exponent, jnp.where(mask, each, 0.0).max(0))
     # `least_swing` keeps the relative change above round-off where a state hardly changes.
     after = nodes + moved
     swing = jnp.abs(after - after[:, :1]).max(1) + least_swing
     relative = jnp.abs(stages - stages[:, :1, :1]).max((1, 2)) / swing
-    error = jnp.maximum(largest, jnp.where(mask, relative, 0.0).max(0))
+    error = jnp.maximum(largest, jnp.where(mask, 0.0, relative).max(0))
     return NewtonStep(Change(moved, bent, t), largest, jnp.maximum(error, jnp.abs(t)))
 
 
@@ -183,17 +183,10 @@ def newton_step(
         plane,
         np.full(points, value),
         (np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)),
-        np.array(_linear(type(system), len(nodes))),
+        system.logarithms,
         least_swing(system, points),
     )
     return jax.tree.map(np.asarray, step)
-
-
-@cache
-def _linear(motion: type[Motion], size: int) -> tuple[bool, ...]:
-    """For each state, whether it is not a logarithm."""
-    mechanical = [not logarithm for logarithm in motion.logarithmic]
-    return (*mechanical, *[False] * (size - len(mechanical)))
 
 
 def least_swing(system: Motion, points: int) -> Float:
@@ -274,8 +267,9 @@ def solve(
     t = np.zeros(guess.nodes.shape[-1])
     few = FEW if len(t) > FEW else 0
     plane = Plane.of_fixed_parameters(guess)
-    line = partial(_fixed, problem)
-    result = solve_in_plane(line, guess, t, plane, max_steps=max_steps, few=few, patience=patience)
+    result = solve_in_plane(
+        lambda _: (problem, None), guess, t, plane, max_steps=max_steps, few=few, patience=patience
+    )
     # The last points of a chunk continue in a smaller chunk, whose steps take less time.
     taken = int(result.steps.max())
     left = np.flatnonzero((result.error > TOLERANCE) & (result.steps == taken))
@@ -284,10 +278,6 @@ def solve(
         for part, rest in run_chunks(again, (problem, result.orbit), left, FEW):
             put(result, part, rest._replace(steps=rest.steps + taken))
     return result
-
-
-def _fixed(problem: Problem, _: Float) -> tuple[Problem, None]:
-    return problem, None
 
 
 #: Numbers of intervals.
@@ -311,14 +301,10 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
     system = problem.system
     scales = np.abs(values.slip_gradient).mean(1)
     swing = np.abs(orbit.nodes).max(1) + least_swing(system, orbit.nodes.shape[-1])
-    for i in range(len(scales)):
-        if i in system.linear:
-            # A force or velocity without influence on slip: errors relative to its range.
-            scales[i] = np.where(scales[i] > 0, scales[i], 1 / swing[i])
-        else:
-            # Errors of logarithmic states count directly, not only by their effect on slip.
-            scales[i] = np.maximum(scales[i], 1.0)
-    return scales
+    # A force or velocity without influence on slip: errors relative to its range. Errors of
+    # logarithmic states count directly, not only by their effect on slip.
+    relative = np.where(scales > 0, scales, 1 / swing[:, None])
+    return np.where(system.logarithms[:, None, None], np.maximum(scales, 1.0), relative)
 
 
 def refined_orbit(
@@ -358,5 +344,5 @@ def _attempt(
     return mesh, solve(problem, mesh, _NEWTON_STEPS, patience)
 
 
-def _where(condition: NDArray[np.bool_], yes: Orbit, no: Orbit) -> Orbit:
+def _where(condition: Bool, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: np.where(condition, a, b), yes, no)

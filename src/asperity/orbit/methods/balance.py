@@ -14,8 +14,8 @@ the grid, and advances z and the states of the law as `asperity.orbit.methods.fo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple, TypeAlias
+from functools import lru_cache, partial
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -37,7 +37,7 @@ from asperity.orbit.methods.fourier import (
     LoadCycle,
     States,
     advance,
-    error_of,
+    iterated,
     load_cycle,
     spectrum,
     together,
@@ -55,6 +55,8 @@ _NEAR = 3e-2
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
+#: Tolerance on the error: harmonics may be much smaller than the states. Most steps on a grid.
+_TOLERANCE, _MOST_STEPS = 1e-11, 40
 #: Steps for a linear system, more than the orbit took.
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
@@ -130,27 +132,18 @@ class BalanceEquations(Equations):
         """Inverse of the balance, and the response to changes of the means."""
         cycle = self.cycle(problem)
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction
-        D = self.derivative
-        c = _coefficients(problem)
-        ones = jnp.ones_like(g)
+        D, c = self.derivative, _coefficients(problem)
+        n, ones, none = range(len(slow)), jnp.ones_like(g), jnp.zeros_like(g)
         _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
-        n, none = range(len(slow)), jnp.zeros_like(g)
-
-        def by(j: int) -> Array:
-            """Change of slip with the j-th of friction and states of the law."""
-            return push(*(ones if i == j else none for i in n))
-
-        def drag(slip: Array) -> Array:
-            return c.damping * slip + c.inertness * (D @ slip)
-
+        # Change of slip with friction and with the states of the law, one after the other.
+        softening, *by_state = (push(*(ones if i == j else none for i in n)) for j in n)
         matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (
-            c.damping * c.elastic + c.inertness * by(0)[None]
+            c.damping * c.elastic + c.inertness * softening[None]
         )
-        diagonal = (cycle.at.w + c.ratio) + c.damping * by(0)
-        matrix = matrix + np.eye(self.nodes)[..., None] * diagonal[:, None]
-        inverse = inverse_by_elimination(matrix)
-        pulls = [ones, *(-drag(by(j)) for j in n[1:])]
-        friction = tuple(_times(inverse, pull) for pull in pulls)
+        diagonal = (cycle.at.w + c.ratio) + c.damping * softening
+        inverse = inverse_by_elimination(matrix + np.eye(self.nodes)[..., None] * diagonal[:, None])
+        drags = (-c.damping * slip - c.inertness * (D @ slip) for slip in by_state)
+        friction = tuple(_times(inverse, pull) for pull in (ones, *drags))
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
         columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]
         rates = [[columns[j][i] for j in n] for i in n]
@@ -168,12 +161,8 @@ class BalanceEquations(Equations):
         """The next unknowns for a change of the friction, and the change of the means."""
         slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction + moved
         rates = self._rates(problem, cycle, slow, g)
-
-        def push(*changes: Array) -> States:
-            return apply(at.rates, changes)
-
         mean, zero_mean, change = advance(
-            cycle, at.mean_inverse, unknowns.mean, rates, push, largest
+            cycle, at.mean_inverse, unknowns.mean, rates, lambda *c: apply(at.rates, c), largest
         )
         (with_means,) = apply([list(at.friction)], change)
         return BalanceUnknowns(mean, zero_mean, g + with_means), change
@@ -205,6 +194,42 @@ class BalanceEquations(Equations):
         moved = _times(at.inverse, -gap)
         stepped, _ = self._advance(problem, cycle, unknowns, at, moved)
         return jax.tree.map(jnp.subtract, unknowns, stepped)
+
+    def orbits(
+        self, problem: Problem, harmonics: int
+    ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
+        """Iterate to the periodic orbit of every operating point, first on `FIRST_NODES` at most.
+
+        Parameters
+        ----------
+        problem : Problem
+            With inertia or damping, parameters of shape (points,).
+        harmonics : int
+            Harmonics whose truncation counts.
+
+        Returns
+        -------
+        BalanceUnknowns
+            Undefined where the error is not small.
+        Prepared
+            The linearisation that the last step used.
+        error : array, shape (points,)
+            Estimated; inf where the iteration does not converge.
+        steps : array, shape ()
+        """
+        coarse = BalanceEquations(min(self.nodes, FIRST_NODES), self.grading)
+        unknowns, steps = _start(coarse, problem), jnp.asarray(0)
+        if self.nodes > FIRST_NODES:
+            unknowns, _, _, steps = _iterate(coarse, problem, unknowns, _COARSE_TOLERANCE)
+            unknowns = _resampled(unknowns, self.nodes)
+        unknowns, prepared, error, more = _iterate(self, problem, unknowns, _TOLERANCE)
+        slow, at = together(unknowns.mean, unknowns.zero_mean), self.cycle(problem).at
+        exponent = _log_slip(problem, at, unknowns.friction, slow[1:])
+        # Where the interface sticks it has kinks, which no Fourier series resolves.
+        error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
+        for waves in (unknowns.zero_mean[0], unknowns.friction, at.w * unknowns.friction):
+            error = jnp.maximum(error, truncation(waves, harmonics))
+        return unknowns, prepared, error, steps + more
 
     def steady(self, problem: Problem) -> BalanceUnknowns:
         """Steady sliding under the mean load."""
@@ -304,92 +329,30 @@ def _derivative(nodes: int, grading: float) -> np.ndarray:
     return by_tau / (1 + grading * np.cos(tau))[:, None]
 
 
-class BalancedOrbit(NamedTuple):
-    """Orbits on the grid; undefined where `error` is not small."""
-
-    unknowns: BalanceUnknowns
-    prepared: Prepared
-    error: Array  # (points,): estimated; inf where the iteration does not converge
-    steps: Array
-
-
-def balanced_orbit(
-    problem: Problem,
-    *,
-    nodes: int,
-    grading: float,
-    harmonics: int,
-    tolerance: float,
-    max_steps: int,
-) -> BalancedOrbit:
-    """Iterate to the periodic orbit of every operating point.
-
-    Parameters
-    ----------
-    problem : Problem
-        With inertia or damping, parameters of shape (points,).
-    nodes : int
-        Grid points per period, even. The iteration begins on `FIRST_NODES` at most.
-    grading : float
-        g in theta = tau + g sin(tau), 0 <= g < 1.
-    harmonics : int
-        Harmonics whose truncation counts.
-    tolerance : float
-        Bound on the error estimated from the observed contraction.
-    max_steps : int
-        On each grid.
-    """
-    coarse = BalanceEquations(min(nodes, FIRST_NODES), grading)
-    unknowns, steps = _start(coarse, problem), jnp.asarray(0)
-    if nodes > FIRST_NODES:
-        unknowns, _, _, steps = _iterate(coarse, problem, unknowns, _COARSE_TOLERANCE, max_steps)
-        unknowns = _resampled(unknowns, nodes)
-    equations = BalanceEquations(nodes, grading)
-    unknowns, prepared, error, more = _iterate(equations, problem, unknowns, tolerance, max_steps)
-    slow = together(unknowns.mean, unknowns.zero_mean)
-    exponent = _log_slip(problem, equations.cycle(problem).at, unknowns.friction, slow[1:])
-    # Where the interface sticks it has kinks, which no Fourier series resolves.
-    error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
-    g = unknowns.friction
-    for waves in (unknowns.zero_mean[0], g, equations.cycle(problem).at.w * g):
-        error = jnp.maximum(error, truncation(waves, harmonics))
-    return BalancedOrbit(unknowns, prepared, error, steps + more)
-
-
 def _iterate(
     equations: BalanceEquations,
     problem: Problem,
     start: BalanceUnknowns,
     tolerance: float,
-    max_steps: int,
 ) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
     """Unknowns, the linearisation that their last step used, estimated error, number of steps."""
     cycle = equations.cycle(problem)
+    prepare = partial(equations.linearised, problem)
 
-    def prepare(unknowns: BalanceUnknowns) -> Prepared:
-        return equations.linearised(problem, unknowns)
-
-    def unfinished(carry: tuple) -> Array:
-        _, _, change, error, steps = carry
-        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
-
-    def body(carry: tuple) -> tuple:
-        unknowns, at, last, reached, steps = carry
+    def step(state: tuple[BalanceUnknowns, Prepared], last: Array) -> tuple[Any, Array]:
+        unknowns, at = state
         far = jnp.any((last > _NEAR) & ~jnp.isnan(last))
         at = jax.lax.cond(far, prepare, lambda _: at, unknowns)
         new, change = equations.bounded_step(problem, cycle, unknowns, at)
-        error = error_of(change, last, _ROUND_OFF)
-        # Further steps change converged points by round-off only.
-        error = jnp.where(reached <= tolerance, reached, error)
-        return new, at, change, error, steps + 1
+        return (new, at), change
 
     shapes = jax.eval_shape(prepare, start)
     nothing = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
-    far = jnp.full(start.friction.shape[1], jnp.inf)
-    unknowns, at, change, error, steps = jax.lax.while_loop(
-        unfinished, body, (start, nothing, far, far, 0)
+    points = start.friction.shape[1]
+    state, error, steps = iterated(
+        step, (start, nothing), points, tolerance, _ROUND_OFF, _MOST_STEPS
     )
-    return unknowns, at, jnp.where(jnp.isnan(change), jnp.inf, error), steps
+    return *state, error, steps
 
 
 def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
@@ -401,17 +364,11 @@ def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
 
 def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
     """The averaged limit of a slider that swings on its asperities without slip."""
-    system, load = problem
+    system = problem.system
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
-    cycle, c = equations.cycle(problem), _coefficients(problem)
-    swing = 1 / (cycle.at.w + c.ratio)
-    if isinstance(load, Harmonic):
-        turn = 1j * SWING_ORDERS[:, None]
-        impedance = turn * c.elastic * (turn * c.inertness + c.damping)
-        elastic, _ = elastic_swing(load, impedance, 1 + c.ratio, cycle.theta[:, None])
-        usable = (elastic * (1 + c.ratio) > LEAST_SWING).all(0)
-        swing = jnp.where(usable, elastic, swing)
-    at = cycle.at._replace(w=1 / swing - c.ratio)
+    cycle = equations.cycle(problem)
+    swing, _ = sticking_joint(problem, cycle.at, cycle.theta[:, None])
+    at = cycle.at._replace(w=1 / swing - system.compliance_ratio)
     averaged = averaged_limit(quasi_static, at, cycle.share, tolerance=_AVERAGED_TOLERANCE)
     zero = jnp.zeros_like(swing)
     friction = swing * (averaged.centre[0] + cycle.at.shear)
@@ -419,35 +376,47 @@ def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
 
 
 #: Orders of the harmonics of the elastic swing.
-SWING_ORDERS = np.arange(1, 13)
+_ORDERS = np.arange(1, 13)
 #: Smallest value of the elastic swing relative to rigid asperities; a smaller value means that the
 #: modulation is faster than the resonance of the elastic asperities, and the swing is not used.
-LEAST_SWING = 0.2
+_LEAST_SWING = 0.2
 
 
-def elastic_swing(
-    load: Harmonic, impedance: Array, carried: ArrayLike, theta: np.ndarray
+def sticking_joint(
+    problem: Problem, at: Excitation, theta: np.ndarray, softening: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
-    """F_i/W of a joint that sticks, over the force that stretches spring and joint.
+    """The swing of a slider on a joint that sticks, for a unit of elongation z of spring and joint.
 
-    Its harmonics obey (carried + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0}, a
-    three-term recurrence, whose minimal solution is a continued fraction.
+    Under a harmonic load the harmonics of F_i/W obey
+
+        (1 + l + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0},
+
+    a three-term recurrence, whose minimal solution is a continued fraction. Another load is carried
+    as without inertia and damping.
 
     Parameters
     ----------
-    load : Harmonic
-    impedance : complex array, shape (orders, points)
-        Impedance of `SWING_ORDERS`.
-    carried : array, shape (points,)
-        The same at rest.
+    problem : Problem
+    at : Excitation
+        Samples of the load, arrays of shape (nodes, points).
     theta : array, shape (nodes, 1)
+    softening : array, shape (points,)
+        Mean change of ln(v_pl) with F_i/W, by which slip relaxes the joint.
 
     Returns
     -------
-    swing : array, shape (nodes, points)
-    waves : complex array, shape (orders, nodes, points)
-        Its parts, of which the real parts count.
+    friction : array, shape (nodes, points)
+        F_i/W.
+    velocity : array, shape (nodes, points)
+        Velocity of the slider over V, less its mean.
     """
+    load, c = problem.load, _coefficients(problem)
+    rigid = 1 / (at.w + c.ratio)
+    if not isinstance(load, Harmonic):
+        return rigid, jnp.zeros_like(rigid)
+    turn, carried = 1j * _ORDERS[:, None], 1 + c.ratio
+    relaxing = turn * c.elastic + softening
+    impedance = (turn * c.inertness + c.damping) * relaxing
     half, ratios = 0.5 * load.epsilon, []
     last = jnp.zeros_like(impedance[0])
     for at_order in impedance[::-1]:
@@ -455,5 +424,8 @@ def elastic_swing(
         ratios.append(last)
     mean = 1 / (carried + 2 * half * last.real)
     harmonics = 2 * mean * jnp.cumprod(jnp.stack(ratios[::-1]), axis=0)
-    waves = harmonics[:, None] * np.exp(1j * SWING_ORDERS[:, None, None] * theta)
-    return mean + waves.real.sum(0), waves
+    waves = harmonics[:, None] * np.exp(1j * _ORDERS[:, None, None] * theta)
+    friction = mean + waves.real.sum(0)
+    usable = (friction * carried > _LEAST_SWING).all(0)
+    velocity = (waves * relaxing[:, None]).real.sum(0)
+    return jnp.where(usable, friction, rigid), jnp.where(usable, velocity, 0.0)

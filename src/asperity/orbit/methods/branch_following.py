@@ -15,25 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
-from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.arrays import Bool, Float, Index
+from asperity.orbit.batches import put, run_chunks, take
 from asperity.orbit.mesh.arclength import (
-    ContinuationPoint,
+    MOVING,
+    BranchStep,
     ParameterLine,
+    PointPair,
     amplitude_line,
-    correct,
+    branch_step,
     first_point,
-    turned,
-    usable,
-    weighted_row,
+    straight,
 )
-from asperity.orbit.mesh.mesh import STAGES, Orbit, on_mesh, scheme_for, spread
-from asperity.orbit.mesh.newton import Change, Plane, moved
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import refine
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider.problem import Problem
-
-Float = NDArray[np.float64]
 
 #: Branches that are followed in a call; one or two, which may need by far the most steps, take half
 #: of the time in a smaller call.
@@ -74,48 +72,46 @@ _DOUBT = 1.5
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 
 
-def follow_from_steady_sliding(
-    problem: Problem, index: Indices, mesh: BranchMesh
-) -> SteadyBranches:
-    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
+def follow_from_steady_sliding(problem: Problem, mesh: BranchMesh) -> MovingBranches:
+    """Follow all points of `problem` (NumPy arrays) from steady sliding.
 
     The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
     before the branch is lost.
     """
-    line, points = amplitude_line(problem), len(problem.system.V)
-    branches = SteadyBranches(line, _steady_pair(line, points, index, mesh.intervals))
-    follow(branches, np.full(points, _FIRST), rows=index, most=mesh.most_steps)
-    return branches
-
-
-def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: int) -> PointPair:
-    system = line.origin.system
-    orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
-    orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
+    line, system = amplitude_line(problem), problem.system
+    points = len(system.V)
+    orbit = Orbit.empty(scheme_for(system), system.size, mesh.intervals, points)
+    orbit.mesh[:] = np.linspace(0, 2 * np.pi, mesh.intervals + 1)[:, None]
     steady = jax.jit(lambda s: s.steady())(system)
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
-    t = np.zeros(points)
-    tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
-    start = ContinuationPoint(orbit, t, tangent, np.zeros_like(orbit.centre))
-    pair = jax.tree.map(np.array, PointPair(orbit, t, start))
+    return followed_branches(line, orbit, mesh.most_steps)
+
+
+def followed_branches(line: ParameterLine, orbit: Orbit, most_steps: int) -> MovingBranches:
+    """Branches followed from orbits at the beginning of a line of parameters towards its end."""
 
     def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
         return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
 
-    for part, begun in run_chunks(begin, (line, orbit, t), index, CHUNK):
-        put(pair, part, begun)
-    return pair
+    points = orbit.centre.shape[1]
+    everyone, start = np.arange(points), (line, orbit, np.zeros(points))
+    parts = [pair for _, pair in run_chunks(begin, start, everyone, CHUNK)]
+    branches = MovingBranches(line, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts))
+    follow(branches, np.full(points, _FIRST), most=most_steps)
+    return branches
 
 
-def continues(share: Float, fastest: Float) -> NDArray[np.bool_]:
+def continues(share: Float, fastest: Float) -> Bool:
     """Whether to follow a branch further: it has not arrived, run away or returned to the start."""
     left = np.abs(share - 1)
     fastest = np.where(left < _NEAR, fastest - _AHEAD, fastest)
     return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
 
 
-class SteadyBranches(Curves):
-    """Branches from steady sliding in the amplitude, predicted from their last two points.
+class MovingBranches(Curves):
+    """Branches along lines of parameters on moving meshes, predicted from their last two points.
+
+    A share is the coordinate on the line: of the amplitude, for branches from steady sliding.
 
     Attributes
     ----------
@@ -125,8 +121,7 @@ class SteadyBranches(Curves):
     span : array, shape (points,)
         Distance between these two.
     fold : array, shape (points,)
-        Share of the amplitude at the fold that is farthest from steady sliding, NaN where there
-        was none.
+        Share at the fold that is farthest from the beginning, NaN where there was none.
     farthest : array, shape (points,)
         Largest share on the branch.
     fastest : array, shape (points,)
@@ -150,7 +145,7 @@ class SteadyBranches(Curves):
     )
 
     def __init__(self, line: ParameterLine, pair: PointPair) -> None:
-        """At steady sliding."""
+        """At the beginning of the line."""
         self.line, self.pair = line, pair
         zero = np.zeros_like(pair.t_before)
         self.span, self.fold, self.limit = zero + _FIRST, zero + np.nan, zero + np.inf
@@ -159,16 +154,16 @@ class SteadyBranches(Curves):
 
     @property
     def share(self) -> Float:
-        """Share of the amplitude reached; about 1 where a branch succeeded."""
+        """Share reached; about 1 where a branch succeeded."""
         return self.pair.point.t
 
     @property
-    def arrived(self) -> NDArray[np.bool_]:
-        """Whether the requested amplitude was reached."""
+    def arrived(self) -> Bool:
+        """Whether the end of the line was reached."""
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
-    def folded(self) -> NDArray[np.bool_]:
+    def folded(self) -> Bool:
         """Whether the branch was abandoned while it returned from its farthest fold."""
         with np.errstate(invalid="ignore"):
             back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
@@ -180,7 +175,7 @@ class SteadyBranches(Curves):
         return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
 
     def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
-        """Lengths that are not predicted to pass the requested amplitude.
+        """Lengths that are not predicted to pass the end of the line.
 
         The length is negative where the last step has passed it. After several failures along the
         secant the next step is predicted along the tangent.
@@ -200,17 +195,17 @@ class SteadyBranches(Curves):
         return np.where(near, aimed, ratio) * self.span
 
     def attempts(
-        self, rows: Indices, length: Float, failures: NDArray[np.int_]
-    ) -> Iterator[tuple[Indices, Attempt]]:
+        self, rows: Index, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Index, Attempt]]:
         """Steps on the moving mesh."""
-        advance = partial(moving_step, max_steps=_NEWTON_STEPS)
+        advance = partial(branch_step, remeshing=MOVING, max_steps=_NEWTON_STEPS)
         inputs = (self.line, self.pair, length / self.span)
         for part, step in run_chunks(advance, inputs, rows, CHUNK):
             miss = np.where(step.miss * step.length < _NOISE, 0.0, step.miss)
             converged = np.isfinite(step.error)
             yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)
 
-    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+    def accept(self, rows: Index, chosen: Index, attempt: Attempt) -> list[str]:
         """Update folds, shares and exponents; a branch ends where it arrives or runs away."""
         step, before = attempt.next, self.pair.point.tangent.t[rows]
         turned = before * step.next.point.tangent.t[chosen] < 0
@@ -223,7 +218,7 @@ class SteadyBranches(Curves):
         self._watch(rows, share)
         return ["" if goes_on else "ended" for goes_on in continues(share, self.fastest[rows])]
 
-    def _watch(self, rows: Indices, share: Float) -> None:
+    def _watch(self, rows: Index, share: Float) -> None:
         """Extrapolate the share to where pulses run away, once they have grown enough."""
         exponent = self.fastest[rows]
         rise = exponent - self.watched_exponent[rows]
@@ -238,7 +233,7 @@ class SteadyBranches(Curves):
         self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
 
 
-def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indices) -> Float:
+def _extremum(pair: PointPair, step: BranchStep, rows: Index, chosen: Index) -> Float:
     """Largest or smallest t between two points, of the cubic through values and directions."""
     t, slope = pair.point.t[rows], pair.point.tangent.t[rows]
     t_next = step.next.point.t[chosen]
@@ -264,38 +259,33 @@ class BranchFollowing(Method):
         """`meshes` are tried in turn, each on the points without a definite outcome."""
         self.meshes = meshes
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations and load."""
-        return True
-
-    def candidates(self, solution: Solution) -> Indices:
+    def candidates(self, solution: Solution) -> Index:
         """Points without an orbit, or whose orbit was lost on every finer mesh."""
         return np.flatnonzero(_without_orbit(solution))
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; `detail` is the amplitude at which the branch ends."""
-        points = problem.system.V.shape[-1]
-        solution = Solution.unsolved(problem, points, options)
-        definite = np.zeros(points, dtype=bool)
+        solution = Solution.unsolved(problem, options)
+        definite = np.zeros_like(solution.converged)
         for mesh in self.meshes:
             rows = np.flatnonzero(_without_orbit(solution) & ~definite)
             if len(rows):
-                attempt = Solution.unsolved(problem, len(rows), options)
                 part = take(problem, rows)
+                attempt = Solution.unsolved(part, options)
                 definite[rows] = solve_along_branches(part, attempt, options, mesh)
                 solution.merge(rows, attempt)
                 options.progress(int(attempt.converged.sum()))
         return solution
 
 
-def _without_orbit(solution: Solution) -> NDArray[np.bool_]:
+def _without_orbit(solution: Solution) -> Bool:
     lost = (solution.outcome == Outcome.NOT_RESOLVED) & np.isinf(solution.detail)
     return np.isin(solution.outcome, WITHOUT_ORBIT) | lost
 
 
 def solve_along_branches(
     problem: Problem, solution: Solution, options: SearchOptions, mesh: BranchMesh
-) -> NDArray[np.bool_]:
+) -> Bool:
     """Refine the orbits at the ends of the branches, or give the reason why a branch has none.
 
     Returns
@@ -303,14 +293,13 @@ def solve_along_branches(
     bool array, shape (points,)
         Whether the outcome does not depend on the mesh.
     """
-    points = len(solution.outcome)
-    branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
+    branch = follow_from_steady_sliding(problem, mesh)
     arrived, folded = branch.arrived, branch.folded
     ran_away = ~arrived & ~folded & (branch.end < 1)
     # Of 19 branches with this below 1, none has an orbit on the finer mesh: the pulses of 15 run
     # away, at most 1.1 times as far beyond the last orbit as the limit, and 3 branches turn back.
     beyond = branch.share + _DOUBT * (branch.end - branch.share)
-    amplitude = np.broadcast_to(problem.load.amplitude, (points,))
+    amplitude = np.broadcast_to(problem.load.amplitude, arrived.shape)
     solution.detail[:] = branch.farthest
     for which, outcome, share in (
         (folded, Outcome.FOLDED, branch.fold),
@@ -321,125 +310,3 @@ def solve_along_branches(
         solution.detail[rows] = share[rows] * amplitude[rows]
     refine(problem, solution, branch.pair.point.orbit, np.flatnonzero(arrived), options)
     return arrived | folded | (branch.fastest >= RUNAWAY) | (beyond < 1)
-
-
-#: Newton's method ends and a step is accepted at this change; the error is about its square.
-ACCEPTED = 1e-5
-#: Smallest ratio of the predicted width of an interval to its present width.
-_NARROWEST = 0.3
-
-
-# Under slow modulation the orbit follows an unstable state of sliding for part of the period and
-# leaves it in a jump (a canard). Along the branch the jump moves through the period, while the
-# parameter hardly changes. At a fixed phase the states then change strongly; at a fixed interval of
-# a mesh that moves with the orbit they hardly change. The prediction therefore extrapolates the
-# states and the phases of each interval from the last two points.
-
-
-class PointPair(NamedTuple):
-    """Two successive points of a branch, the first without its tangent."""
-
-    before: Orbit
-    t_before: Float
-    point: ContinuationPoint
-
-
-class MovingMeshStep(NamedTuple):
-    """One step on the moving mesh.
-
-    Attributes
-    ----------
-    next : PointPair
-    error, iterations : array, shape (points,)
-        As in `ArclengthStep`.
-    turn : array, shape (points,)
-        Cosine of the angle between the tangents before and after.
-    miss : array, shape (points,)
-        Distance of the new point from the predicted one, in steps.
-    length : array, shape (points,)
-        Distance of the new point from the previous point, for each interval.
-    fastest : array, shape (points,)
-        Largest exponent of the slip rate of the new orbit.
-    """
-
-    next: PointPair
-    error: Float
-    iterations: Float
-    turn: Float
-    miss: Float
-    length: Float
-    fastest: Float
-
-
-def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
-    """Extrapolation by `ratio` times the last step."""
-    before, now = pair.before, pair.point.orbit
-    longer = now.widths + ratio * (now.widths - before.widths)
-    widths = np.maximum(longer, _NARROWEST * now.widths)
-    widths = widths * (2 * np.pi / widths.sum(0))
-    mesh = np.concatenate([np.zeros_like(widths[:1]), np.cumsum(widths, axis=0)])
-    mesh[-1] = 2 * np.pi
-    rises = now.slopes * now.widths
-    rises = rises + ratio * (rises - before.slopes * before.widths)
-    return now._replace(
-        mesh=mesh,
-        centre=now.centre + ratio * (now.centre - before.centre),
-        nodes=now.nodes + ratio * (now.nodes - before.nodes),
-        slopes=rises / np.diff(mesh, axis=0),
-    ), pair.point.t + ratio * (pair.point.t - pair.t_before)
-
-
-def _distance(units: Float, a: Orbit, s: Float, b: Orbit, t: Float) -> Float:
-    """Distance interval by interval, of states, phases and coordinate."""
-    states = (a.centre - b.centre)[:, None] + a.nodes - b.nodes
-    square = ((units[:, None] * states) ** 2).sum(0).mean(0)
-    return np.sqrt(square + ((a.mesh - b.mesh) ** 2).mean(0) + (s - t) ** 2)
-
-
-def relaid(orbit: Orbit, units: Float) -> Orbit:
-    """The orbit on a mesh with intervals of equal length in the space of phase and states.
-
-    Along a branch this mesh changes as smoothly as the orbit does, so that it can be extrapolated;
-    a mesh that spreads an error estimate evenly does not.
-    """
-    widths = orbit.widths
-    rises = widths * np.abs(orbit.slopes).mean(1) * units[:, None]
-    top = np.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
-    local = (np.abs(top) * widths * units[:, None]).max(0)
-    error = (local + 1e-10) ** (1 / (STAGES + 1))
-    for _ in range(2):
-        error = (np.roll(error, 1, 0) + 2 * error + np.roll(error, -1, 0)) / 4
-    length = np.sqrt(widths**2 + (rises**2).sum(0))
-    density = sum(a / a.sum(0) for a in (error, length, widths)) / widths
-    return on_mesh(orbit, spread(orbit.mesh, density, len(widths), smoothings=3))
-
-
-def straight(point: ContinuationPoint, length: Float) -> PointPair:
-    """A pair that extrapolates along the tangent, by the given length."""
-    return PointPair(*moved(point.orbit, point.t, point.tangent, -length), point)
-
-
-def moving_step(
-    line: ParameterLine, pair: PointPair, ratio: Float, *, max_steps: int
-) -> MovingMeshStep:
-    """One step of `ratio` times the last one along each branch."""
-    point = pair.point
-    tangent, units = point.tangent, point.units
-    with np.errstate(all="ignore"):
-        guess, t_guess = _predicted(pair, ratio)
-        plane = Plane(weighted_row(guess, tangent.nodes, units), tangent.t)
-        result = correct(line, guess, t_guess, plane, max_steps=max_steps, tolerance=ACCEPTED)
-        orbit, t = result.orbit, result.t
-        new = relaid(orbit, units)
-        turn = turned(line, new, t, tangent.nodes, tangent.t)
-        step = _distance(units, guess, t_guess, point.orbit, point.t)
-        t_slope = turn.point.tangent.t
-        forward = ratio * (t - point.t) * (tangent.t + t_slope)
-        backward = (tangent.t * t_slope > 0) & (forward < 0)
-        miss = _distance(units, orbit, t, guess, t_guess) / step
-        length = _distance(units, new, t, point.orbit, point.t)
-        fine = usable(new, turn.cosine) & ~backward
-        error = np.where(fine & (result.error <= ACCEPTED), result.error, np.inf)
-        fastest = turn.values.log_slip.max((0, 1))
-    following = PointPair(point.orbit, point.t, turn.point)
-    return MovingMeshStep(following, error, result.steps, turn.cosine, miss, length, fastest)

@@ -12,10 +12,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.orbit.batches import Indices, mesh_chunk, points_of, put, run_chunks, take
+from asperity.arrays import Bool, Complex, Float, Index
+from asperity.orbit.batches import mesh_chunk, points_of, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, multiplier_gap
 from asperity.orbit.mesh.equations import VANISHING_GROWTH, read_orbit, split_observables
 from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
@@ -35,7 +35,7 @@ def refine(
     problem: Problem,
     solution: Solution,
     orbit: Orbit,
-    index: Indices,
+    index: Index,
     options: SearchOptions,
 ) -> None:
     """Refine the orbits of the points `index` and write those that are resolved to `solution`.
@@ -52,7 +52,7 @@ def refine(
     options : SearchOptions
     """
     size, points = orbit.centre.shape
-    coarse, previous = len(orbit.mesh) - 1, Solution.unsolved(problem, points, options)
+    coarse, previous = len(orbit.mesh) - 1, Solution.unsolved(problem, options)
     evaluate = partial(read_orbit, harmonics=options.harmonics)
     for part, initial in run_chunks(evaluate, (problem, orbit), index, mesh_chunk(size)):
         previous.store(part, initial)
@@ -72,13 +72,22 @@ def refine(
         orbit, index = finer, index[~resolved[index]]
         if not len(index):
             return
+    _finish(problem, solution, orbit, index)
+
+
+def _finish(problem: Problem, solution: Solution, orbit: Orbit, index: Index) -> None:
+    """Resolve multipliers that are not resolved yet, and store the points `index` or discard them.
+
+    Outcomes of these points say which of the three they need.
+    """
     stiff = index[solution.outcome[index] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     resolve_multipliers(problem, solution, orbit, stiff)
-    _store_orbits(problem, solution, orbit, stiff[solution.converged[stiff]])
-    solution.discard(index[~solution.converged[index]])
+    converged = solution.converged[index]
+    _store_orbits(problem, solution, orbit, index[converged])
+    solution.discard(index[~converged])
 
 
-def _store_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> None:
+def _store_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Index) -> None:
     """Write waveforms and orbits of the points `rows` to `solution`, if they were requested."""
     phases = solution.waveform.shape[1]
     if phases:
@@ -110,28 +119,23 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     evaluate = partial(read_orbit, harmonics=options.harmonics)
     chunk = mesh_chunk(problem.system.size)
     points = np.arange(orbit.centre.shape[1])
-    stiff = []
     for part, observables in run_chunks(evaluate, (problem, orbit), points, chunk):
         logs = observables.log_multipliers
         known = extreme_multipliers(observables, logs)
         solution.store(part, observables, logs)
         solution.iterations[part] = intervals
-        stiff.append(part[~known])
-    index = np.concatenate(stiff)
-    solution.outcome[index] = Outcome.MULTIPLIERS_NOT_RESOLVED
-    resolve_multipliers(problem, solution, orbit, index)
-    _store_orbits(problem, solution, orbit, np.flatnonzero(solution.converged))
-    solution.discard(np.flatnonzero(~solution.converged))
+        solution.outcome[part[~known]] = Outcome.MULTIPLIERS_NOT_RESOLVED
+    _finish(problem, solution, orbit, points)
 
 
 def _compare(
     solution: Solution,
-    part: Indices,
+    part: Index,
     previous: Solution,
     observables: Observables,
     error: Float,
     agreement: float,
-) -> NDArray[np.bool_]:
+) -> Bool:
     """Compare each point with its previous mesh; returns a mask of the points that agree."""
     logs = observables.log_multipliers
     known = extreme_multipliers(observables, logs)
@@ -156,13 +160,9 @@ class Collocation(Method):
     name = "collocation"
     choice = "collocation"
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations and load."""
-        return True
-
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`."""
-        solution = Solution.unsolved(problem, problem.system.V.shape[-1], options)
+        solution = Solution.unsolved(problem, options)
         everyone = np.arange(len(solution.outcome))
         orbit, solved = orbits_from_averaged_limit(problem, everyone)
         refine(problem, solution, orbit, solved, options)
@@ -170,15 +170,13 @@ class Collocation(Method):
         return solution
 
 
-Float = NDArray[np.float64]
-
 #: Grading of the first mesh towards the weakest contact, and Newton steps on it.
 _GRADING, _NEWTON_STEPS = 0.5, 30
 
 
 def orbits_from_averaged_limit(
-    problem: Problem, index: Indices, patience: float = math.inf
-) -> tuple[Orbit, Indices]:
+    problem: Problem, index: Index, patience: float = math.inf
+) -> tuple[Orbit, Index]:
     """Orbits by Newton's method from the averaged limit.
 
     Parameters
@@ -284,9 +282,7 @@ _MOST_SIDE_BY_SIDE = 100_000
 _OVERFLOW, _HOPELESS = 750.0, 5000.0
 
 
-def extreme_multipliers(
-    observables: Observables, logs: NDArray[np.complex128]
-) -> NDArray[np.bool_]:
+def extreme_multipliers(observables: Observables, logs: Complex) -> Bool:
     """Points with multipliers outside the range of doubles, for which no finer mesh is needed.
 
     The function replaces the `logs` of these points by the values that are known.
@@ -306,7 +302,7 @@ def extreme_multipliers(
     return np.asarray(vanishing | overflowing)
 
 
-def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, index: Indices) -> None:
+def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, index: Index) -> None:
     """Resolve the multipliers of resolved orbits on finer and finer transfer maps."""
     intervals = orbit.mesh.shape[0] - 1
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_INTERVALS]
@@ -327,7 +323,7 @@ def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, inde
             return
 
 
-def _overflowing_logs(size: int, log_determinant: Float) -> NDArray[np.complex128]:
+def _overflowing_logs(size: int, log_determinant: Float) -> Complex:
     """A lower bound for the largest multiplier, infinite as a double; the others are not known."""
     logs = np.full((size, len(log_determinant)), complex(np.nan, np.nan))
     logs.real[0] = log_determinant / size

@@ -24,17 +24,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import antiderivative, grid, interpolation
 from asperity.algebra.small_systems import Matrix, apply, inverse_points, jacobian
+from asperity.arrays import Float
 from asperity.loads import Excitation, Harmonic, Modulation
 from asperity.orbit.batches import FAST_BLOCK, FEW, chunk_of, points_of, run_chunks, take
 from asperity.orbit.floquet import floquet_form
@@ -179,11 +179,54 @@ def _largest_change(change: States, new: States, old: States, kappa: Array) -> A
     return jnp.stack([moved[0] / size, *moved[1:], *map(jnp.abs, change)]).max(0)
 
 
-def error_of(change: Array, last: Array, round_off: float) -> Array:
-    """Error after a change, from the change before: r / (1 - r) times it for contraction by r."""
-    contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
-    error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
-    return jnp.where(change < round_off, change, error)
+def iterated(
+    step: Callable[[Any, Array], tuple[Any, Array]],
+    start: Any,
+    points: int,
+    tolerance: float,
+    round_off: float,
+    max_steps: int,
+) -> tuple[Any, Array, Array]:
+    """Repeat a contraction until the estimated error of every point is below a tolerance.
+
+    Parameters
+    ----------
+    step : callable
+        Takes unknowns and their last change, (points,), inf before the first step; returns new
+        unknowns and their change.
+    start : pytree
+    points : int
+    tolerance : float
+        Bound on the error estimated from the observed contraction.
+    round_off : float
+        Round-off of a change.
+    max_steps : int
+
+    Returns
+    -------
+    unknowns : pytree
+    error : array, shape (points,)
+        inf where the iteration does not contract.
+    steps : array, shape ()
+    """
+
+    def unfinished(carry: tuple) -> Array:
+        _, change, error, steps = carry
+        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
+
+    def body(carry: tuple) -> tuple:
+        unknowns, last, reached, steps = carry
+        unknowns, change = step(unknowns, last)
+        # A contraction by r leaves an error of r / (1 - r) times the change.
+        r = jnp.where(jnp.isinf(last), 0.5, change / last)
+        error = jnp.where(r < 1, change * r / (1 - r), jnp.inf)
+        error = jnp.where(change < round_off, change, error)
+        # Further steps change converged points by round-off only.
+        return unknowns, change, jnp.where(reached <= tolerance, reached, error), steps + 1
+
+    far = jnp.full(points, jnp.inf)
+    unknowns, change, error, steps = jax.lax.while_loop(unfinished, body, (start, far, far, 0))
+    return unknowns, jnp.where(jnp.isnan(change), jnp.inf, error), steps
 
 
 def fourier_orbit(
@@ -227,27 +270,18 @@ def fourier_orbit(
     inverse = inverse_points(averaged.matrix)
     rates_of = rates_on(system, cycle)
     zero = (jnp.zeros((nodes, points)),) * system.size
-    far = jnp.full(points, jnp.inf)
 
-    def unfinished(carry: tuple) -> Array:
-        *_, change, error, steps = carry
-        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
-
-    def body(carry: tuple) -> tuple:
-        mean, zero_mean, last, reached, steps = carry
+    def step(unknowns: tuple[States, States], _: Array) -> tuple[tuple[States, States], Array]:
+        mean, zero_mean = unknowns
         rates, push = jax.linearize(rates_of, *together(mean, zero_mean))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
-        change = _largest_change(moved, new, zero_mean, system.kappa)
-        error = error_of(change, last, _ROUND_OFF)
-        # Further steps change converged points by round-off only.
-        return mean, new, change, jnp.where(reached <= tolerance, reached, error), steps + 1
+        return (mean, new), _largest_change(moved, new, zero_mean, system.kappa)
 
-    mean, zero_mean, change, error, steps = jax.lax.while_loop(
-        unfinished, body, (averaged.centre, zero, far, far, 0)
+    start = averaged.centre, zero
+    (mean, zero_mean), error, steps = iterated(
+        step, start, points, tolerance, _ROUND_OFF, max_steps
     )
-    return FourierOrbit(
-        mean, zero_mean, jnp.where(jnp.isnan(change), jnp.inf, error), steps, grading
-    )
+    return FourierOrbit(mean, zero_mean, error, steps, grading)
 
 
 def stretched(cycle: LoadCycle, J: Matrix) -> Matrix:
@@ -362,25 +396,17 @@ def fast_solve(
     points = points_of(problem)
 
     def solve(block: Problem) -> tuple[Observables, Array, Array, FourierOrbit | None]:
-        observables, error, orbit = _fast_block(block, nodes, grading, harmonics)
-        return observables, error, orbit.steps, orbit if orbits else None
+        count = points_of(block)
+        orbit = fourier_orbit(
+            *block, count, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
+        )
+        observables, error = fourier_observables(*block, orbit, harmonics=harmonics)
+        each = {name: jnp.full(count, getattr(orbit, name)) for name in ("steps", "grading")}
+        return observables, error, each["steps"], orbit._replace(**each) if orbits else None
 
     blocks = jax.tree.map(lambda a: a.reshape(-1, min(points, FAST_BLOCK)), problem)
     results = jax.lax.map(solve, blocks)
     return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
-
-
-def _fast_block(
-    problem: Problem, nodes: int, grading: float, harmonics: int
-) -> tuple[Observables, Array, FourierOrbit]:
-    system, load = problem
-    points = points_of(problem)
-    orbit = fourier_orbit(
-        system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
-    )
-    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics)
-    each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
-    return observables, error, orbit._replace(**each)
 
 
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
@@ -409,7 +435,7 @@ class Fourier(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; a grid gives its failures to the next, finer one."""
         points = np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(points), options)
+        solution = Solution.unsolved(problem, options)
         rate, sharpness, _ = steady_sliding(problem)
         left = points[rate < LARGEST_CONTRACTING_RATE]
         # A block runs until its slowest point has converged, so points are sorted by difficulty.
@@ -443,7 +469,5 @@ class Fourier(Method):
         return solution
 
 
-def _sample(
-    problem: Problem, orbit: FourierOrbit, *, grading: float, phases: int
-) -> NDArray[np.float64]:
+def _sample(problem: Problem, orbit: FourierOrbit, *, grading: float, phases: int) -> Float:
     return waveform(problem, orbit._replace(grading=grading), phases)

@@ -19,10 +19,10 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import FEW, Indices, mesh_chunk, put, run_chunks, take
+from asperity.arrays import Bool, Complex, Float, Index
+from asperity.orbit.batches import FEW, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.methods.collocation import accept
 from asperity.orbit.solution import Method, SearchOptions, Solution
@@ -30,8 +30,6 @@ from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.limits import adiabatic_growth, adiabatic_states, even_phases
-
-Float = NDArray[np.float64]
 
 #: Numbers of nodes of successive series, which are compared with each other; odd, so that every
 #: harmonic has its sine.
@@ -69,28 +67,24 @@ class FourierSeries(Method):
     name = "series"
     choice = "series"
 
-    def suits(self, problem: Problem) -> bool:
-        """Any equations: an attempt shows which orbits are smooth."""
-        return True
-
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; only points under slow or weak modulation are tried."""
-        points = np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(points), options)
+        solution = Solution.unsolved(problem, options)
         rate, sharpness, _ = steady_sliding(problem)
         slow, weak = rate >= _SLOW, (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
         smooth = np.flatnonzero(slow | weak)
         orbit, rows = series_orbits(problem, smooth)
         if len(rows):
-            attempt = Solution.unsolved(problem, len(rows), options)
-            accept(take(problem, rows), attempt, take(orbit, rows), options)
+            part = take(problem, rows)
+            attempt = Solution.unsolved(part, options)
+            accept(part, attempt, take(orbit, rows), options)
             exact = slow[rows] | (np.abs(attempt.harmonics[:2]) > _LEAST_HARMONIC).all(0)
             options.progress(int(attempt.converged[exact].sum()))
             solution.merge(rows[exact], take(attempt, np.flatnonzero(exact)))
         return solution
 
 
-def follows_steady_sliding(problem: Problem, index: Indices) -> Indices:
+def follows_steady_sliding(problem: Problem, index: Index) -> Index:
     """The points of `index` at which a slider follows a modulation slower than its relaxation.
 
     Steady sliding is stable at all phases there. Where it is not, the slider may leave the orbit of
@@ -103,10 +97,10 @@ def follows_steady_sliding(problem: Problem, index: Indices) -> Indices:
 
 def series_orbits(
     problem: Problem,
-    index: Indices,
+    index: Index,
     intervals: int = INTERVALS,
     numbers: tuple[int, ...] = NODES,
-) -> tuple[Orbit, Indices]:
+) -> tuple[Orbit, Index]:
     """Orbits of the points `index` of a problem (NumPy arrays) on even intervals.
 
     Also returned are the points that a series of one of the `numbers` of nodes resolves. Orbits of
@@ -116,7 +110,7 @@ def series_orbits(
     scheme = scheme_for(system)
     orbit = Orbit.empty(scheme, system.size, intervals, len(system.V))
 
-    def solve(part: Problem) -> tuple[Orbit, NDArray[np.bool_]]:
+    def solve(part: Problem) -> tuple[Orbit, Bool]:
         harmonics, exact = _solve(part, numbers)
         return _on_even_mesh(harmonics, scheme, intervals), exact
 
@@ -126,9 +120,7 @@ def series_orbits(
     return orbit, np.concatenate(resolved)
 
 
-def _solve(
-    problem: Problem, numbers: tuple[int, ...]
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+def _solve(problem: Problem, numbers: tuple[int, ...]) -> tuple[Complex, Bool]:
     """Harmonics (size, count, points), and which points are exact."""
     Y = np.array(adiabatic_states(problem, nodes=numbers[0]))
     points = Y.shape[2]
@@ -153,11 +145,10 @@ def _solve(
     return harmonics, exact
 
 
-def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices:
+def _newton(problem: Problem, Y: Float, at: Index, most_steps: int) -> Index:
     """Improve the points `at` of the states in place; returns those that converged."""
     derivative = _derivative(Y.shape[1])
     system = problem.system
-    logarithms = [i for i in range(system.size) if i not in system.linear]
     excitation = excitation_at(problem.load, even_phases(Y.shape[1]) * np.ones(Y.shape[2]))
     done = []
     for count in range(1, most_steps + 1):
@@ -175,7 +166,7 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
             break
         with np.errstate(all="ignore"):
             exponent = (values.slip_gradient[..., at] * step).sum(0)
-            change = np.abs([exponent, *step[logarithms]]).max((0, 1))
+            change = np.abs([exponent, *step[system.logarithms]]).max((0, 1))
         usable = np.isfinite(change)
         at, step, change = at[usable], step[..., usable], change[usable]
         Y[..., at] += step * np.minimum(1.0, _LARGEST_CHANGE / np.maximum(change, 1e-300))
@@ -225,9 +216,7 @@ def _resampled(Y: Float, nodes: int) -> Float:
     return np.fft.irfft(harmonics * nodes, n=nodes, axis=1)
 
 
-def _on_even_mesh(
-    harmonics: NDArray[np.complex128], scheme: CollocationScheme, intervals: int
-) -> Orbit:
+def _on_even_mesh(harmonics: Complex, scheme: CollocationScheme, intervals: int) -> Orbit:
     """Series as the piecewise polynomials of collocation."""
     mesh = np.linspace(0, 2 * np.pi, intervals + 1)
     order = np.arange(1, harmonics.shape[1])

@@ -25,19 +25,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.mirrored_grid import interpolation
 from asperity.algebra.runge_kutta import dormand_prince_8
-from asperity.algebra.small_systems import jacobian_columns, solve_columns
-from asperity.loads import Excitation, Harmonic
-from asperity.orbit.batches import Indices, run_chunks, take
+from asperity.algebra.small_systems import solve_columns, value_and_jacobian
+from asperity.arrays import Bool, Complex, Float, Index
+from asperity.loads import Excitation
+from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
-from asperity.orbit.methods.balance import LEAST_SWING, SWING_ORDERS, elastic_swing
+from asperity.orbit.methods.balance import sticking_joint
 from asperity.orbit.observables import Observables, response_gap, waveform_of
-from asperity.orbit.solution import Float, Method, SearchOptions, Solution
+from asperity.orbit.solution import Method, SearchOptions, Solution
 from asperity.slider import Inertial, Motion, QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.limits import averaged_limit, even_phases
@@ -54,23 +54,16 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     theta = 2 * np.pi * np.arange(_NODES)[:, None] / _NODES
     points = jnp.ones(jax.tree.leaves(problem)[0].shape[-1])
     at = load.at(jnp.asarray(theta))
-    w, velocity = at.w * points, jnp.zeros((_NODES, 1))
+    at = at._replace(w=at.w * points)
     softening = _softening(problem, points)
-    if isinstance(load, Harmonic):
-        relaxing = 1j * SWING_ORDERS[:, None] + system.strain * softening
-        drag = 1j * SWING_ORDERS[:, None] / system.mobility + system.damping
-        swing, waves = elastic_swing(load, drag * relaxing / system.strain, 1.0, theta)
-        usable = (swing > LEAST_SWING).all(0)
-        # Without inertia the joint carries z / (w + l): the load under which that is z G / (1 + l).
-        ratio = quasi_static.compliance_ratio
-        w = jnp.where(usable, (1 + ratio) / jnp.where(usable, swing, 1.0) - ratio, w)
-        moving = (waves * relaxing[:, None]).real.sum(0) / system.strain
-        velocity = jnp.where(usable, moving, 0.0)
+    swing, velocity = sticking_joint(problem, at, theta, softening)
+    # The load under which a joint without inertia carries as much.
+    w = 1 / swing - quasi_static.compliance_ratio
     centre = averaged_limit(quasi_static, at._replace(w=w), np.full(_NODES, 1 / _NODES)).centre
     Y = jnp.stack(centre)[:, None]
     force = quasi_static.force(Y, Excitation(points)) + 0 * w
     friction = quasi_static.friction(Y, Excitation(w))
-    mechanical = force + system.damping, 1 + velocity * force, friction
+    mechanical = force + system.damping, 1 + velocity * Y[0], friction
     states = jnp.stack(jnp.broadcast_arrays(*mechanical, *quasi_static.law_state(Y)))
     # The states of the law follow the elastic motion, by a small amount.
     orders = np.arange(1, _NODES // 2)[:, None]
@@ -140,7 +133,7 @@ class Shooting(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; slower relaxation by slip allows coarser divisions of the period."""
         size, rows = problem.system.size, np.arange(problem.system.V.shape[-1])
-        solution = Solution.unsolved(problem, len(rows), options)
+        solution = Solution.unsolved(problem, options)
         guess, relaxation = np.empty((size, len(rows))), np.empty(len(rows))
         for members, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
             guess[:, members], relaxation[members] = values
@@ -159,7 +152,7 @@ def _refine(
     options: SearchOptions,
     divisions: _Divisions,
     first: Float,
-    rows: Indices,
+    rows: Index,
 ) -> None:
     """Solve points on finer and finer divisions of the period until two divisions agree.
 
@@ -213,7 +206,7 @@ def _refine(
         rows = _joined(unresolved)
 
 
-def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps: Steps) -> Indices:
+def _chords(problem: Problem, first: Float, inverse: Float, rows: Index, steps: Steps) -> Index:
     """Chord steps with the matrices of a coarser division, in place; the rows left finite."""
     solve, nearly = partial(chord_step, steps=steps), []
     for _ in range(_CHORDS):
@@ -228,9 +221,7 @@ def _chords(problem: Problem, first: Float, inverse: Float, rows: Indices, steps
     return _joined([*nearly, rows])
 
 
-def _agreed(
-    observed: Observables, numbers: NDArray[np.complex128], logs: NDArray[np.complex128]
-) -> NDArray[np.bool_]:
+def _agreed(observed: Observables, numbers: Complex, logs: Complex) -> Bool:
     """Which points have the numbers of the division before, and Liouville's determinant."""
     determinant = np.linalg.det(np.moveaxis(observed.monodromy, -1, 0))
     with np.errstate(all="ignore"):
@@ -244,7 +235,7 @@ def _sample(
     problem: Problem,
     solution: Solution,
     first: Float,
-    rows: Indices,
+    rows: Index,
     steps: Steps,
     grading: float,
 ) -> None:
@@ -259,11 +250,11 @@ def _sample(
         solution.waveform[..., members] = samples
 
 
-def _chunk(rows: Indices) -> int:
+def _chunk(rows: Index) -> int:
     return _CHUNK if len(rows) > 3 * _FEW else _FEW
 
 
-def _joined(parts: list[Indices]) -> Indices:
+def _joined(parts: list[Index]) -> Index:
     """Rows in order, so that points of like difficulty stay together."""
     return np.sort(np.concatenate([np.empty(0, dtype=int), *parts]))
 
@@ -423,8 +414,8 @@ def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegr
 def _trace(problem: Problem, theta: Array, states: Array) -> Array:
     """Trace of the Jacobian of the rates."""
     at = problem.load.at(theta)
-    _, columns = jacobian_columns(lambda Y: problem.system.rates(Y, at), states)
-    return sum((column[i] for i, column in enumerate(columns)), jnp.zeros_like(states[0]))
+    _, J = value_and_jacobian(lambda Y: problem.system.rates(Y, at), states)
+    return sum((J[i, i] for i in range(len(states))), jnp.zeros_like(states[0]))
 
 
 def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array) -> Array:
@@ -442,8 +433,7 @@ def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array)
     array, shape (...)
     """
     _, exponent = jax.jvp(lambda Y: system.log_slip(Y, at), (states,), (step,))
-    logarithms = [step[i] for i in range(system.size) if i not in system.linear]
-    return jnp.abs(jnp.stack([exponent, *logarithms])).max(0)
+    return jnp.abs(jnp.stack([exponent, *step[system.logarithms]])).max(0)
 
 
 def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]:
@@ -476,7 +466,7 @@ def _path(problem: Problem, start: Array, steps: Steps, *, count: int) -> Array:
 
 def shot_waveform(
     problem: Problem, start: Array, *, steps: Steps, count: int, grading: float, phases: int
-) -> NDArray[np.float64]:
+) -> Float:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points).
 
     By trigonometric interpolation in tau between the ends of `count` steps.
