@@ -41,8 +41,8 @@ from asperity.slider.named import law_from
 #: Largest number of rows whose orbits are remembered, about ten kilobytes each.
 _REMEMBERED = 2048
 #: Root of the sum of the squared relative changes of the parameters, below which a known orbit is
-#: near (`KnownOrbits`): of 1,900 rows of six tables whose coarse orbit Newton's method did not reach
-#: from there, other initial guesses than transients found an orbit of 50.
+#: near (`KnownOrbits`): of 1,900 rows of six tables whose coarse orbit Newton's method did not
+#: reach from there, other initial guesses than transients found an orbit of 50.
 _NEAR = 0.1
 #: Smallest share of rows with an orbit in the coarse model: some rows may have slip events, whose
 #: orbits this model does not reach, even at the minimum.
