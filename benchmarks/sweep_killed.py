@@ -70,7 +70,9 @@ def done(store: Path) -> int:
     return sum(len(names) for _, _, names in os.walk(store / "status" / "c"))
 
 
-def main(kills: int, seed: int, law: str = "rice-ruina", frequency: str = "120 Hz") -> bool:
+def main(
+    kills: int = 10, seed: int = 1, law: str = "rice-ruina", frequency: str = "120 Hz"
+) -> bool:
     """Kill, compare and print; True if all files are equal."""
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
@@ -113,5 +115,4 @@ def main(kills: int, seed: int, law: str = "rice-ruina", frequency: str = "120 H
 
 
 if __name__ == "__main__":
-    arguments = [int(text) for text in sys.argv[1:]]
-    sys.exit(0 if main(*(arguments or [10, 1])) else 1)
+    sys.exit(0 if main(*map(int, sys.argv[1:])) else 1)
