@@ -59,8 +59,10 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
             return f"{COLUMN_OPTIONS[key]} {quoted(value)}".rstrip()
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
     if name == "numbers":
-        own = f"numbers.{key}" not in options
-        return number_option(key, value, options.get(name, "--set"), own=own).rstrip()
+        has_options = f"numbers.{key}" not in options
+        return number_option(
+            key, value, options.get(name, "--set"), has_options=has_options
+        ).rstrip()
     if name == "channels" and value:
         return f'--channel "{key} = {value}"'
     if name == "units" and key and value:

@@ -106,7 +106,9 @@ def _text(value: Any, unit: str) -> str:
     return ",".join(_text(float(v) if v in numbers else v, unit) for v in value)
 
 
-def number_option(name: str, value: str = "", pairs: str = "--set", *, own: bool = True) -> str:
+def number_option(
+    name: str, value: str = "", pairs: str = "--set", *, has_options: bool = True
+) -> str:
     """The option of a number of a point: ``-V "1 um/s"``, ``--inertia``, ``--set "K=0.3 N/um"``.
 
     Parameters
@@ -116,11 +118,11 @@ def number_option(name: str, value: str = "", pairs: str = "--set", *, own: bool
         With its unit; empty for the option alone.
     pairs : str
         Option that takes NAME=VALUE.
-    own : bool
+    has_options : bool
         Whether the command has the options of `Parameter.options`.
     """
     parameter = {**DRIVE, **MACHINE}.get(name)
-    if own and parameter is not None and parameter.options:
+    if has_options and parameter is not None and parameter.options:
         value = "" if parameter.rule == "switch" else value
         return f"{parameter.options[0]} {quoted(value) if value else ''}".rstrip()
     return f"{pairs} {quoted(f'{name}={value}', also='=') if value else name}"
