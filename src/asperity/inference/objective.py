@@ -34,6 +34,9 @@ _AT_BOUND = 1e-6
 #: Relative change of the coordinates at which a minimisation by the coarse model ends; the exact
 #: model continues from there.
 _COARSE = 1e-4
+#: Relative decrease of chi-squared that is negligible: with chi-squared of 100, a ten-thousandth of
+#: a standard error. Orbits on the mesh are no more accurate.
+_NEGLIGIBLE = 1e-10
 #: Smallest distance of the start of a minimisation from the bounds.
 _INSIDE = 2e-10
 
@@ -270,7 +273,7 @@ class Objective:
     curved: bool = False
     unsolved: int = field(default=0, init=False, repr=False)
     # State of this object: `dataclasses.replace` does not copy it.
-    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
+    _last: dict[bytes, tuple[Float, Float]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -338,9 +341,12 @@ class Objective:
     def residuals(self, u: Float) -> tuple[Float, Float]:
         """Residuals of data and priors and their Jacobian; NaN without a solution."""
         key = u.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = key, self._evaluate(u)
-        return self._last[1]
+        if key not in self._last:
+            # Two points are kept: a step that is rejected returns to the point before.
+            for old in list(self._last)[:-1]:
+                del self._last[old]
+            self._last[key] = self._evaluate(u)
+        return self._last[key]
 
     def _evaluate(self, u: Float) -> tuple[Float, Float]:
         data = self.data_residuals(u)
@@ -374,8 +380,8 @@ class Objective:
         return -math.inf if data is None else float(sum(log_density(d) for d in data))
 
     def forget(self) -> None:
-        """Forget the last evaluation: a term has changed."""
-        self._last = None
+        """Forget the last evaluations: a term has changed."""
+        self._last.clear()
 
     def use_search(self, always: bool) -> None:
         """Set whether every call tries the slower method of the terms."""
@@ -425,7 +431,6 @@ class Objective:
             ending = max(tolerance, _COARSE)
             near = ahead.minimise(point, kept, tolerance=ending, evaluations=evaluations)
             self.unsolved += ahead.unsolved
-            # The last evaluation is kept: usually that of the approached minimum is needed again.
             if self.chi2(point) >= self.chi2(near.u):
                 point = near.u
         if not moving or not math.isfinite(self.chi2(point)):
@@ -452,7 +457,7 @@ class Objective:
                 bounds=(low, high),
                 x_scale="jac",
                 xtol=tolerance,
-                ftol=1e-2 * tolerance,
+                ftol=max(1e-2 * tolerance, _NEGLIGIBLE),
                 gtol=tolerance,
                 max_nfev=evaluations,
             ).x

@@ -349,8 +349,9 @@ def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
 # an orbit, and continuation takes seconds. A transient comes close to a stable orbit in a few
 # periods, and every orbit that can be measured is stable.
 
-#: Number of periods of a transient, and the largest number of its steps.
-_PERIODS, _MOST_STEPS = 6, 2000
+#: Number of periods of a transient, and the largest number of its steps. After 6 periods a
+#: transient with a multiplier of -0.8 is still too far from the orbit; more than 12 find no others.
+_PERIODS, _MOST_STEPS = 12, 4000
 #: Number of periods over which the modulation rises; after a sudden start the slider may run away.
 _RISE = 2
 #: Tolerance of a step; Newton's method corrects the remaining error.
