@@ -356,8 +356,9 @@ _PERIODS, _MOST_STEPS = 12, 4000
 _RISE = 2
 #: Tolerance of a step; Newton's method corrects the remaining error.
 _TOLERANCE = 1e-6
-#: Largest change of a state over the last period of a transient that counts as periodic.
-_SETTLED = 0.1
+#: Largest change of a state over the last period of a transient that counts as periodic. The state
+#: of a contact that sticks all the time grows as log(t): over the last of 12 periods by 0.09.
+_SETTLED = 0.05
 
 
 def settled_orbits(
