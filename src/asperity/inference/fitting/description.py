@@ -23,7 +23,7 @@ from asperity.inference.fitting.intervals import (
     inverse_information,
     parabola_of,
 )
-from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
+from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF, RIVAL
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.objective import Minimum, Objective, Residuals, log_density
 from asperity.inference.tables.residuals import (
@@ -36,8 +36,6 @@ from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 from asperity.units import quantity_text
 
-#: Other minima this close in chi-squared are reported: 3 standard deviations.
-RIVAL = 9.0
 #: Chi-squared is compared with its parabola at this many standard deviations. The normal
 #: approximation is used if the rise lies between these two: intervals are then wrong by less than a
 #: quarter.

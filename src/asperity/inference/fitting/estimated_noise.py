@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.inference.fitting.description import RIVAL
+from asperity.inference.fitting.minima import RIVAL
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import RunTerm
 

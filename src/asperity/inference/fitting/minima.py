@@ -47,6 +47,8 @@ DOUBTFUL = 0.05
 #: The slower method is used if chi-squared can decrease by more: a tenth of a standard error, or
 #: this share of chi-squared for a law that is far off.
 GAIN, _LARGE_GAIN = 0.01, 0.1
+#: Other minima this close in chi-squared are reported: 3 standard deviations.
+RIVAL = 9.0
 #: Minimisations within this of the lowest chi-squared are continued to their end.
 _CONTINUED = 50.0
 #: Other minima are searched at these multiples of a memory length. Minima with lengths closer than
@@ -229,8 +231,7 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
             # Transients do not reach orbits that are hardly stable; continuation does, in up to
             # seconds a row.
             objective.search_wholly(near.u)
-        tolerance = _COARSE_TOLERANCE if far_off else None
-        minima.append(objective.minimise(near.u, tolerance=tolerance))
+        minima.append(_minimised_beside(objective, near.u, minima, far_off=far_off))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
 
@@ -270,8 +271,22 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
             ]
             if apart:
                 u = min(apart, key=_CHI2).u
-                others.append(objective.minimise(u, evaluations=_EVALUATIONS))
+                others.append(_minimised_beside(objective, u, [*minima, *others]))
     return sorted([*minima, *others], key=_CHI2)
+
+
+def _minimised_beside(
+    objective: Objective, u: Float, minima: Sequence[Minimum], *, far_off: bool = False
+) -> Minimum:
+    """The minimum reached from u, precise only if it may be one of those that a fit reports."""
+    if minima or far_off:
+        near = objective.minimise(u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        lowest = min((m.chi2 for m in minima), default=math.inf)
+        again = near.chi2 > lowest and any(_apart(near, m) < _SAME_COARSE for m in minima)
+        if far_off or again or near.chi2 > lowest + RIVAL:
+            return near
+        u = near.u
+    return objective.minimise(u)
 
 
 def _p_value(objective: Objective, minimum: Minimum) -> float:
@@ -296,9 +311,13 @@ def distinct(minima: list[Minimum], same: float = _SAME) -> list[Minimum]:
     """Minima without those that repeat an earlier one."""
     kept: list[Minimum] = []
     for minimum in minima:
-        if all(np.abs(minimum.u - other.u).max() > same for other in kept):
+        if all(_apart(minimum, other) > same for other in kept):
             kept.append(minimum)
     return kept
+
+
+def _apart(one: Minimum, other: Minimum) -> float:
+    return float(np.abs(one.u - other.u).max())
 
 
 def _blocked(objective: Objective, end: Minimum) -> bool:
