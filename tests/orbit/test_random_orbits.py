@@ -156,10 +156,25 @@ def assert_orbit(response, motion):
     assert np.abs(response.harmonics[:2] - 2 * spectrum[1:3]).max() < 100 * accuracy * response.mu1
 
 
+def comes_to_rest(response):
+    """Whether the interface sticks within ten periods: orbits are of uninterrupted sliding."""
+    load, motion = response.load, response.motion
+    rates = jax.jit(lambda theta, Y: motion.rates(Y, load.at(theta)))
+    excess = jax.jit(lambda theta, Y: motion.log_slip(Y, load.at(theta)) + 20.0)
+    excess.terminal = True
+    start = np.asarray(motion.steady())
+    run = solve_ivp(rates, (0, 20 * np.pi), start, "LSODA", rtol=1e-8, atol=1e-10, events=excess)
+    return run.status == 1
+
+
 @pytest.mark.parametrize("seed", population(10))
 @pytest.mark.parametrize("law", LAWS)
 def test_a_random_orbit_obeys_the_equations(law, seed):
     response = random_orbit(law, seed)
+    if law == "cut-off" and response.result[()] != "converged":
+        assert "no periodic orbit found" in response.result[()]
+        assert comes_to_rest(response)
+        return
     assert response.result[()] == "converged"
     assert_orbit(response, response.motion)
 
