@@ -5,8 +5,8 @@ the equations of section III are written out again, so that a formula or a fast 
 with this has been checked by something else. It also carries the inertia of the slider, which the
 quasi-static solver leaves out. One period is integrated by DOP853 and closed by Newton's method.
 
-States, dimensionless: y = F/W0 - mu, phi = ln(V Phi/D0), and with inertia also u, the velocity
-(ln(v/V) with rigid asperities, v/V - 1 with elastic ones) and g = F_i/W0 - mu (elastic ones only).
+States, dimensionless: y = F/W0 - mu, phi = ln(V Phi/D0), and with inertia also u = ln(v/V), for
+rigid asperities.
 """
 
 from __future__ import annotations
