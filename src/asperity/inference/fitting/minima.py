@@ -184,11 +184,15 @@ def _by_few_rows(
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
     # A law that is far off for few rows does not describe all of them.
-    if minima or (again and roughly and _far_off(coarse, roughly[0])):
+    far_off = bool(roughly) and _far_off(coarse, roughly[0])
+    if minima or (again and far_off):
         return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
-    again += _best(objective, drawn, objective.chi2_of_many(np.array(drawn)))
-    ends = _roughly_minimised(objective, again, None)
+    chi2 = objective.chi2_of_many(np.array(drawn))
+    if far_off:
+        end = _minimised_beside(objective, drawn[int(np.argmin(chi2))], [], far_off=True)
+        return [end] if math.isfinite(end.chi2) else []
+    ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
     return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
 
 
@@ -280,7 +284,8 @@ def _minimised_beside(
 ) -> Minimum:
     """The minimum reached from u, precise only if it may be one of those that a fit reports."""
     if minima or far_off:
-        near = objective.minimise(u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+        evaluations = _FIRST_EVALUATIONS if far_off else _EVALUATIONS
+        near = objective.minimise(u, tolerance=_COARSE_TOLERANCE, evaluations=evaluations)
         lowest = min((m.chi2 for m in minima), default=math.inf)
         again = near.chi2 > lowest and any(_apart(near, m) < _SAME_COARSE for m in minima)
         if far_off or again or near.chi2 > lowest + RIVAL:
