@@ -339,7 +339,7 @@ def _file_rows(
         try:
             rows_of.question_of(path)
         except InputError as error:
-            raise InputError(f"{error} (--conditions, '{path.name}')") from None
+            raise error.noting(f" (--conditions, '{path.name}')") from None
     return rows_of
 
 

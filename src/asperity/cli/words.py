@@ -104,4 +104,4 @@ def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
         try:
             yield
         except InputError as error:
-            raise InputError(str(error)) from None
+            raise error.worded() from None

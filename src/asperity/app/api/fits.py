@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field, StrictBool
 
 from asperity.app.api.catalogue import package_material
-from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
+from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
@@ -156,8 +156,11 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     report(share=0.0)
     options = {name: getattr(question, name) for name in FitOptions.model_fields}
     record: dict[str, Any]
-    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder, naming(in_labels):
-        options["data"] = _data(question, files, Path(folder))
+    with (
+        tempfile.TemporaryDirectory(prefix="asperity-page-") as folder,
+        naming(in_labels, files=_names(data := _data(question, files, Path(folder)))),
+    ):
+        options["data"] = data
         if len(question.laws) == 1:
             one = questions.Fit(**{**options, "law": question.laws[0]})
             whole: Any = answer_fit(one, read=_read, progress=on_progress)
@@ -221,9 +224,14 @@ def _data(
     return data
 
 
+def _names(data: Iterable[Mapping[str, Any]]) -> dict[Path, str]:
+    """Names of files as the user knows them, by the path on the server."""
+    return {Path(file["file"]): file["name"] for file in data}
+
+
 def _read(data: Any) -> Any:
     """A recording for a fit; files are read within the limits of all readers of the page."""
-    with named(data.file, data.name), limited(LIMITS):
+    with limited(LIMITS):
         return read_source(data.file, data.source)
 
 
