@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from asperity.errors import Argument, InputError, naming
+from asperity.errors import Argument, InputError, naming, symbol
 
 #: Fields of an operating point, and fields whose options take NAME=VALUE.
 POINT_OPTIONS: Mapping[str, str] = {"law": "--law", "material": "--material"}
@@ -75,7 +75,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
         whole, _, part = name.partition(".")
         option = name
         if whole in _PAIRS and whole in options:
-            option, key = known[whole], part
+            option, name, key = known[whole], whole, part
+    key = symbol(key) if name in _PAIRS else key
     if name in _PAIRS and key and value:
         return f"{option} {quoted(f'{key}={value}', also='=')}"
     # A switch says yes or no by itself.

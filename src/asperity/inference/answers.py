@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from asperity import materials
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.comparison.compare import Comparison, compare as compare_loaded
 from asperity.inference.cycles import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit as fit_loaded
@@ -259,7 +259,8 @@ def _prior_of_unloading(
     label = "stiffness_from"
     other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
     if other is not None:
-        raise InputError(label, "be the only number of K", f"{Argument(other)} K too", "drop one")
+        rule = f"be the only number of {symbol('K')}"
+        raise InputError(label, rule, f"{Argument(other, 'K')} too", "drop one")
     rule, advice = "go with one recording", "give one recording"
     require(len(question.data) == 1, label, rule, f"{len(question.data)} files", advice)
     require(not is_table(question.data[0]), label, rule, "a table", advice)

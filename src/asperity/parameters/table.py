@@ -19,7 +19,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from asperity.errors import Argument, InputError, closest, require
+from asperity.errors import Argument, InputError, closest, require, symbol
 from asperity.parameters.arguments import shown, typed
 from asperity.parameters.parameter import Names, Output, Parameter
 
@@ -166,7 +166,7 @@ def known_name(
     """
     canonical = canonical_name(name, known)
     if canonical is None:
-        raise InputError(label, "be a known name", shown(name), suggestion(name, known))
+        raise InputError(label, "be a known name", shown(symbol(name)), suggestion(name, known))
     return canonical
 
 
@@ -174,7 +174,7 @@ def known_name(
 def suggestion(name: str, known: Mapping[str, Parameter]) -> str:
     """``did you mean 'x'?``, or the names there are."""
     meant = [p.name for p in known.values() if name.lower() in p.meant]
-    return f"did you mean '{meant[0]}'?" if meant else closest(name, known)
+    return f"did you mean '{symbol(meant[0])}'?" if meant else closest(name, map(symbol, known))
 
 
 #: Decorations of a formula that a plain name goes without.

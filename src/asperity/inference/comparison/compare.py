@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, enumerated, require
+from asperity.errors import InputError, enumerated, require, symbol
 from asperity.inference.comparison.evidence import (
     DISFAVOURED,
     EXCLUDED,
@@ -213,7 +213,7 @@ def compare(
     nobodys = [p for p in free or () if p in of_any_law - of_these]
     if nobodys:
         rule = "be parameters of the laws that are compared"
-        got = f"'{nobodys[0]}', which none of {', '.join(dict.fromkeys(laws))} has"
+        got = f"'{symbol(nobodys[0])}', which none of {', '.join(dict.fromkeys(laws))} has"
         raise InputError("free", rule, got, "leave it out, or add a law with it")
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {
