@@ -185,7 +185,7 @@ def _invert(
     solve: Any
     sought, solve = {"R": ("radius", patch_radius), "h0": ("gap", gap)}[unknown]
     result = solve(ratio, hertz, layer=layer, **{name: numbers[name] for name in _CONTACT})
-    lengths = tuple(f"{unknown} = {format_si(v, 'length', 6)}" for v in result.solutions)
+    lengths = tuple(f"{symbol(unknown)} = {format_si(v, 'length', 6)}" for v in result.solutions)
     if output.as_json or lengths:
         output.answer(
             lambda: {

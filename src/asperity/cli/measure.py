@@ -441,7 +441,7 @@ def _campaign(
         lambda: {**counts, **healing},
         lambda: [
             Section("", (made,)),
-            *([healing_section(campaign, output.names)] if campaign.series else []),
+            *([healing_section(campaign)] if campaign.series else []),
         ],
     )
     output.draw(lambda: with_cycles(campaign).plot())

@@ -196,18 +196,11 @@ _OUTPUT = (
 def _chosen(context: click.Context, names: str) -> str:
     """The set of names, in which sentences are written too."""
     if names != NAMES[0]:
-        name_by(symbols=in_geophysics)
+        from asperity.laws.registry import symbols_of
+
+        name_by(symbols=symbols_of("geophysics"))
     chosen: str = context.meta.setdefault(CHOSEN_NAMES, names)
     return chosen
-
-
-def in_geophysics(name: str) -> str:
-    """The name in geophysics of a parameter of any registered law."""
-    from asperity.laws import registered
-    from asperity.parameters.table import plain_names
-
-    every = (plain_names(law) for law in registered().values())
-    return next((names[name] for names in every if name in names), name)
 
 
 def point_options(command: Command) -> Command:

@@ -71,6 +71,8 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
     known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
     option = known.get(name)
+    if option and option.startswith("--set "):
+        return number_option(option.removeprefix("--set "), has_options=False)
     if option is None:
         whole, _, part = name.partition(".")
         option = name

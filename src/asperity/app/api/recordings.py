@@ -9,7 +9,6 @@ import json
 import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,9 @@ from pydantic import field_validator
 
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming
+from asperity.laws.registry import symbols_of
 from asperity.outputs.tables import Section
-from asperity.parameters import NAMES, OUTPUTS, Names, in_names
+from asperity.parameters import NAMES, OUTPUTS, Names
 from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
@@ -54,7 +54,8 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
     ``table`` for a lock-in table.
     """
     path, name = Path(argument["path"]), argument["name"]
-    with naming(in_labels, files={path: name}):
+    symbols = symbols_of(argument.get("names", NAMES[0]))
+    with naming(in_labels, symbols, {path: name}):
         table = _table_in(path, name)
         if table is not None:
             return {"table": table}
@@ -117,8 +118,7 @@ def _measured(
     names: Names = argument.get("names", NAMES[0])
 
     def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
-        words = partial(in_names, names=names)
-        return [section.worded(words).record() for section in sections]
+        return [section.record() for section in sections]
 
     question = questions.Measurement(**argument["options"])
     name = argument["name"]

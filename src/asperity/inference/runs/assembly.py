@@ -78,7 +78,7 @@ def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
 def _stiffness(value: Any, load_unit: str, W0: float, label: str) -> float:
     over = over_load(value, label) if load_unit else None
     parameter = replace(MACHINE["K"], kind=STIFFNESS[load_unit])
-    return float(parameter.check(value, label)) if over is None else over * W0
+    return float(parameter.check(value, symbol(label))) if over is None else over * W0
 
 
 def over_load(value: Any, label: str = "K") -> float | None:
@@ -288,9 +288,11 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
     """
     for run in runs:
         if run.load_unit != "N":
+            K = symbol("K")
             raise InputError(
-                f"K must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
-                "leave K out of the free and the fixed parameters, and give the table a column of K"
+                f"{K} must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
+                f"leave {K} out of the free and the fixed parameters, and give the table a column "
+                "of K"
             )
 
 

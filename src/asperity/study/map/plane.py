@@ -102,7 +102,7 @@ class Axis:
         """
         match = _AXIS.fullmatch(text + " ")
         if match is None:
-            advice = "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
+            advice = f"write it like '{symbol('K')}=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
             raise InputError(label, "be NAME=LOW:HIGH:COUNT UNIT", f"'{text}'", advice)
         name, low, high, count, unit = (part.strip() for part in match.groups())
         parameter = _parameter(name)
