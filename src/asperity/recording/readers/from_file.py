@@ -152,7 +152,9 @@ def raw_recording(
         raise InputError("recording.path", "fit into memory", got, "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
-        rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {error}"
+        # The text of an OSError has the path, which the user may know by another name.
+        text = getattr(error, "strerror", None) or error
+        rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {text}"
         why = f"which may be cut or damaged: its reader could not read it ({why})"
         raise refuse_truncated(path, why, rule) from None
     if not isinstance(recorded, RawRecording):
