@@ -9,9 +9,10 @@ A solve that fails is not an error: it is reported in the result.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 
@@ -43,7 +44,7 @@ class Argument(NamedTuple):
         return name
 
     def __str__(self) -> str:
-        return _words.get()(self)
+        return _naming.get().words(self)
 
     def __format__(self, spec: str) -> str:
         return format(str(self), spec)
@@ -86,24 +87,75 @@ class Key(Argument):
 
 
 Words = Callable[[Argument], str]
+Symbols = Callable[[str], str]
 
-_words: ContextVar[Words] = ContextVar("words", default=in_python)
+
+class Naming(NamedTuple):
+    """What a door calls arguments, parameters and files."""
+
+    words: Words = in_python
+    symbols: Symbols = str
+    files: Mapping[Path, str] = {}
+
+
+_IN_PYTHON_NAMES = Naming()
+_naming: ContextVar[Naming] = ContextVar("naming", default=_IN_PYTHON_NAMES)
+
+
+def name_by(
+    words: Words | None = None,
+    symbols: Symbols | None = None,
+    files: Mapping[Path, str] | None = None,
+) -> Naming:
+    """As `naming`, from now on; returns the naming until now."""
+    earlier = _naming.get()
+    _naming.set(
+        Naming(
+            earlier.words if words is None else words,
+            earlier.symbols if symbols is None else symbols,
+            earlier.files if files is None else files,
+        )
+    )
+    return earlier
 
 
 @contextmanager
-def naming(words: Words) -> Iterator[None]:
-    """Let sentences name arguments in the words of a door.
+def naming(
+    words: Words | None = None,
+    symbols: Symbols | None = None,
+    files: Mapping[Path, str] | None = None,
+) -> Iterator[None]:
+    """Let sentences name things as a door does; what is left out is named as before.
 
     Parameters
     ----------
-    words : callable
+    words : callable, optional
         From an `Argument` to a text.
+    symbols : callable, optional
+        From the name of a parameter to that in the set of names of the user.
+    files : mapping of Path to str, optional
+        Names that the user knows, of files that lie under other names.
     """
-    token = _words.set(words)
+    earlier = name_by(words, symbols, files)
     try:
         yield
     finally:
-        _words.reset(token)
+        _naming.set(earlier)
+
+
+def symbol(name: str) -> str:
+    """The name of a parameter in the user's set of names, for a sentence."""
+    return _naming.get().symbols(name)
+
+
+def symbols(names: Iterable[str]) -> str:
+    """Names of parameters in the user's set of names, with commas between them."""
+    return ", ".join(map(symbol, names))
+
+
+def known_as(path: Path) -> Path:
+    """A path as the user knows it, for a sentence."""
+    return Path(_naming.get().files.get(path, path))
 
 
 class InputError(ValueError):
@@ -140,6 +192,15 @@ class InputError(ValueError):
         if not self.rule:
             return self
         return type(self)(field, self.rule, self.got, self.advice)
+
+    def shortened(self, most: int) -> InputError:
+        """The same mistake, its parts as one line of at most so many characters each."""
+        parts = (printable(part, most) for part in (self.rule, self.got, self.advice))
+        return type(self)(self.field._replace(name=printable(self.field.name, most)), *parts)
+
+    def worded(self) -> InputError:
+        """The same mistake, its field in the words of the door in use, for every door."""
+        return self.about(Key(str(self.field)))
 
     def noting(self, addition: str) -> InputError:
         """The same mistake with an addition at its end."""
@@ -209,6 +270,14 @@ class MistakesError(InputError):
         self.source = source
         # Which a copy in another process is made of.
         self.args = (self.errors, source)
+
+    def worded(self) -> InputError:
+        """As of `InputError`, for every mistake."""
+        return type(self)([error.worded() for error in self.errors], self.source)
+
+    def noting(self, addition: str) -> InputError:
+        """As of `InputError`, to the last mistake."""
+        return type(self)([*self.errors[:-1], self.errors[-1].noting(addition)], self.source)
 
     @property
     def mistakes(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Bool, Float, Index
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, require, symbol, symbols
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulation import lowest_load, modulated
 from asperity.materials import load_from
@@ -86,7 +86,7 @@ def sourced_numbers(
     for written, value in given.items():
         field = Argument(f"{place}.{written}") if place else Argument("numbers", key=written)
         name = known_name(written, known, field)
-        require(name not in numbers, field, "be given once", f"{name} too", "leave one out")
+        require(name not in numbers, field, "be given once", f"{symbol(name)} too", "leave one out")
         if isinstance(value, SourcedNumber):
             numbers[name] = value
             continue
@@ -155,7 +155,7 @@ def without_numbers(
     name, example = missing[0], known[missing[0]].example
     like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
     advice = f"name a material that has them or give each one, like {like}"
-    return InputError(law_name, "have all its numbers", f"none for {', '.join(missing)}", advice)
+    return InputError(law_name, "have all its numbers", f"none for {symbols(missing)}", advice)
 
 
 def refuse_foreign(law_name: str, given: Iterable[str]) -> None:
@@ -166,7 +166,7 @@ def refuse_foreign(law_name: str, given: Iterable[str]) -> None:
             n for n, law in registered().items() if canonical_name(name, point_parameters(law))
         ]
         holds = not owners or canonical_name(name, of_law)
-        got = f"'{name}', which belongs to {', '.join(owners)}"
+        got = f"'{symbol(name)}', which belongs to {', '.join(owners)}"
         advice = "leave it out or choose another law"
         require(holds, law_name, "be given its own parameters", got, advice)
 
@@ -352,9 +352,12 @@ def require_influence(
         if other:
             value = "1" if other == "inertia" else "0.1"
             like = f"{place}.{other} = {value}" if place else Argument("numbers", other, value)
-            rule, got = f"have an influence, which it has with {other}", f"{other} = 0"
-            about = field.format(name) if field else Argument("numbers", name)
-            raise InputError(about, rule, got, f"add {like}, or leave {name} out")
+            rule, got = (
+                f"have an influence, which it has with {symbol(other)}",
+                f"{symbol(other)} = 0",
+            )
+            about = field.format(symbol(name)) if field else Argument("numbers", name)
+            raise InputError(about, rule, got, f"add {like}, or leave {symbol(name)} out")
 
 
 def without_mass(values: Mapping[str, Float]) -> Bool:

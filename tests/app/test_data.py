@@ -17,9 +17,11 @@ import asperity as asp
 from asperity.app.api import fits, recordings
 from asperity.app.api.protocols import checked
 from asperity.app.uploads import Uploads
+from asperity.app.words import in_labels
 from asperity.cli.main import main
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError, naming, symbol
 from asperity.inference.answers import read_data
+from asperity.laws.registry import symbols_of
 from asperity.outputs.tables import Section
 from asperity.questions import fit as questions
 from references.spring_slider import spring_slider
@@ -240,7 +242,8 @@ def test_what_is_no_recording_gets_a_sentence(measured_here, what, tmp_path):
 def test_a_sentence_names_what_the_page_names(measured_here, content, source, begin):
     with pytest.raises(InputError) as refused:
         measured_here(content, source=source)
-    assert str(refused.value).startswith(begin)
+    with naming(in_labels):
+        assert str(refused.value).startswith(begin)
     assert "columns=" not in str(refused.value)
     assert "columns[" not in str(refused.value)
 
@@ -373,8 +376,10 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
             folder.mkdir() or posterior.to_netcdf(folder / "a.nc")
         ),
     )
-    said = Section("posterior", ("A is larger than B",))
-    monkeypatch.setattr("asperity.inference.report.posterior_sections", lambda posterior: [said])
+    monkeypatch.setattr(
+        "asperity.inference.report.posterior_sections",
+        lambda posterior: [Section("A", (f"{symbol('A')} is larger than {symbol('B')}",))],
+    )
     asked = {
         "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000", "report": True,
         "names": "geophysics", "tables": [{"name": "readings.csv", "text": table["text"]}],
@@ -385,6 +390,7 @@ def test_a_table_is_fitted_and_its_posterior_sampled_as_asked(measured_here, mon
     result = fits.fit(whole, lambda **message: sent.append(message))
     assert {"draws": 50, "of": 800} in sent
     assert result["posterior"]["seed"] == 7
+    assert result["sections"][-1]["title"] == "A"  # a text of the report, and no parameter
     assert result["sections"][-1]["sentences"] == ("a is larger than b",)
     middles, heights = (np.array(result["posterior"]["histograms"]["mu0"][n]) for n in "xy")
     width = middles[1] - middles[0]
@@ -681,3 +687,31 @@ def test_a_fit_needs_a_recording_that_was_sent(ask, steps):
     answer = ask("data/fit", steps["question"])
     assert answer.status == 400
     assert "recording must be" in answer.json["error"]
+
+
+def test_an_error_names_the_file_as_the_user_does_and_changes_nothing_else(measured_here) -> None:
+    """The file is 0123.csv on the server."""
+    rows = "".join(f"{t / 10},{3 + t % 3}\n" for t in range(60))
+    with pytest.raises(InputError) as refused:
+        measured_here(b"time (s),0123.csv\n" + rows.encode(), "mine.csv")
+    assert refused.value.rule
+    assert "0123.csv" in str(refused.value)
+    assert "mine.csv" not in str(refused.value)
+    with pytest.raises(InputError) as refused:
+        measured_here(b"", "mine.csv")
+    assert refused.value.got == "'mine.csv', which is empty"
+
+
+def test_files_of_a_fit_are_named_as_the_user_does(tmp_path) -> None:
+    path = tmp_path / "B.csv"
+    path.write_text("A\n")
+    question = {"laws": ["rice-ruina"], "runs": [{"recording": "x"}], "names": "geophysics"}
+    files = [{"path": str(path), "name": "A.csv"}]
+    with pytest.raises(InputError) as refused:
+        fits.fit({"question": question, "files": files}, lambda **message: None)
+    assert refused.value.got.startswith("'A.csv'")
+
+
+def test_fixed_numbers_have_the_names_of_the_page() -> None:
+    with naming(in_labels, symbols_of("geophysics")):
+        assert f"{Argument('fixed', 'D0')}" == "Fixed numbers, D_c"

@@ -10,6 +10,8 @@ import pytest
 
 from asperity.cli.main import main
 from asperity.cli.shell import _EXAMPLE_IN_HELP, _EXAMPLES
+from asperity.cli.words import fields_as_options
+from asperity.errors import Argument, InputError, MistakesError
 from references.commands import refused
 from references.populations import population
 
@@ -70,9 +72,37 @@ def test_parameters_are_named_as_the_user_names_them(asperity, tmp_path):
     path.write_text("time (s),displacement (mm),friction\n" + rows)
     fit = partial(asperity, "fit", path, "--names", "geophysics")
     refused(fit("--free", "a,b"), "got none for D_c;")
-    refused(fit("--free", "a,b,x"), "--free must be", "choose one of a, b, D_c, k, M, sigma_n")
+    refused(fit("--free", "a,b,x"), "--free must be", "choose one of D_c, M, a, b, eps_ratio")
     refused(fit("--free", "a,b", "--fix", "Dc=-2 um"), "--fix D_c must be positive, got -2e-06 m")
     refused(fit("--free", "a,b,D_c", "--start", "sigma_n=7 N"), "got 'sigma_n'; free it")
+
+
+def test_only_parameters_are_renamed(asperity, tmp_path):
+    """Files, columns, units and options keep their names, though parameters have some of them."""
+    path = tmp_path / "B.csv"
+    path.write_text("time (s),A,B\n" + "".join(f"{t / 10},{t % 3},{t % 5}\n" for t in range(60)))
+    geophysics = ("--names", "geophysics")
+    refused(asperity("fit", path, *geophysics), "choose one of A, B, like --force A")
+    point = [*OF, "--law", "rice-ruina", "-e", "0.2", "-f", "1 Hz", *geophysics]
+    refused(asperity(*point, "-V", "0 um/s"), "-V must be positive")
+    refused(asperity(*point, "-V", "1 K"), "got '1 K'")
+    refused(asperity(*point), "got none for V_lp;", 'like -V "1 um/s"')
+    path.write_text("")
+    refused(asperity("measure", path, *geophysics), "got 'B.csv', which is empty")
+    plan = tmp_path / "K.toml"
+    plan.write_text("A = 1\n")
+    refused(asperity("design", plan, *geophysics), "A must be a known field", "(in 'K.toml')")
+    axes = ("--x", "D_c=1:2:2 um", "--y", "b=2:1:2", "--out", tmp_path / "map.nc")
+    point = [*OF[1:], "--law", "rice-ruina", "-V", "1 um/s", "-f", "1 Hz", *geophysics]
+    refused(asperity("map", *point, *axes), "--y must", "got 2 to 1")
+
+
+def test_a_command_passes_the_parts_of_an_error_on():
+    fixed = InputError(Argument("fixed", "A"), "be positive", "-1", "correct it")
+    with pytest.raises(MistakesError) as refused, fields_as_options({"fixed": "--fix"}):
+        raise MistakesError([fixed, fixed], "K.toml")
+    assert [error.got for error in refused.value.errors] == ["-1", "-1"]
+    assert refused.value.mistakes[0] == "--fix A must be positive, got -1; correct it"
 
 
 @pytest.mark.parametrize(

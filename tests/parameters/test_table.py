@@ -23,7 +23,6 @@ from asperity.parameters import (
     all_parameters,
     canonical_name,
     display_name,
-    in_names,
     known_name,
     law_parameters,
     point_parameters,
@@ -183,14 +182,5 @@ def test_names_of_geophysics_are_those_of_the_table() -> None:
     assert [display_name(text) for text in texts] == list(texts)
 
 
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("A is not determined beside B: fix one", "a is not determined beside b: fix one"),
-        ("A law is excluded. A stretch is steep", "A law is excluded. A stretch is steep"),
-        ("D0 is at its bound: use --fix D0=1", "D_c is at its bound: use --fix D_c=1"),
-    ],
-)
-def test_sentences_in_names_of_geophysics(text: str, shown: str) -> None:
-    assert in_names(text, "geophysics") == shown
-    assert in_names(text) == text
+def test_the_run_of_a_parameter_keeps_its_name() -> None:
+    assert display_name("K[B]/W0", "geophysics") == "k[B]/sigma_n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from asperity.errors import Argument
+from asperity.errors import Argument, symbol
 
 #: Label of the page of each field.
 LABELS: Mapping[str, str] = {
@@ -76,9 +76,9 @@ def in_labels(argument: Argument) -> str:
     elif head in _OF_DATA:
         name = field
     if name in ("numbers", "start") and key:
-        label = key
+        label = symbol(key)
     elif name == "fixed" and key:
-        label = f"Fixed numbers, {key}"
+        label = f"Fixed numbers, {symbol(key)}"
     elif name in ("columns", "Trace.channel") and key == "time":
         label = LABELS["time"]
     elif name in ("columns", "Trace.channel") and key:

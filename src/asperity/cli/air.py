@@ -16,7 +16,7 @@ from asperity.cli.options import (
     switch,
 )
 from asperity.cli.report import Output, say
-from asperity.errors import require
+from asperity.errors import require, symbol, symbols
 from asperity.parameters.arguments import number, one_of
 
 if TYPE_CHECKING:
@@ -79,7 +79,11 @@ def air(
     unknown, given = {"radius": "R", "gap": "h0"}.get(sought or "", ""), settings_of(settings)
     rule = f"be left out with --for {sought}"
     require(
-        unknown not in given, f"--set {unknown}", rule, f"'{given.get(unknown)}'", "it is sought"
+        unknown not in given,
+        f"--set {symbol(unknown)}",
+        rule,
+        f"'{given.get(unknown)}'",
+        "it is sought",
     )
     numbers = _numbers(given, material_named(material), vacuum, unknown)
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
@@ -104,19 +108,25 @@ def _numbers(
     for name, text in given.items():
         rule = "not be given with --vacuum"
         require(
-            not (vacuum and name in _LAYER), f"--set {name}", rule, f"'{text}'", "leave one out"
+            not (vacuum and name in _LAYER),
+            f"--set {symbol(name)}",
+            rule,
+            f"'{text}'",
+            "leave one out",
         )
-        one_of(name, kinds, "--set")
-    numbers = {n: number(text, f"--set {n}", kinds[n], "positive") for n, text in given.items()}
+        one_of(symbol(name), map(symbol, kinds), "--set")
+    numbers = {
+        n: number(text, f"--set {symbol(n)}", kinds[n], "positive") for n, text in given.items()
+    }
     for name in kinds:
         published = _PUBLISHED.get(name, name)
         if name not in (*numbers, unknown) and material is not None and published in material:
             numbers[name] = material[published].si
     missing = [name for name in kinds if name not in (*numbers, unknown)]
     if missing:
-        example = f"{missing[0]}={KINDS[kinds[missing[0]]].example}"
+        example = f"{symbol(missing[0])}={KINDS[kinds[missing[0]]].example}"
         advice = f'name a material that has them or give each one, like --set "{example}"'
-        require(False, "air", "have all its numbers", f"none for {', '.join(missing)}", advice)
+        require(False, "air", "have all its numbers", f"none for {symbols(missing)}", advice)
     return numbers
 
 
@@ -175,7 +185,7 @@ def _invert(
     solve: Any
     sought, solve = {"R": ("radius", patch_radius), "h0": ("gap", gap)}[unknown]
     result = solve(ratio, hertz, layer=layer, **{name: numbers[name] for name in _CONTACT})
-    lengths = tuple(f"{unknown} = {format_si(v, 'length', 6)}" for v in result.solutions)
+    lengths = tuple(f"{symbol(unknown)} = {format_si(v, 'length', 6)}" for v in result.solutions)
     if output.as_json or lengths:
         output.answer(
             lambda: {

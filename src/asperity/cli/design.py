@@ -10,6 +10,7 @@ import click
 
 from asperity.cli.options import Count, option, output_options
 from asperity.cli.report import Output
+from asperity.errors import symbol, symbols
 
 if TYPE_CHECKING:
     from asperity.inference import Design
@@ -79,17 +80,17 @@ def _sections(result: Design) -> list[Section]:
         settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
         predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
         rows.append((*settings, str(p.readings), *predicted))
-    aim = f"to measure {', '.join(plan.question.measure)}"
+    aim = f"to measure {symbols(plan.question.measure)}"
     if plan.rival is not None:
         aim = f"to exclude {plan.rival.law.name}"
     title = f"{plan.truth.law.name}: {result.readings} readings {aim}"
-    points = Section(title, head=(*axes, "readings", *plan.noise), rows=tuple(rows))
+    points = Section(title, head=(*map(symbol, axes), "readings", *plan.noise), rows=tuple(rows))
     numbers = tuple(
-        (n, f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
+        (symbol(n), f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
         for n, p in result.parameters.items()
     )
     head = ("", "expected", "std. error", "even grid", "")
-    grid = " x ".join(f"{m} {n}" for n, m in zip(axes, result.grid_levels, strict=True))
+    grid = " x ".join(f"{m} {symbol(n)}" for n, m in zip(axes, result.grid_levels, strict=True))
     what = "chi-squared" if plan.rival is not None else "interval"
     fewer = "infinitely many" if math.isinf(result.fewer) else f"{result.fewer:.3g}"
     if math.isnan(result.fewer):
@@ -103,7 +104,7 @@ def _sections(result: Design) -> list[Section]:
         *(f"  {count} not: {reason}" for reason, count in result.left_out.items()),
     ]
     if plan.rival is not None:
-        values = "; ".join(f"{n} = {v:.4g}" for n, v in (result.rival_values or {}).items())
+        values = "; ".join(f"{symbol(n)} = {v:.4g}" for n, v in (result.rival_values or {}).items())
         chi2, chi2_grid, probable, on_grid = (
             f"{x:.{digits}g}" if x is not None and math.isfinite(x) else "unknown"
             for x, digits in (
@@ -122,8 +123,8 @@ def _sections(result: Design) -> list[Section]:
         best = min(levels, key=lambda level: level[2])
         several = [f"{format_si(v, known[axis].kind, 3)}: {more:.3g}" for v, _, more in levels]
         lines.append(
-            f"readings at one {axis} alone, in multiples of the design's: {', '.join(several)}; "
-            f"best {format_si(best[0], known[axis].kind, 3)}"
+            f"readings at one {symbol(axis)} alone, in multiples of the design's: "
+            f"{', '.join(several)}; best {format_si(best[0], known[axis].kind, 3)}"
         )
     sections = [
         points,
@@ -136,7 +137,7 @@ def _sections(result: Design) -> list[Section]:
     if (s := result.simulation) is not None:
         decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"
         spread = tuple(
-            (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{result.parameters[n].se:.3g}")
+            (symbol(n), f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{result.parameters[n].se:.3g}")
             for n, x in s.spread.items()
         )
         title = f"{s.sets} simulated fits{decided}"

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import option, output_options, point_options, switch
+from asperity.cli.options import option, output_options, parameter_name, point_options, switch
 from asperity.cli.report import Output, say
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, symbol
 from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def map(
     for line in record["boundaries"]:
         kinds = " and ".join(dict.fromkeys(line["kind"]))
         spans = ", ".join(
-            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g} {unit}".rstrip()
+            f"{symbol(name)} {min(line[name]):.6g} to {max(line[name]):.6g} {unit}".rstrip()
             for name, unit in units.items()
         )
         boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
@@ -129,7 +129,8 @@ def _axis(text: str, log: bool, option: str) -> Axis:
     from asperity.study.map import Axis
 
     try:
-        return Axis.parse(text, log, option)
+        name, *values = text.split("=", 1)
+        return Axis.parse("=".join([parameter_name(name.strip()), *values]), log, option)
     except InputError as error:
         raise error.about(option) from None
 

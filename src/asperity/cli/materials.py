@@ -8,7 +8,7 @@ import click
 
 from asperity.cli.options import output_options, switch
 from asperity.cli.report import Output
-from asperity.errors import require
+from asperity.errors import require, symbol
 
 if TYPE_CHECKING:
     from asperity.materials import Material, Number
@@ -52,7 +52,9 @@ def materials(name: str | None, cite: bool, output: Output) -> None:
     else:
         material = known.load(name)
         head = ("name", "value", "kind", "place", "note")
-        rows = tuple((n, str(v), v.kind, v.place, v.note) for n, v in material.numbers.items())
+        rows = tuple(
+            (symbol(n), str(v), v.kind, v.place, v.note) for n, v in material.numbers.items()
+        )
         table = Section(f"{material.name}: {material.title}\n", head=head, rows=rows)
         output.answer(lambda: _record(material), lambda: [table], indent="")
 

@@ -25,7 +25,7 @@ from asperity.cli.options import (
 from asperity.cli.recording import listed_times, source_options, velocities_option
 from asperity.cli.report import Output, say
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
-from asperity.errors import InputError, naming, require
+from asperity.errors import InputError, naming, require, symbol, symbols
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -339,7 +339,7 @@ def _file_rows(
         try:
             rows_of.question_of(path)
         except InputError as error:
-            raise InputError(f"{error} (--conditions, '{path.name}')") from None
+            raise error.noting(f" (--conditions, '{path.name}')") from None
     return rows_of
 
 
@@ -441,7 +441,7 @@ def _campaign(
         lambda: {**counts, **healing},
         lambda: [
             Section("", (made,)),
-            *([healing_section(campaign, output.names)] if campaign.series else []),
+            *([healing_section(campaign)] if campaign.series else []),
         ],
     )
     output.draw(lambda: with_cycles(campaign).plot())
@@ -471,7 +471,7 @@ def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """Numbers of the machine from ``--set``, by the fields of the question."""
     from asperity.measurement.campaign import MACHINE_FIELDS
 
-    rule, like = f"name one of {', '.join(MACHINE_FIELDS)}", 'write it like --set "K=168 N/m"'
+    rule, like = f"name one of {symbols(MACHINE_FIELDS)}", f'like --set "{symbol("K")}=168 N/m"'
     for name in given if strict else ():
-        require(name in MACHINE_FIELDS, "--set", rule, f"'{name}'", like)
+        require(name in MACHINE_FIELDS, "--set", rule, f"'{symbol(name)}'", f"write it {like}")
     return {MACHINE_FIELDS[name]: given[name] for name in given if name in MACHINE_FIELDS}

@@ -13,7 +13,7 @@ import click
 
 from asperity.cli.report import CHOSEN_NAMES, Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
-from asperity.errors import InputError, require
+from asperity.errors import InputError, name_by, require, symbol
 from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
 from asperity.parameters.arguments import one_of
 
@@ -187,12 +187,20 @@ _OUTPUT = (
         "k/sigma_n.",
         default=NAMES[0],
         is_eager=True,
-        callback=lambda context, option, names: context.meta.setdefault(
-            CHOSEN_NAMES, one_of(names, NAMES, "--names")
-        ),
+        callback=lambda context, option, names: _chosen(context, one_of(names, NAMES, "--names")),
     ),
     switch("--json as_json", "Print JSON instead of text."),
 )
+
+
+def _chosen(context: click.Context, names: str) -> str:
+    """The set of names, in which sentences are written too."""
+    if names != NAMES[0]:
+        from asperity.laws.registry import symbols_of
+
+        name_by(symbols=symbols_of("geophysics"))
+    chosen: str = context.meta.setdefault(CHOSEN_NAMES, names)
+    return chosen
 
 
 def point_options(command: Command) -> Command:
@@ -303,7 +311,7 @@ def pairs_of(
 def settings_of(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
     """Parameters by their one names, from texts as of `pairs_of`."""
     settings: dict[str, str] = {}
-    for name, value in pairs_of(texts, option, '"K=0.2 N/um"').items():
+    for name, value in pairs_of(texts, option, f'"{symbol("K")}=0.2 N/um"').items():
         add_setting(settings, parameter_name(name), value, option)
     return settings
 
@@ -324,7 +332,7 @@ def add_setting(settings: dict[str, str], name: str, value: str | None, option: 
     """Add a value that another option gives, if it does; twice the same name is an error."""
     if value is None:
         return
-    field, twice = f"{option} {name}".strip(), f"'{settings.get(name)}' and '{value}'"
+    field, twice = f"{option} {symbol(name)}".strip(), f"'{settings.get(name)}' and '{value}'"
     require(name not in settings, field, "be given once", twice, "leave one out")
     settings[name] = value
 

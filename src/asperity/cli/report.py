@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,16 +60,14 @@ class Output:
         from asperity.laws import get_law
         from asperity.outputs import json
         from asperity.outputs.tables import as_text
-        from asperity.parameters import in_names
         from asperity.parameters.table import plain_names
 
-        known = get_law(law) if law and self.names != NAMES[0] else None
         if self.as_json:
-            names = {} if self.names == NAMES[0] else {"names": plain_names(known)}
+            laws = [get_law(law)] if law else []
+            names = {} if self.names == NAMES[0] else {"names": plain_names(*laws)}
             click.echo(json.to_json({**record(), **names}, indent=2))
         else:
-            words = partial(in_names, names=self.names, law=known)
-            click.echo(as_text((section.worded(words) for section in sections()), indent))
+            click.echo(as_text(sections(), indent))
 
     def require_picture(self, *inputs: Path) -> None:
         """Check the path of ``--plot`` before anything is computed."""

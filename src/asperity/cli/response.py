@@ -10,7 +10,7 @@ import click
 
 from asperity.cli.options import option, output_options, point_options, switch
 from asperity.cli.report import Output, say
-from asperity.errors import require
+from asperity.errors import require, symbol
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
@@ -206,7 +206,7 @@ def _sections(
 
     kinds = point_parameters(get_law(law))
     inputs = [
-        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
+        (symbol(name), format_si(number.value, kinds[name].kind, 6), number.origin)
         for name, number in numbers.items()
     ]
     rows = []
@@ -215,7 +215,7 @@ def _sections(
             continue  # of a law without states, which has no modes
         text = f"{value:.9g} {unit}".removesuffix(" 1") if isinstance(value, float) else str(value)
         yes_or_no = name in ("stable", "steady")
-        rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, meaning))
+        rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, symbol(meaning)))
     stresses = output.names == "geophysics"
     title = f"{law}, of forces per square metre: N for Pa" if stresses else law
     return [Section(title, rows=tuple(inputs)), Section(heading, rows=tuple(rows))]

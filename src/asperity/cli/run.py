@@ -11,7 +11,7 @@ import click
 
 from asperity.cli.options import law_option, option, output_options, switch
 from asperity.cli.report import Output, save_figure, say
-from asperity.errors import InputError
+from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
     from asperity.protocol import Protocol, RunSummary
@@ -89,7 +89,8 @@ def run(
     )
     require_netcdf(out, "--out", "run.nc")
     try:
-        wanted = load_protocol(protocol)
+        with naming(symbols=str):  # a file has the names of friction
+            wanted = load_protocol(protocol)
     except ProtocolError as error:
         say(*(f"{protocol}: {' '.join(mistake.split())}" for mistake in error.mistakes))
         return 2

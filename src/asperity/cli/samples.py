@@ -8,7 +8,7 @@ import click
 
 from asperity.cli.options import Count, option, output_options
 from asperity.cli.report import Output
-from asperity.errors import require
+from asperity.errors import require, symbol
 
 _EPILOG = """\b
 Examples:
@@ -59,7 +59,7 @@ def samples(name: str | None, out: Path | None, seed: int | None, output: Output
     numbers = {key: number.value for key, number in truth.numbers.items()}
     numbers["V"] = truth.programme.level.velocity
     kinds = {**known_parameters(truth.law), **DRIVE}
-    rows = tuple((key, format_si(value, kinds[key].kind)) for key, value in numbers.items())
+    rows = tuple((symbol(key), format_si(value, kinds[key].kind)) for key, value in numbers.items())
     made = f"{target}: {len(trace)} samples of {', '.join(trace.channels)}"
     output.answer(
         lambda: {"file": str(target), "law": truth.law, "numbers": numbers},

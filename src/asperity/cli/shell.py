@@ -65,23 +65,6 @@ class Shell(click.Group):
         command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
         return command
 
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; its errors have the names that the user has chosen."""
-        try:
-            return super().invoke(ctx)
-        except InputError as error:
-            from asperity.cli.report import CHOSEN_NAMES
-
-            if ctx.meta.get(CHOSEN_NAMES, "friction") == "friction":
-                raise
-            from asperity.laws import registered
-            from asperity.parameters.table import in_names
-
-            text = str(error)
-            for law in registered().values():
-                text = in_names(text, ctx.meta[CHOSEN_NAMES], law)
-            raise InputError(text) from None
-
     def main(
         self,
         args: Sequence[str] | None = None,

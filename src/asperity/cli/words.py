@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from asperity.errors import Argument, InputError, naming
+from asperity.errors import Argument, InputError, naming, symbol
 
 #: Fields of an operating point, and fields whose options take NAME=VALUE.
 POINT_OPTIONS: Mapping[str, str] = {"law": "--law", "material": "--material"}
@@ -71,11 +71,14 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
     known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
     option = known.get(name)
+    if option and option.startswith("--set "):
+        return number_option(option.removeprefix("--set "), has_options=False)
     if option is None:
         whole, _, part = name.partition(".")
         option = name
         if whole in _PAIRS and whole in options:
-            option, key = known[whole], part
+            option, name, key = known[whole], whole, part
+    key = symbol(key) if name in _PAIRS else key
     if name in _PAIRS and key and value:
         return f"{option} {quoted(f'{key}={value}', also='=')}"
     # A switch says yes or no by itself.
@@ -104,4 +107,4 @@ def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
         try:
             yield
         except InputError as error:
-            raise InputError(str(error)) from None
+            raise error.worded() from None

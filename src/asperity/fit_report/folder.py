@@ -6,9 +6,8 @@ A page is one file, with nothing to fetch.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
-from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from matplotlib.figure import Figure
 
 from asperity._version import __version__
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import InputError, naming, require, symbol
 from asperity.fit_report.bands import Series, bands_of
 from asperity.fit_report.pictures import data_figure, laws_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, LockInTable, Posterior
@@ -28,10 +27,11 @@ from asperity.inference.report import comparison_report, estimates, fit_report, 
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
+from asperity.laws.registry import symbols_of
 from asperity.materials import cited_works
-from asperity.outputs.tables import Section, as_html, html_page, html_table
+from asperity.outputs.tables import as_html, html_page, html_table
 from asperity.outputs.written import written_folder
-from asperity.parameters import NAMES, Names, in_names, law_parameters, point_parameters
+from asperity.parameters import NAMES, Names, law_parameters, point_parameters
 
 
 def document(title: str, kicker: str, heading: str, sections: Mapping[str, str]) -> str:
@@ -73,7 +73,8 @@ def write_report(
         Converged.
     posterior : Posterior, optional
     names : {"friction", "geophysics"}
-        Names of parameters on the page; files keep the names of friction.
+        Names of parameters on the page, but for warnings, which have those of the fit; files keep
+        the names of friction.
 
     Raises
     ------
@@ -82,7 +83,8 @@ def write_report(
     """
     rule = "have converged for a report"
     require(fit.converged, "fit", rule, f"'{fit.message}'", "correct that first")
-    with written_folder(folder, "report") as staging:
+    symbols = symbols_of(names, fit.objective.law)
+    with written_folder(folder, "report") as staging, naming(symbols=symbols):
         more = {"posterior": posterior.record()} if posterior else {}
         record = json.dumps({**fit_record(fit), **more}, indent=2)
         (staging / "fit.json").write_text(record + "\n", encoding="utf-8")
@@ -125,21 +127,15 @@ def material_text(fit: Fit) -> str:
 def page(fit: Fit, posterior: Posterior | None, names: Names) -> str:
     """The page as text, with embedded figures and without external resources."""
     name = fit.objective.terms[0].name
-    sampled = worded_html(posterior_sections(posterior), fit, names) if posterior else ""
+    sampled = as_html(posterior_sections(posterior)) if posterior else ""
     sections = {
-        "Fit": worded_html(fit_report(fit), fit, names),
+        "Fit": as_html(fit_report(fit)),
         **({"Posterior": sampled} if sampled else {}),
         "Data and fit": _figures(fit, posterior, names),
         "Data": data_tables(fit),
-        "Provenance": provenance(fit, names),
+        "Provenance": provenance(fit),
     }
     return document(f"Fit of {fit.law} to {name}", "A fit", f"{fit.law} fitted to {name}", sections)
-
-
-def worded_html(sections: Iterable[Section], fit: Fit, names: Names) -> str:
-    """Sections as HTML, in the names that the user has chosen."""
-    words = partial(in_names, names=names, law=fit.objective.law)
-    return as_html(section.worded(words) for section in sections)
 
 
 def _figures(fit: Fit, posterior: Posterior | None, names: Names) -> str:
@@ -193,11 +189,10 @@ def _recording(term: RunTerm) -> str:
     return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 
 
-def provenance(fit: Fit, names: Names) -> str:
+def provenance(fit: Fit) -> str:
     """Fixed parameters, date, version of the program, and source of the law."""
-    words = partial(in_names, names=names, law=fit.objective.law)
     fixed = [
-        (words(n), f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
+        (symbol(n), f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
         for n, v in fit.objective.fixed.items()
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
@@ -224,7 +219,8 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     comparison : Comparison
         With one converged fit at least.
     names : {"friction", "geophysics"}
-        Names of parameters on the page; files keep the names of friction.
+        Names of parameters on the page, but for warnings, which have those of the fit; files keep
+        the names of friction.
 
     Raises
     ------
@@ -234,7 +230,8 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
     rule = "have a converged fit for a report"
     require(fits, "comparison", rule, "none", f"{comparison.verdict}")
-    with written_folder(folder, "report") as staging:
+    symbols = symbols_of(names, *(fit.objective.law for fit in fits.values()))
+    with written_folder(folder, "report") as staging, naming(symbols=symbols):
         record = json.dumps(comparison_record(comparison), indent=2)
         page = comparison_page(comparison, fits, names)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
@@ -256,15 +253,14 @@ def comparison_page(comparison: Comparison, fits: Mapping[str, Fit], names: Name
     first = next(iter(fits.values()))
     data = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": worded_html(comparison_report(comparison, reasons=True), first, names),
+        "Verdict": as_html(comparison_report(comparison, reasons=True)),
         "Data and laws": _figures_of_laws(fits, names),
         "Estimates": "".join(
-            f"<h3>{escape(name)}</h3>{worded_html([estimates(fit)], fit, names)}"
-            for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{as_html([estimates(fit)])}" for name, fit in fits.items()
         ),
         "Data": data_tables(first),
         "Provenance": "".join(
-            f"<h3>{escape(name)}</h3>{provenance(fit, names)}" for name, fit in fits.items()
+            f"<h3>{escape(name)}</h3>{provenance(fit)}" for name, fit in fits.items()
         ),
     }
     return document(f"Laws compared on {data}", "A comparison", f"Laws on {data}", sections)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from asperity import materials
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.comparison.compare import Comparison, compare as compare_loaded
 from asperity.inference.cycles import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit as fit_loaded
@@ -211,8 +211,8 @@ def _stick_slip(
         return None
     if "K" in fixed and question.stiffness is None:
         raise InputError(
-            f"K must be in N/m for a fit of the cycles of {name}, got '{fixed['K']}'; multiply it "
-            f"by the load, as {Argument('fixed', 'K', '300 N/m')}, with "
+            f"{symbol('K')} must be in N/m for a fit of the cycles of {name}, got '{fixed['K']}'; "
+            f"multiply it by the load, as {Argument('fixed', 'K', '300 N/m')}, with "
             f"{Argument('fixed', 'W0', '0.3 N')}; of a force over the weight the load is that of "
             f"the mass, as {Argument('fixed', 'M', '30 g')}"
         )
@@ -259,11 +259,15 @@ def _prior_of_unloading(
     label = "stiffness_from"
     other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
     if other is not None:
-        raise InputError(label, "be the only number of K", f"{Argument(other)} K too", "drop one")
+        rule = f"be the only number of {symbol('K')}"
+        raise InputError(label, rule, f"{Argument(other, 'K')} too", "drop one")
     rule, advice = "go with one recording", "give one recording"
     require(len(question.data) == 1, label, rule, f"{len(question.data)} files", advice)
     require(not is_table(question.data[0]), label, rule, "a table", advice)
-    rule, advice = "be without a prior of gain", "give the prior of K from another source"
+    rule, advice = (
+        "be without a prior of gain",
+        f"give the prior of {symbol('K')} from another source",
+    )
     got = "both: the slope is measured by the same gauge, and scales with it"
     require(not any(name.partition("[")[0] == "gain" for name in priors), label, rule, got, advice)
     assert question.stiffness_from is not None  # by the caller

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.slider.named import slider_from
@@ -116,7 +116,7 @@ def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -
         ),
     ):
         if value is None:
-            rule = f"have {field} for a fit of its cycles"
+            rule = f"have {symbol(field)} for a fit of its cycles"
             raise InputError(name, rule, "none", f"give it, as {example}")
     regular = [r for r in measurement.regimes if r.kind == REGULAR]
     if not regular:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from asperity.errors import symbol, symbols
 from asperity.inference.comparison.compare import Comparison, laws_table
 from asperity.inference.fitting.result import (
     MISFIT,
@@ -31,14 +32,21 @@ def fit_report(fit: Fit) -> list[Section]:
         return [Section(f"{fit.law}: {fit.message}")]
     names = list(fit.parameters)
     correlations = tuple(
-        (n, *(f"{fit.correlation[i, j]:+.2f}" if j < i else "" for j in range(len(names) - 1)))
+        (
+            symbol(n),
+            *(f"{fit.correlation[i, j]:+.2f}" if j < i else "" for j in range(len(names) - 1)),
+        )
         for i, n in enumerate(names)
         if i
     )
     return [
         Section(fit.law, fit_in_words(fit)),
         estimates(fit),
-        *([Section("correlations", (), ("", *names[:-1]), correlations)] if correlations else []),
+        *(
+            [Section("correlations", (), ("", *map(symbol, names[:-1])), correlations)]
+            if correlations
+            else []
+        ),
         quality(fit),
         Section("", warnings=tuple(fit.warnings)),
     ]
@@ -51,7 +59,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     sentences = [f"These numbers are doubtful: {'; '.join(fit.doubts)}."] if fit.doubts else []
     difference = fit.rate_dependence
     if difference is not None:
-        sentences.append(f"A - B = {difference.shown}: {difference.meaning}")
+        sentences.append(f"{symbol('A - B')} = {difference.shown}: {difference.meaning}")
     if fit.level_change is not None:
         value, error, steps = fit.level_change
         which = "its step" if steps == 1 else f"its {steps} steps"
@@ -65,7 +73,7 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not fit.parts(HoldTerm):
         sentences.append(f"mu0 = {mu0[0]:.4g} at V0 = {quantity_text(V0[0], 'm/s')}")
     if fit.undetermined:
-        sentences.append(f"not determined by these data: {', '.join(fit.undetermined)}")
+        sentences.append(f"not determined by these data: {symbols(fit.undetermined)}")
     return tuple(sentences)
 
 
@@ -73,7 +81,7 @@ def estimates(fit: Fit) -> Section:
     """Estimates with standard errors and intervals, or "not determined"."""
     head = ("", "estimate", "std. error", "68 % interval", "95 % interval", "", "")
     rows = tuple(
-        _estimate_row(name, p, name.removesuffix("/W0") in fit.undetermined)
+        _estimate_row(symbol(name), p, name.removesuffix("/W0") in fit.undetermined)
         for name, p in {**fit.parameters, **fit.over_load}.items()
     )
     return Section("", (), head, rows)
@@ -157,11 +165,13 @@ def windows_sections(over: WindowedFit) -> list[Section]:
     rows: list[tuple[str, ...]] = []
     for name, p in over.parameters.items():
         if name in over.undetermined:
-            rows.append((name, NOT_DETERMINED, "", "", "", "", p.unit, "by these data"))
+            rows.append((symbol(name), NOT_DETERMINED, "", "", "", "", p.unit, "by these data"))
             continue
         shown = Shown.of(p.value, p.se, p.unit)
         errors = [shown.error(se) for se in (p.se, p.se_noise, p.se_window)]
-        rows.append((name, shown.value, *errors, shown.interval(p.interval_95), shown.unit, ""))
+        rows.append(
+            (symbol(name), shown.value, *errors, shown.interval(p.interval_95), shown.unit, "")
+        )
     title = f"over {len(over.windows)} windows ({spans} s)"
     return [Section(title, (), head, tuple(rows), over.new_warnings)]
 
@@ -174,7 +184,9 @@ def posterior_sections(posterior: Posterior) -> list[Section]:
     for name, p in posterior.parameters.items():
         shown = Shown.of(p.mean, p.sd, p.unit)
         numbers = (shown.value, shown.error(p.sd), shown.interval(p.interval_95), shown.unit)
-        rows.append((name, *numbers, f"{p.r_hat:.4f}", f"{p.ess_bulk:.0f}", f"{p.ess_tail:.0f}"))
+        rows.append(
+            (symbol(name), *numbers, f"{p.r_hat:.4f}", f"{p.ess_bulk:.0f}", f"{p.ess_tail:.0f}")
+        )
     diverging = int(posterior.diverging.sum())
     title = f"posterior, {chains} chains of {draws} draws, {diverging} diverging"
     return [Section(title, (), head, tuple(rows), tuple(posterior.warnings))]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, closest, require
+from asperity.errors import Argument, InputError, closest, require, symbol, symbols
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import Parameter, point_parameters
@@ -192,13 +192,21 @@ def require_fittable(law: type[Law], free: Sequence[str]) -> None:
     fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
     for name in free:
         if name in REFERENCES:
-            rule, got = "be parameters that data can determine", f"'{name}': a change of it is"
+            rule, got = (
+                "be parameters that data can determine",
+                f"'{symbol(name)}': a change of it is",
+            )
             raise InputError("free", rule, f"{got} one of mu0", "free mu0 instead")
         if name not in fittable:
-            rule, advice = f"be parameters of {law.name}", closest(name, fittable)
-            raise InputError("free", rule, f"'{name}'", advice)
+            rule, advice = (
+                f"be parameters of {law.name}",
+                closest(symbol(name), map(symbol, fittable)),
+            )
+            raise InputError("free", rule, f"'{symbol(name)}'", advice)
         if list(free).count(name) > 1:
-            raise InputError("free", "name each parameter once", f"'{name}' twice", "drop one")
+            raise InputError(
+                "free", "name each parameter once", f"'{symbol(name)}' twice", "drop one"
+            )
 
 
 def unknowns_of(
@@ -305,9 +313,9 @@ def require_free_names(
         # Names without a run stand for the parameter of each run.
         shared = {name.partition("[")[0] for name in known}
         for name in names:
-            rule = f"be of free parameters ({', '.join(known)})"
+            rule = f"be of free parameters ({symbols(known)})"
             advice = f"free it, correct the name, or leave the {label} out"
-            require(name in known or name in shared, label, rule, f"'{name}'", advice)
+            require(name in known or name in shared, label, rule, f"'{symbol(name)}'", advice)
 
 
 def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:
@@ -329,6 +337,6 @@ def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior
         if name in material and material[name].uncertainty:
             published = material[name]
             priors[name] = Prior(published.si, float(published.si_uncertainty or 0), material.name)
-    got, advice = f"'{material.name}', which has none for {', '.join(names)}", "leave the prior out"
+    got, advice = f"'{material.name}', which has none for {symbols(names)}", "leave the prior out"
     require(priors, "prior", "be a material with uncertainties of free parameters", got, advice)
     return priors

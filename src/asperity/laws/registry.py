@@ -23,9 +23,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypeGuard
 
-from asperity.errors import InputError, closest, code_of_others, require
+from asperity.errors import InputError, Symbols, closest, code_of_others, require
 from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
+from asperity.parameters import Names, display_name
 from asperity.parameters.arguments import shown, typed
 
 _LAWS: dict[str, type[Law]] = {}
@@ -77,6 +78,18 @@ def registered() -> dict[str, type[Law]]:
 
 
 @typed
+def symbols_of(names: Names, *laws: type[Law]) -> Symbols:
+    """Names of parameters in a set of names, for `asperity.errors.naming`.
+
+    Parameters
+    ----------
+    names : {"friction", "geophysics"}
+    *laws : type of Law
+        Laws that need not be registered.
+    """
+    return lambda name: display_name(name, names, *laws, *registered().values())
+
+
 def get_law(name: str) -> type[Law]:
     """Look a law up by name: one of the package, registered, or of an installed package.
 

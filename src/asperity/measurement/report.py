@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from asperity.errors import symbol
 from asperity.measurement.campaign import Row, modulated_rows, sliding_rows
 from asperity.measurement.record import modulated_record, sliding_record
 from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
@@ -72,27 +73,27 @@ def measured_sections(measurement: Any, name: str, names: Names = "friction") ->
 def _modulated(measurement: Measurement, name: str, names: Names) -> list[Section]:
     reading, unit = measurement.reading, measurement.samples.unit
     rows = [
-        _row(number, getattr(reading, number), reading.uncertainty(number), of, meaning)
+        _row(symbol(number), getattr(reading, number), reading.uncertainty(number), of, meaning)
         for number, of, meaning in (
             ("W0", unit, "mean load"),
-            ("epsilon", "", "amplitude of W/W0"),
+            ("epsilon", "", f"amplitude of W/{symbol('W0')}"),
             ("frequency", "Hz", f"period {_duration(1 / reading.frequency)}"),
             ("mean_force", unit, ""),
-            ("mean_friction", "", "mean of F/W0"),
+            ("mean_friction", "", f"mean of F/{symbol('W0')}"),
         )
     ]
     if names == "geophysics" and "Pa" not in unit:
         rows[0] = ("load", *rows[0][1:])
     if math.isfinite(measurement.delta_mu):
         change, doubt = measurement.delta_mu, measurement.delta_mu_uncertainty
-        meaning = "mean_friction - F(0)/W0 without modulation"
+        meaning = f"mean_friction - F(0)/{symbol('W0')} without modulation"
         rows.append(_row("delta_mu", change, doubt, "", meaning))
     for side, level in (("before", measurement.before), ("after", measurement.after)):
         if level is not None:
             rows.append(_row(f"F0_{side}", level.value, level.uncertainty, unit, "no modulation"))
     for n in range(1, reading.harmonics.size + 1):
         phasor = reading.phasor(n)
-        where = f"amplitude of F/W0 at {'' if n == 1 else n}f"
+        where = f"amplitude of F/{symbol('W0')} at {'' if n == 1 else n}f"
         rows.append(_row(f"mu{n}", phasor.amplitude, phasor.amplitude_uncertainty, "", where))
         rows.append(
             _row(f"phase{n}", phasor.phase, phasor.phase_uncertainty, "rad", "against the load")
@@ -184,7 +185,7 @@ def _stick_slip(measurement: StickSlipMeasurement, name: str) -> list[Section]:
     ]
     stiffness, doubt = measurement.stiffness_from_slope
     if math.isfinite(stiffness):
-        rows.append(_row("stiffness", stiffness, doubt, "N/m", "loading_slope W0/V"))
+        rows.append(_row("stiffness", stiffness, doubt, "N/m", f"loading_slope {symbol('W0/V')}"))
     smallest = f"{measurement.smallest_drop:.2g}"
     rows.append(("smallest_drop", smallest, "", "a smaller one may not have been seen"))
     columns = ("from (s)", "to (s)", "regime", "evidence")
@@ -196,18 +197,16 @@ def _stick_slip(measurement: StickSlipMeasurement, name: str) -> list[Section]:
     ]
 
 
-def healing_section(campaign: StickSlipCampaign, names: Names = "friction") -> Section:
+def healing_section(campaign: StickSlipCampaign) -> Section:
     """Healing of each machine of a campaign.
 
     Parameters
     ----------
     campaign : StickSlipCampaign
-    names : {"friction", "geophysics"}
     """
-    twice = "(B - A)" if names == "friction" else "(b - a)"
     title = (
-        f"drop per e-fold of stick time; about 2 {twice} of a rate-and-state law, far below the "
-        "critical stiffness"
+        f"drop per e-fold of stick time; about 2 ({symbol('B - A')}) of a rate-and-state law, far "
+        "below the critical stiffness"
     )
     return Section(title, rows=tuple((line.name, line.value) for line in campaign.summary()[1]))
 
@@ -247,7 +246,7 @@ def _steps(measurement: SlidingMeasurement) -> list[Section]:
         if math.isfinite(step.rate_dependence):
             slope, doubt = step.rate_dependence, step.rate_uncertainty
             meaning = f"d mu/d ln V; 95 %: +- {step.rate_interval_95:.2g}"
-            rows.append(_row("A - B", slope, doubt, "", meaning))
+            rows.append(_row(symbol("A - B"), slope, doubt, "", meaning))
             rows.append(("peak", f"{step.peak:.4g}", "", "beyond the level before"))
         if step.trend != "none":
             # Trends are over slip where both velocities are known, and over time otherwise.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -39,17 +39,6 @@ class Section(NamedTuple):
     def record(self) -> dict[str, Any]:
         """The section as JSON values."""
         return self._asdict()
-
-    def worded(self, words: Callable[[str], str]) -> Section:
-        """The section with every text in other words."""
-
-        def texts(row: Iterable[str]) -> tuple[str, ...]:
-            return tuple(words(text) for text in row)
-
-        rows = tuple(texts(row) for row in self.rows)
-        return Section(
-            words(self.title), texts(self.sentences), texts(self.head), rows, texts(self.warnings)
-        )
 
 
 def aligned(rows: Iterable[Row], indent: str = "") -> str:

@@ -25,7 +25,6 @@ from asperity.parameters.table import (
     all_parameters as all_parameters,
     canonical_name as canonical_name,
     display_name as display_name,
-    in_names as in_names,
     known_name as known_name,
     law_parameters as law_parameters,
     plain_name as plain_name,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, known_as, require
 from asperity.parameters.toml_file import file_content
 
 _DELIMITERS = (",", ";", "\t")
@@ -294,7 +294,7 @@ def readable(path: Path, label: str, what: str = "CSV") -> Iterator[None]:
         why = (getattr(error, "strerror", None) or "").lower() or "it is no text"
         if isinstance(error, csv.Error):
             why = f"{error}, check the quotation marks"
-        rule, got = f"be a {what} that can be read", f"'{path}': {why}"
+        rule, got = f"be a {what} that can be read", f"'{known_as(path)}': {why}"
         raise InputError(Argument(label), rule, got, "correct the path or the file") from None
 
 

@@ -19,7 +19,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from asperity.errors import Argument, InputError, closest, require
+from asperity.errors import Argument, InputError, closest, require, symbol
 from asperity.parameters.arguments import shown, typed
 from asperity.parameters.parameter import Names, Output, Parameter
 
@@ -166,7 +166,7 @@ def known_name(
     """
     canonical = canonical_name(name, known)
     if canonical is None:
-        raise InputError(label, "be a known name", shown(name), suggestion(name, known))
+        raise InputError(label, "be a known name", shown(symbol(name)), suggestion(name, known))
     return canonical
 
 
@@ -174,18 +174,13 @@ def known_name(
 def suggestion(name: str, known: Mapping[str, Parameter]) -> str:
     """``did you mean 'x'?``, or the names there are."""
     meant = [p.name for p in known.values() if name.lower() in p.meant]
-    return f"did you mean '{meant[0]}'?" if meant else closest(name, known)
+    return f"did you mean '{symbol(meant[0])}'?" if meant else closest(name, map(symbol, known))
 
 
 #: Decorations of a formula that a plain name goes without.
 _DECORATIONS = re.compile(r"\\bar|[\\{}]")
-#: Words of a sentence. What an option takes keeps its name, unless it is a parameter's, and "A"
-#: before a noun is the article.
-_WORDS = re.compile(
-    r"(?P<kept>--(?!fix|set|start|prior)[\w-]+ \S+"
-    r"|(?:^|(?<=[.:;] ))A(?= [a-z]{2})(?! (?:is|and|at|has|of|lies)\b))"
-    r"|(?<!\w)[A-Za-z]\w*"
-)
+#: Words of a name, and the run of a parameter, as of ``K[B]/W0``.
+_WORDS = re.compile(r"\[.*?\]|[A-Za-z]\w*")
 
 
 @typed
@@ -205,7 +200,7 @@ def symbol_of(parameter: Parameter, names: Names = "friction") -> str:
 
 
 @typed
-def display_name(name: str, names: Names = "friction", law: type | None = None) -> str:
+def display_name(name: str, names: Names = "friction", *laws: type) -> str:
     """A name, or a quotient or difference of names, as plain text in a set of names.
 
     Parameters
@@ -213,31 +208,19 @@ def display_name(name: str, names: Names = "friction", law: type | None = None) 
     name : str
         As ``D0``, ``K/W0`` or ``A - B``; words that are no parameter stay as they are.
     names : {"friction", "geophysics"}
-    law : type of Law, optional
+    *laws : type of Law
         Whose parameters have names too, in addition to those that several laws share.
     """
     if names == "friction":
         return name
-    known = plain_names(law)
-    return re.sub(r"[A-Za-z]\w*", lambda word: known.get(plain_name(word[0]), word[0]), name)
-
-
-@typed
-def in_names(text: str, names: Names = "friction", law: type | None = None) -> str:
-    """A sentence with the names of parameters in it written in a set of names."""
-    if names == "friction":
-        return text
-    known = plain_names(law)
-
-    def renamed(word: re.Match[str]) -> str:
-        return word[0] if word["kept"] else known.get(word[0], word[0])
-
-    return _WORDS.sub(renamed, text)
+    known = plain_names(*laws)
+    return _WORDS.sub(lambda word: known.get(plain_name(word[0]), word[0]), name)
 
 
 def parameter_named(name: str, law: Any = None) -> str:
     """The name of the parameter that geophysics calls so: D0 for ``D_c`` or ``Dc``."""
-    known = {_folded(usual): parameter for parameter, usual in plain_names(law).items()}
+    laws = () if law is None else (law,)
+    known = {_folded(usual): parameter for parameter, usual in plain_names(*laws).items()}
     return known.get(_folded(name), name)
 
 
@@ -261,9 +244,9 @@ def in_symbols(text: str) -> str:
 
 
 @cache
-def plain_names(law: Any) -> dict[str, str]:
+def plain_names(*laws: Any) -> dict[str, str]:
     """Plain names of geophysics by the names of the parameters, where they differ."""
-    parameters = {**INTERFACE, **EXPERIMENT, **(law_parameters(law) if law is not None else {})}
+    parameters = {**INTERFACE, **all_parameters(laws)}
     return {
         name: _DECORATIONS.sub("", symbol_of(parameter, "geophysics"))
         for name, parameter in parameters.items()

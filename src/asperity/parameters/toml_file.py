@@ -48,6 +48,18 @@ _LONG_KEY = re.compile(
 )
 
 
+class SyntaxMistakeError(InputError):
+    """A text that is not TOML.
+
+    Attributes
+    ----------
+    line : int
+        Of the mistake, counted from 1.
+    """
+
+    line = 0
+
+
 def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[str, Any]]:
     """Path and content of a TOML file.
 
@@ -104,8 +116,11 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what = printable(" ".join(str(error).split()))
-        rule = "be valid TOML"
-        raise InputError(label, rule, f"{source} ({what})", "correct that line") from None
+        got, advice = f"{source} ({what})", "correct that line"
+        mistake = SyntaxMistakeError(label, "be valid TOML", got, advice)
+        line = re.search(r"at line (\d+)", what)  # otherwise it is at the end
+        mistake.line = int(line[1]) if line else text.count("\n") + 1
+        raise mistake from None
     except RecursionError:
         raise deep from None
     except ValueError:

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from asperity.errors import symbol
 from asperity.parameters import DRIVE, MACHINE
 from asperity.questions.fit import Fit
 from asperity.questions.record import Record
@@ -125,6 +126,7 @@ def number_option(
     if has_options and parameter is not None and parameter.options:
         value = "" if parameter.rule == "switch" else value
         return f"{parameter.options[0]} {quoted(value) if value else ''}".rstrip()
+    name = symbol(name)
     return f"{pairs} {quoted(f'{name}={value}', also='=') if value else name}"
 
 

@@ -74,4 +74,4 @@ def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:
         Findings of the reader.
     """
     causes = [f.sentence.rstrip(".") for f in findings if f.name in _COLUMNS]
-    return InputError(f"{error} ({'; '.join(causes)})") if causes else error
+    return error.noting(f" ({'; '.join(causes)})") if causes else error

@@ -153,7 +153,7 @@ def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        mistakes.append(str(error))
+        mistakes.append(error)
 
 
 def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:

@@ -9,7 +9,6 @@ import shlex
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,7 +17,7 @@ import numpy as np
 from pydantic import Field, StrictBool
 
 from asperity.app.api.catalogue import package_material
-from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
+from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
@@ -26,7 +25,7 @@ from asperity.app.words import in_labels
 from asperity.arrays import Float
 from asperity.errors import naming, require
 from asperity.outputs.tables import Section
-from asperity.parameters import Names, in_names
+from asperity.parameters import Names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
 from asperity.questions.record import Span, Times, Whole
@@ -135,34 +134,42 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     and ``runs`` are those of the fit or of the best law. If requested, there are ``posterior``, and
     ``report``, the folder as a ZIP file in base64.
     """
+    from asperity.laws.registry import symbols_of
+
+    question = Fitted(**argument["question"])
+    with naming(in_labels, symbols_of(question.names)):
+        return _fit(question, argument["files"], report)
+
+
+def _fit(
+    question: Fitted, files: Sequence[Mapping[str, str]], report: Callable[..., None]
+) -> dict[str, Any]:
     from asperity.inference import sample_posterior
     from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.compare import comparison_record
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import comparison_report, fit_report, posterior_sections
-    from asperity.laws import get_law
     from asperity.questions import fit as questions
-
-    question = Fitted(**argument["question"])
-    files = argument["files"]
 
     def on_progress(done: int, total: int) -> None:
         report(share=done / total)
 
-    def described(sections: Iterable[Section], law: str = "") -> list[dict[str, Any]]:
-        words = partial(in_names, names=question.names, law=get_law(law) if law else None)
-        return [section.worded(words).record() for section in sections]
+    def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
+        return [section.record() for section in sections]
 
     report(share=0.0)
     options = {name: getattr(question, name) for name in FitOptions.model_fields}
     record: dict[str, Any]
-    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder, naming(in_labels):
-        options["data"] = _data(question, files, Path(folder))
+    with (
+        tempfile.TemporaryDirectory(prefix="asperity-page-") as folder,
+        naming(files=_names(data := _data(question, files, Path(folder)))),
+    ):
+        options["data"] = data
         if len(question.laws) == 1:
             one = questions.Fit(**{**options, "law": question.laws[0]})
             whole: Any = answer_fit(one, read=_read, progress=on_progress)
             best = whole
-            record = {"fit": fit_record(whole), "sections": described(fit_report(whole), best.law)}
+            record = {"fit": fit_record(whole), "sections": described(fit_report(whole))}
         else:
             several = questions.Comparison(**{**options, "laws": question.laws})
             whole = answer_comparison(several, read=_read, progress=on_progress)
@@ -171,9 +178,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
             record = {
                 "comparison": comparison_record(whole),
                 "sections": described(comparison_report(whole)),
-                "laws": {
-                    name: described(fit_report(j.fit), j.fit.law) for name, j in whole.laws.items()
-                },
+                "laws": {name: described(fit_report(j.fit)) for name, j in whole.laws.items()},
             }
     pictures: list[dict[str, Any]] = []
     posterior = None
@@ -187,7 +192,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
                 progress=lambda done, total: report(draws=done, of=total),
             )
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
-            record["sections"] += described(posterior_sections(posterior), best.law)
+            record["sections"] += described(posterior_sections(posterior))
         report(stage="figures")
         record["bands"] = _bands(best, posterior)
         record["residuals"] = _residuals(best)
@@ -221,9 +226,14 @@ def _data(
     return data
 
 
+def _names(data: Iterable[Mapping[str, Any]]) -> dict[Path, str]:
+    """Names of files as the user knows them, by the path on the server."""
+    return {Path(file["file"]): file["name"] for file in data}
+
+
 def _read(data: Any) -> Any:
     """A recording for a fit; files are read within the limits of all readers of the page."""
-    with named(data.file, data.name), limited(LIMITS):
+    with limited(LIMITS):
         return read_source(data.file, data.source)
 
 

@@ -16,7 +16,7 @@ from asperity.errors import InputError, closest, require
 from asperity.laws import registered
 from asperity.materials.record import packaged
 from asperity.outputs import size_text
-from asperity.parameters.toml_file import parsed_toml
+from asperity.parameters.toml_file import SyntaxMistakeError, parsed_toml
 from asperity.protocol import (
     Protocol,
     ProtocolError,
@@ -39,9 +39,8 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
     try:
         content = parsed_toml(text, "protocol")
     except InputError as error:
-        line = re.search(r"at line (\d+)", str(error))
-        last = text.count("\n") + 1 if "end of document" in str(error) else None
-        return None, [{"sentence": str(error), "line": int(line[1]) if line else last}]
+        line = error.line if isinstance(error, SyntaxMistakeError) else None
+        return None, [{"sentence": str(error), "line": line}]
     errors: Sequence[InputError] = list(_files_named(content))
     if not errors:
         try:

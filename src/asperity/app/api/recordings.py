@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +16,10 @@ import numpy as np
 from pydantic import field_validator
 
 from asperity.app.words import in_labels
-from asperity.errors import InputError, naming, printable
+from asperity.errors import InputError, naming
+from asperity.laws.registry import symbols_of
 from asperity.outputs.tables import Section
-from asperity.parameters import NAMES, OUTPUTS, Names, in_names
+from asperity.parameters import NAMES, OUTPUTS, Names
 from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
@@ -55,7 +54,8 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
     ``table`` for a lock-in table.
     """
     path, name = Path(argument["path"]), argument["name"]
-    with named(path, name):
+    symbols = symbols_of(argument.get("names", NAMES[0]))
+    with naming(in_labels, symbols, {path: name}):
         table = _table_in(path, name)
         if table is not None:
             return {"table": table}
@@ -63,17 +63,6 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
         trace = read_source(path, Source(**argument["source"]))
         report(recording=_described(trace, name))
         return _measured(trace, argument, report)
-
-
-@contextmanager
-def named(path: Path, name: str) -> Iterator[None]:
-    """Give errors the file name of the user in place of the name on the server."""
-    with naming(in_labels):
-        try:
-            yield
-        except InputError as error:
-            text = str(error).replace(str(path), name).replace(path.name, name)
-            raise InputError(printable(text, 900)) from None
 
 
 def _described(trace: Any, name: str) -> dict[str, Any]:
@@ -109,7 +98,7 @@ def _described(trace: Any, name: str) -> dict[str, Any]:
         "roles": roles | {r: n for r, n in guessed.items() if n is not None},
         "candidates": fitting,
         "findings": [asdict(f) for f in trace.findings[:_MOST_LISTED]],
-        "provenance": {**provenance, "file": name},
+        "provenance": provenance,
     }  # fmt: skip
 
 
@@ -129,8 +118,7 @@ def _measured(
     names: Names = argument.get("names", NAMES[0])
 
     def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
-        words = partial(in_names, names=names)
-        return [section.worded(words).record() for section in sections]
+        return [section.record() for section in sections]
 
     question = questions.Measurement(**argument["options"])
     name = argument["name"]

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, enumerated, require
+from asperity.errors import InputError, enumerated, require, symbol, symbols
 from asperity.inference.comparison.evidence import (
     DISFAVOURED,
     EXCLUDED,
@@ -213,7 +213,7 @@ def compare(
     nobodys = [p for p in free or () if p in of_any_law - of_these]
     if nobodys:
         rule = "be parameters of the laws that are compared"
-        got = f"'{nobodys[0]}', which none of {', '.join(dict.fromkeys(laws))} has"
+        got = f"'{symbol(nobodys[0])}', which none of {', '.join(dict.fromkeys(laws))} has"
         raise InputError("free", rule, got, "leave it out, or add a law with it")
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {
@@ -569,7 +569,7 @@ def what_would_tell(first: Fit, second: Fit) -> str:
             farthest, row = float(apart[j]), a.row[j]
             sentence = (
                 "what would tell them apart best among points near the measured ones: "
-                f"{a.observable[j]} at V = {points['V'][row]:.3g} m/s, "
+                f"{a.observable[j]} at {symbol('V')} = {points['V'][row]:.3g} m/s, "
                 f"eps = {points['epsilon'][row]:.3g}, f = {points['frequency'][row]:.4g} Hz, "
                 f"where they differ by {farthest:.2g} of its standard uncertainties"
             )
@@ -631,7 +631,7 @@ def laws_table(
         notes = [f"{word}: {number}" if name != comparison.best else "lowest AICc"]
         notes += [j.why] if reasons and j.excluded else []
         if f.undetermined:
-            notes.append(f"{', '.join(f.undetermined)} not determined")
+            notes.append(f"{symbols(f.undetermined)} not determined")
         rows.append(
             (
                 name,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.arrays import Float
-from asperity.errors import InputError
+from asperity.errors import InputError, symbol
 from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import (
     Candidates,
@@ -565,8 +565,8 @@ class _Task:
                 unknown.name in (self.plan.question.measure or errors)
             ):
                 warnings.append(
-                    f"{unknown.name} will not be determined by these readings: its standard error "
-                    f"will be {error.se:.3g} {error.unit}".rstrip()
+                    f"{symbol(unknown.name)} will not be determined by these readings: its "
+                    f"standard error will be {error.se:.3g} {error.unit}".rstrip()
                 )
         if shares.efficiency < _TRUSTED:
             warnings.append(
@@ -668,7 +668,7 @@ def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> li
         se, error = errors[name].se, simulation.uncertainty[name]
         if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
             warnings.append(
-                f"the simulated spread of {name}, {spread:.3g}, is not the expected standard error "
-                f"{se:.3g}: predictions are not linear in it over so wide a range"
+                f"the simulated spread of {symbol(name)}, {spread:.3g}, is not the expected "
+                f"standard error {se:.3g}: predictions are not linear in it over so wide a range"
             )
     return warnings

@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,11 +133,11 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
         # A law that is defined in a file is searched in the folder of the plan.
         if isinstance(place, str) and ".py:" in place:
             content[key] = str(file.parent / place)
-    with naming(in_files):
+    with naming(in_files, symbols=str):
         try:
             return plan_of(content, name=file.name, require_unit=True)
         except InputError as error:
-            raise InputError(f"{error} (in '{Path(path).name}')") from None
+            raise error.worded().noting(f" (in '{file.name}')") from None
 
 
 @typed

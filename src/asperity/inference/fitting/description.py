@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import Argument, enumerated
+from asperity.errors import Argument, enumerated, symbol
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -154,7 +154,7 @@ def described_fit(
         names = [objective.names[i] for i in sorted(profiled)]
         also = [n for n in names if n not in (*bent, *at_edge)]
         warnings.append(
-            f"chi-squared is no parabola in {enumerated(bent)}: "
+            f"chi-squared is no parabola in {enumerated([symbol(n) for n in bent])}: "
             + (
                 f"intervals of {enumerated([*bent, *also])} are by profile likelihood"
                 f"{' but for those named before' if at_edge else ''}; take the intervals, not the "
@@ -323,7 +323,7 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
             warnings.append(
-                f"the prior of {unknown.name}, {prior.mean:.4g} +- {prior.sd:.2g} "
+                f"the prior of {symbol(unknown.name)}, {prior.mean:.4g} +- {prior.sd:.2g} "
                 f"{unknown.parameter.unit}".rstrip()
                 + f", is contradicted by the data by {apart:.3g} standard deviations: one of them "
                 "is wrong, and the other parameters follow it; fit without it and compare"
@@ -484,11 +484,12 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
             warnings.append(
-                f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}"
+                f"{symbol(name)} is at its bound {quantity_text(estimate.value, estimate.unit)}"
             )
     for other in fit.optima:
         at = ", ".join(
-            f"{n} {quantity_text(other.values[n], p.unit)}" for n, p in fit.parameters.items()
+            f"{symbol(n)} {quantity_text(other.values[n], p.unit)}"
+            for n, p in fit.parameters.items()
         )
         warnings.append(
             f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "
@@ -546,15 +547,17 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     names = list(fit.parameters)
     i = names.index(name)
     partners = [
-        other for j, other in enumerate(names) if j != i and abs(fit.correlation[i, j]) > 0.98
+        symbol(other)
+        for j, other in enumerate(names)
+        if j != i and abs(fit.correlation[i, j]) > 0.98
     ]
     if partners:
         return (
-            f"{name} is not determined by these data together with {enumerated(partners)}: they "
-            "change the predictions in the same way; fix one of them, give a prior, or measure at "
-            "points that distinguish them"
+            f"{symbol(name)} is not determined by these data together with "
+            f"{enumerated(partners)}: they change the predictions in the same way; fix one of "
+            "them, give a prior, or measure at points that distinguish them"
         )
     return (
-        f"{name} is not determined by these data; fix it or give a prior: the intervals of the "
-        "other parameters hold only for values near the present one"
+        f"{symbol(name)} is not determined by these data; fix it or give a prior: the intervals "
+        "of the other parameters hold only for values near the present one"
     )

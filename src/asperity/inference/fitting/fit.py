@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.cycles import AveragedCycle, CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.estimated_noise import under_drift, with_noise
@@ -267,7 +267,9 @@ def _hold_objective(
     numbers = law_parameters(law)
     for name in free:
         holds, advice = name in numbers, "leave it out: the table has stiffness and velocity"
-        require(holds, "free", f"be parameters of {law.name} with holds", f"'{name}'", advice)
+        require(
+            holds, "free", f"be parameters of {law.name} with holds", f"'{symbol(name)}'", advice
+        )
     fixed = {n: v for n, v in given.fixed.items() if n not in ("V", "K", "W0")}
     constants = fixed_values(law, None, free, fixed, given.material, assumed=_OF_THE_LEVEL)
     begun, priors = start_values(law, free, given.start, given.material), given.priors(free)
@@ -304,7 +306,9 @@ def _cycle_objective(
     missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
     if missing:
         advice = f"name it in {Argument('free')}, or give it in {Argument('fixed')}"
-        raise InputError(f"{missing[0]}", "be free or fixed for a fit of cycles", "neither", advice)
+        raise InputError(
+            symbol(missing[0]), "be free or fixed for a fit of cycles", "neither", advice
+        )
     priors = given.priors(names)
     # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
     K = first.loading_slope * first.W0 / first.V

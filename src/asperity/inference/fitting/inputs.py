@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, MistakesError, require
+from asperity.errors import Argument, InputError, MistakesError, require, symbol, symbols
 from asperity.inference.cycles import AveragedCycle
 from asperity.inference.holds import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
@@ -141,11 +141,11 @@ def fixed_values(
     elsewhere |= {**(assumed or {}), **material_values(material, known)}
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
-        require(name not in free, name, "be free or fixed", "both", "leave one out")
+        require(name not in free, symbol(name), "be free or fixed", "both", "leave one out")
         rule, advice = "be parameters of a harmonic load", "leave it out: fits take no other load"
-        require(name not in MODULATION, "fixed", rule, f"'{name}'", advice)
+        require(name not in MODULATION, "fixed", rule, f"'{symbol(name)}'", advice)
         rule, advice = f"be parameters of {law.name}", "leave it out or choose another law"
-        require(name in known or name == "eps_ratio", "fixed", rule, f"'{name}'", advice)
+        require(name in known or name == "eps_ratio", "fixed", rule, f"'{symbol(name)}'", advice)
     result: dict[str, Any] = {}
     missing = []
     for name in known:
@@ -168,14 +168,17 @@ def fixed_values(
         raise UnfittableLawError(
             law.name,
             "have all its numbers",
-            f"none for {', '.join(missing)}",
+            f"none for {symbols(missing)}",
             f"use {Argument('free')} or {Argument('fixed', missing[0])}, add columns, or name a "
             "material",
         )
     if over_load(given.get("K")) is not None:
         if "W0" not in result:
-            rule, got = "come with a fixed W0", f"'{given['K']}' and W0 free"
-            raise InputError("K over the load", rule, got, "give K as a stiffness, or fix W0")
+            K, W0 = symbol("K"), symbol("W0")
+            rule, got = f"come with a fixed {W0}", f"'{given['K']}' and {W0} free"
+            raise InputError(
+                f"{K} over the load", rule, got, f"give {K} as a stiffness, or fix {W0}"
+            )
         result["K"] = result["K"] * result["W0"]
     for name in (n for n in given if n in points):
         column, value = np.broadcast_arrays(points[name], result[name])
@@ -212,7 +215,7 @@ def require_some(law: type[Law], free: Sequence[str]) -> None:
     InputError
     """
     rule = f"name a parameter of {law.name}"
-    require(free, "free", rule, "none", "free one, such as A or eps_ratio")
+    require(free, "free", rule, "none", f"free one, such as {symbol('A')} or eps_ratio")
 
 
 def require_motion(
@@ -306,7 +309,7 @@ def require_enough(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
     needed = sum(1 for u in unknowns if u.prior is None)
     rule = "hold more data than free parameters"
     advice = f"free fewer with {Argument('free')}, or measure more"
-    got = f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})"
+    got = f"{count} for {len(unknowns)} ({symbols(u.name for u in unknowns)})"
     require(not count < max(needed + (needed > 1), 1), name, rule, got, advice)
 
 

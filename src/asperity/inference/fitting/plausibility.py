@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import require
+from asperity.errors import require, symbol
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.minima import minima_of
 from asperity.inference.fitting.result import Fit
@@ -46,7 +46,7 @@ def contradicted_stiffness(
     if not freed.converged or gain < _CONTRADICTED_AICC:
         return []
     moved = ", ".join(
-        f"{n} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
+        f"{symbol(n)} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
         if n in fit.values and n in freed.values
     )
@@ -60,15 +60,16 @@ def contradicted_stiffness(
             own.append(f"{found}, {K.value / fit.values['K']:.3g} times it")
         elif not low <= (fixed := stiffness_in(run, given)) <= high:
             said.append(
-                f"the fixed K of {fixed:.4g} {K.unit} is contradicted: {found}; AICc falls by "
-                f"{gain:.3g} with K free{moved}; leave K free, or give it a prior"
+                f"the fixed {symbol('K')} of {fixed:.4g} {K.unit} is contradicted: {found}; AICc "
+                f"falls by {gain:.3g} with {symbol('K')} free{moved}; "
+                f"leave {symbol('K')} free, or give it a prior"
             )
     if given is None:
         shared = fit.parameters["K"]
         said.append(
-            f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
-            f"{', '.join(own)}; AICc falls by {gain:.3g} with a K for each{moved}; leave K out of "
-            "the free parameters, so that each has its own"
+            f"the {symbol('K')} of {shared.value:.4g} {shared.unit} that the recordings share is "
+            f"contradicted: {', '.join(own)}; AICc falls by {gain:.3g} with a {symbol('K')} for "
+            f"each{moved}; leave {symbol('K')} out of the free parameters, so that each has its own"
         )
     return said
 
@@ -95,7 +96,7 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
         low, high = ranges[name]
         if not low <= value <= high:
             said.append(
-                f"{name} of {value:.3g} {unit}".rstrip()
+                f"{symbol(name)} of {value:.3g} {unit}".rstrip()
                 + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
                 "units and signs of displacement, force and load, and look at a picture of the "
                 "recording with the motion"
@@ -143,11 +144,12 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     low, high = estimate.interval_95
     if low <= K <= high:
         return ""
-    numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
+    law = [n for n in ("A", "B", "D0") if n in freed.values]
+    numbers = ", ".join(f"{symbol(n)} {freed.values[n]:.4g}" for n in law)
     return (
-        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
-        f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / K:.3g} "
-        f"times the given {K:.4g} N/m"
+        f"with {symbol('K')} free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a "
+        f"{symbol('K')} of {estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), "
+        f"{estimate.value / K:.3g} times the given {K:.4g} N/m"
         + (f", with {numbers}" if numbers else "")
         + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "
         "prior"

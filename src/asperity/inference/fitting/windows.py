@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, symbol
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import LEVELS, UNDETERMINED, Interval
 from asperity.inference.fitting.result import Fit
@@ -206,7 +206,7 @@ def disagreeing(
     for span, value in zip(spans, over.values, strict=True):
         if abs(float(unknown.to_coordinate(value)) - mean) > _FAR_OFF * total:
             result.append(
-                f"{_shown(span)}: {over.name} is {value:.4g} {over.unit}, far from the "
+                f"{_shown(span)}: {symbol(over.name)} is {value:.4g} {over.unit}, far from the "
                 "estimates of the other windows, and has a small weight; look at its fit first"
             )
     return result

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.arrays import Bool, Float
+from asperity.errors import symbol
 from asperity.inference.fitting.intervals import LEVELS, Interval
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
@@ -225,13 +226,13 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
     for name, p in marginals.items():
         if not p.r_hat <= _LARGEST_R_HAT:
             warnings.append(
-                f"chains disagree about {name} (R-hat {p.r_hat:.3f}); sample more draws, and look "
-                "for more than one maximum"
+                f"chains disagree about {symbol(name)} (R-hat {p.r_hat:.3f}); sample more draws, "
+                "and look for more than one maximum"
             )
         elif min(p.ess_bulk, p.ess_tail) < _EFFECTIVE_DRAWS * chains:
             warnings.append(
-                f"draws of {name} say as much as {p.ess_bulk:.0f} independent ones (in the tails "
-                f"{p.ess_tail:.0f}), which is too few; sample more"
+                f"draws of {symbol(name)} say as much as {p.ess_bulk:.0f} independent ones (in "
+                f"the tails {p.ess_tail:.0f}), which is too few; sample more"
             )
     failed, lost = int(stats.failed.sum()), int((stats.diverging & ~stats.failed).sum())
     if lost:

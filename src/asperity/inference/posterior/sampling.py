@@ -20,7 +20,7 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity._processes import available_cores, process_pool
 from asperity.arrays import Float
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, symbol
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
@@ -89,7 +89,13 @@ def sample_posterior(
     require_bayes()
     advice = "a posterior is sampled from its maximum on"
     require(fit.converged, "fit", "have converged", f"'{fit.message}'", advice)
-    require(fit.parameters, "posterior", "be of free parameters", "none", "free one, such as A")
+    require(
+        fit.parameters,
+        "posterior",
+        "be of free parameters",
+        "none",
+        f"free one, such as {symbol('A')}",
+    )
     require_sizes(chains, draws)
     whitened = Whitened.of(fit)
     density, data = whitened.compiled()

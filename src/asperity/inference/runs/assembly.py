@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, enumerated, require, symbol
 from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import STIFFNESS, RecordedRun
@@ -78,7 +78,7 @@ def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
 def _stiffness(value: Any, load_unit: str, W0: float, label: str) -> float:
     over = over_load(value, label) if load_unit else None
     parameter = replace(MACHINE["K"], kind=STIFFNESS[load_unit])
-    return float(parameter.check(value, label)) if over is None else over * W0
+    return float(parameter.check(value, symbol(label))) if over is None else over * W0
 
 
 def over_load(value: Any, label: str = "K") -> float | None:
@@ -121,7 +121,7 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
         holds = name not in free or any(run.cuts or run.load_varies for run in runs)
         rule = "be seen in a change of the velocity or of the load"
         advice = "add a recording with velocity steps or holds, or give the steps"
-        require(holds, name, rule, f"neither in {names}", advice)
+        require(holds, symbol(name), rule, f"neither in {names}", advice)
     for run in runs:
         needed = _SAMPLES_PER_PARAMETER * (len(free) + len(run.cuts) + 2)
         rule = f"have at least {needed} samples for {len(free)} free parameters"
@@ -251,9 +251,9 @@ def stiffness_of_table(
     """
     loads, text, prior = np.unique(W0), start.get("K"), priors.get("K")
     if over_load(text) is not None or (prior is not None and prior.unit == "1/m"):
-        rule, got = "come with one fixed W0", "several or none"
+        rule, got = f"come with one fixed {symbol('W0')}", "several or none"
         one = loads.size == 1 and bool(np.isfinite(loads[0]))
-        require(one, "K over the load", rule, got, "give K in N/m")
+        require(one, f"{symbol('K')} over the load", rule, got, f"give {symbol('K')} in N/m")
     load = float(loads[0])
     of_start = {} if text is None else {"K": _stiffness(text, "N", load, "start.K")}
     in_newtons = _prior_in(prior, "N/m", load, "a table")
@@ -273,8 +273,8 @@ def shared_stiffness(
     """
     units = list(dict.fromkeys(run.load_unit or "none" for run in runs))
     rule = "be one for all runs if it is named"
-    advice = "leave K out of the free parameters: each run then has its own"
-    require(len(units) <= 1, "K", rule, f"loads in {' and '.join(units)}", advice)
+    advice = f"leave {symbol('K')} out of the free parameters: each run then has its own"
+    require(len(units) <= 1, symbol("K"), rule, f"loads in {' and '.join(units)}", advice)
     return free_stiffness(runs[0], "K", start, priors)
 
 
@@ -288,9 +288,11 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
     """
     for run in runs:
         if run.load_unit != "N":
+            K = symbol("K")
             raise InputError(
-                f"K must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
-                "leave K out of the free and the fixed parameters, and give the table a column of K"
+                f"{K} must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
+                f"leave {K} out of the free and the fixed parameters, and give the table a column "
+                "of K"
             )
 
 
@@ -360,7 +362,8 @@ def require_calibrated(
     several = len(runs) > 1 or beside_table
     for name in free:
         holds = name.partition("[")[0] != GAIN or name in given or GAIN in given
-        got = "none: A, B, mu0 and K scale with it, so that a recording cannot tell it"
+        scaled = enumerated([symbol(n) for n in ("A", "B", "mu0", "K")])
+        got = f"none: {scaled} scale with it, so that a recording cannot tell it"
         advice = (
             f"give one by a calibration of the gauge, like {Argument('prior', name, '1+-0.02')}"
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
+from asperity.errors import symbol
 from asperity.measurement.stick_slip.healing import StickSlipHealing, of_campaign
 from asperity.measurement.stick_slip.regimes import REPEATED
 from asperity.parameters.parameter import Drawn, SummaryLine
@@ -41,8 +42,10 @@ class StickSlipSeries:
     def name(self) -> str:
         """The machine in words."""
         known = (("K", self.K, "stiffness"), ("W0", self.W0, "force"))
-        parts = [f"{name} = {format_si(v, kind, 4)}" for name, v, kind in known if np.isfinite(v)]
-        return ", ".join(parts) or "K and W0 not known"
+        parts = [
+            f"{symbol(name)} = {format_si(v, kind, 4)}" for name, v, kind in known if np.isfinite(v)
+        ]
+        return ", ".join(parts) or f"{symbol('K')} and {symbol('W0')} not known"
 
     def column(self, name: str) -> Float:
         """Numbers of the rows; NaN where they are not known."""
@@ -83,16 +86,18 @@ class StickSlipSeries:
         if healing.reason:
             return none, healing.reason
         condition = (
-            "where the law alone damps slips (B - A is up to twice as large where the machine "
-            "stops them), K is below half of the critical stiffness and "
+            f"where the law alone damps slips ({symbol('B - A')} is up to twice as large where the "
+            f"machine stops them), {symbol('K')} is below half of the critical stiffness and "
         )
         energy = self.mass(np.nan) * float(np.nanmax(self.column("V"), initial=-np.inf)) ** 2
         if not np.isfinite(energy * self.W0):
-            return healing.b_minus_a, f"{condition}M V^2 < A D0 W0: M is not known"
+            return healing.b_minus_a, f"{condition}{symbol('M V^2 < A D0 W0')}: M is not known"
         least = 2 * self.K * energy / (healing.b_minus_a[1] * self.W0**2)
         if least > np.nanmax(self.column("force_before"), initial=0.0):
-            return none, f"inertia counts: M V^2 < A D0 W0 would need A above {least:.2g}"
-        return healing.b_minus_a, f"{condition}A D0 above {energy / self.W0:.2g} m (M V^2/W0)"
+            slow = symbol("M V^2 < A D0 W0")
+            return none, f"inertia counts: {slow} would need {symbol('A')} above {least:.2g}"
+        length = f"{energy / self.W0:.2g} m ({symbol('M V^2/W0')})"
+        return healing.b_minus_a, f"{condition}{symbol('A D0')} above {length}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -163,7 +168,7 @@ class StickSlipCampaign(Drawn):
                 (low, high), condition = one.b_minus_a(healing)
                 value = f"{low:.2g} to {high:.2g} (95 %), {condition}"
                 value = f"cannot tell: {condition}" if np.isnan(low) else value
-                lines.append(SummaryLine("B - A", value))
+                lines.append(SummaryLine(symbol("B - A"), value))
         return f"StickSlipCampaign, {count} recordings", lines
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from asperity.arrays import Float
+from asperity.errors import symbol
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import other_line
@@ -62,8 +63,8 @@ def load_harmonics(reading: LockInReading) -> Check:
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
     number = effect / max(response.amplitude, 1e-300)
     text = (
-        f"the load's second harmonic is {share:.3g} W0; with the ratio mu1/epsilon of the first "
-        f"harmonic it makes {effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
+        f"the load's second harmonic is {share:.3g} {symbol('W0')}; with the ratio mu1/epsilon of "
+        f"the first harmonic it makes {effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once"
     )
     present = share > 4 * second.amplitude_uncertainty
@@ -236,8 +237,8 @@ def _times(number: float) -> str:
 def contact(reading: LockInReading) -> Check:
     """Whether the load stays above zero."""
     text = (
-        f"the load falls to {1 - reading.epsilon:.3g} W0 in each period; below zero contact is "
-        "lost, or the load's zero or sign is not that of the recording"
+        f"the load falls to {1 - reading.epsilon:.3g} {symbol('W0')} in each period; below zero "
+        "contact is lost, or the load's zero or sign is not that of the recording"
     )
     return LOCK_IN.check("contact", reading.epsilon, text)
 
@@ -245,7 +246,9 @@ def contact(reading: LockInReading) -> Check:
 def friction(number: float) -> Check:
     """Whether a mean of F/W0 is a friction coefficient of contacts."""
     low, high = _LOW_FRICTION[0], _HIGH_FRICTION[0]
-    sentence = f"the mean of F/W0 is {number:.4g}, where contacts have {low:g} to {high:g}"
+    sentence = (
+        f"the mean of F/{symbol('W0')} is {number:.4g}, where contacts have {low:g} to {high:g}"
+    )
     if number < 0:
         sentence += (
             "; load and force have opposite signs, which turns every phase by pi: a unit such as "

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float
+from asperity.errors import symbol
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check
@@ -168,8 +169,9 @@ def lines_in_the_pauses(
             seen = line > _SEEN * doubt and line > harmonic.amplitude_uncertainty * abs(reading.W0)
             if largest is None or (seen, number) > (largest[2], largest[0]):
                 sentence = (
-                    f"without modulation the force has a line of {number:.2g} mu{n} W0 at {f:.6g} "
-                    "Hz: mains, cross-talk or the drive, which is part of what is read"
+                    f"without modulation the force has a line of {number:.2g} mu{n} "
+                    f"{symbol('W0')} at {f:.6g} Hz: mains, cross-talk or the drive, "
+                    "which is part of what is read"
                 )
                 largest = number, sentence, seen
     if largest is None:
@@ -198,8 +200,8 @@ def hum(reading: LockInReading, time: Float, force: Float) -> Check:
             if line > _SEEN * doubt and share > number:
                 number, seen = share, True
                 sentence = (
-                    f"hum at {m * base:g} Hz is {share:.2g} of mu{n} W0; mains have harmonics, and "
-                    f"{n * f:.6g} Hz is one of them: mu{n} may hold hum"
+                    f"hum at {m * base:g} Hz is {share:.2g} of mu{n} {symbol('W0')}; mains have "
+                    f"harmonics, and {n * f:.6g} Hz is one of them: mu{n} may hold hum"
                 )
     return LOCK_IN.check("hum", number, sentence, significant=seen)
 

@@ -8,7 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from asperity.errors import Argument, InputError, closest, listed, printable
+from asperity.errors import Argument, InputError, closest, known_as, listed, printable
 from asperity.parameters.arguments import shown
 from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
@@ -99,7 +99,7 @@ def assemble(
                 text,
             )
     findings = _folded(findings + _unknown(channels))
-    provenance = {"file": path.name, **recorded.provenance, "time": clock.source}
+    provenance = {"file": known_as(path).name, **recorded.provenance, "time": clock.source}
     roles = {role: name for role, name in roles.items() if role != "time"}
     trace = Trace(clock.time, channels, (), provenance, roles)
     return Trace(clock.time, channels, (*findings, *check(trace)), provenance, roles)

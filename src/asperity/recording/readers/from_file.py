@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, closest, printable, require
+from asperity.errors import Argument, InputError, closest, known_as, require
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive, stress_to_force
@@ -107,7 +107,7 @@ def format_of(path: Path) -> str:
         if reader_named(name).is_format(path):
             return name
     rule = "be CSV or other text, HDF5, MATLAB, TDMS or LOOK"
-    got = f"'{path.name}', which looks like none of them"
+    got = f"'{known_as(path).name}', which looks like none of them"
     advice = f"give {Argument('format', value='...')} if it is one of them"
     raise InputError("recording.path", rule, got, advice)
 
@@ -148,11 +148,13 @@ def raw_recording(
     except InputError:
         raise
     except MemoryError:
-        got = f"'{path.name}', which holds more"
+        got = f"'{known_as(path).name}', which holds more"
         raise InputError("recording.path", "fit into memory", got, "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
-        rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {error}"
+        # The text of an OSError has the path, which the user may know by another name.
+        text = getattr(error, "strerror", None) or error
+        rule, why = f"be a whole file of format '{name}'", f"{type(error).__name__}: {text}"
         why = f"which may be cut or damaged: its reader could not read it ({why})"
         raise refuse_truncated(path, why, rule) from None
     if not isinstance(recorded, RawRecording):
@@ -162,8 +164,8 @@ def raw_recording(
     return recorded
 
 
-#: Largest length of a message.
-_LONGEST = 1200
+#: Largest length of a part of a message, which may quote the file.
+_LONGEST = 400
 
 
 @typed
@@ -285,8 +287,11 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
 
 
 def _with_content(file: Path) -> Path:
-    require(file.is_file(), "recording.path", "be a file", f"'{file}'", "check the name")
-    got, advice = f"'{file.name}', which is empty", "copy it again from where it was recorded"
+    require(file.is_file(), "recording.path", "be a file", f"'{known_as(file)}'", "check the name")
+    got, advice = (
+        f"'{known_as(file).name}', which is empty",
+        "copy it again from where it was recorded",
+    )
     require(file.stat().st_size != 0, "recording.path", "hold data", got, advice)
     return file
 
@@ -299,11 +304,7 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
         try:
             yield caught
         except InputError as error:
-            shortened = printable(str(error), _LONGEST)
-            # An error that needs no shortening keeps its parts.
-            if shortened == str(error):
-                raise
-            raise type(error)(shortened) from None
+            raise error.shortened(_LONGEST) from None
 
 
 def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:

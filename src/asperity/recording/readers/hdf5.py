@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, known_as
 from asperity.recording.readers.raw import (
     RawColumn,
     RawRecording,
@@ -84,7 +84,7 @@ def _groups(file: Any, path: Path) -> dict[str, Any]:
 
 
 def _elsewhere(path: Path, name: str) -> InputError:
-    got = f"'{path.name}', whose '{name.strip('/')}' lies in another file"
+    got = f"'{known_as(path).name}', whose '{name.strip('/')}' lies in another file"
     return InputError("recording.path", "hold its data itself", got, "copy the data into one file")
 
 

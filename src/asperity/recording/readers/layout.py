@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
-from asperity.errors import Argument, InputError, require
+from asperity.errors import Argument, InputError, known_as, require
 from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
@@ -423,7 +423,7 @@ def layout_of(
     )
     if not sample or score < 0.5:
         named = [Argument(name, value="...") for name in ("delimiter", "decimal")]
-        got = f"'{path.name}' without one that is understood"
+        got = f"'{known_as(path).name}' without one that is understood"
         advice = f"give {named[0]} and {named[1]}, or another file"
         raise InputError("recording.path", "hold a table of numbers", got, advice)
     rows = [cells_of(text, separators[0]) for text in sample]

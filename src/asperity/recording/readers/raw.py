@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, closest, known_as, require
 from asperity.parameters.arguments import typed
 from asperity.recording.finding import Finding, with_cause
 
@@ -116,7 +116,7 @@ def truncated(number: float, where: str, sentence: str, sure: bool = True) -> Fi
 def refuse_truncated(path: Path, why: str, rule: str = "be a whole file") -> InputError:
     """The error for a file of which nothing can be used."""
     advice = "copy it again from where it was recorded"
-    return InputError("recording.path", rule, f"'{path.name}', {why}", advice)
+    return InputError("recording.path", rule, f"'{known_as(path).name}', {why}", advice)
 
 
 def plain(name: str) -> str:
@@ -262,7 +262,7 @@ def one_table(
             refused = InputError("read.group", "be a group with columns", f"'{chosen}'", advice)
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
-    rule, got = "hold columns of numbers", f"'{path.name}' with none"
+    rule, got = "hold columns of numbers", f"'{known_as(path).name}' with none"
     require(filled, "recording.path", rule, got, "give a recording")
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import InputError, known_as
 from asperity.recording.finding import Finding
 from asperity.recording.readers.raw import (
     RawColumn,
@@ -68,7 +68,7 @@ def library(name: str, rule: str, path: Path) -> Any:
         import nptdms
     except ImportError:
         advice = "install npTDMS, as 'pip install asperity[lab]' does"
-        raise InputError(name, rule, f"'{path.name}', which is TDMS", advice) from None
+        raise InputError(name, rule, f"'{known_as(path).name}', which is TDMS", advice) from None
     return nptdms
 
 
@@ -117,7 +117,10 @@ def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
         return 0.0, None
     if len(steps) > 1:
         listed = " and ".join(f"{s:g} s" for s in sorted(steps))
-        rule, got = "be chosen where channels differ in interval", f"{listed} in '{path.name}'"
+        rule, got = (
+            "be chosen where channels differ in interval",
+            f"{listed} in '{known_as(path).name}'",
+        )
         raise InputError("read.group", rule, got, "choose a group, or give rate= to override them")
     starts = [float(p.get("wf_start_offset", 0.0)) for p in properties if "wf_increment" in p]
     return starts[0], steps.pop()

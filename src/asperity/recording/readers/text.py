@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, known_as, require
 from asperity.recording.finding import Finding
 from asperity.recording.readers.layout import MISSING, Layout, cells_of, digits, layout_of, lines_of
 from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, truncated
@@ -61,10 +61,16 @@ def is_format(path: Path) -> bool:
     head = beginning(path)
     for mark, kind in _ARCHIVES.items():
         rule, advice = "be the recording itself", "unpack it, or save the sheet as CSV"
-        require(not head.startswith(mark), "recording.path", rule, f"'{path.name}', {kind}", advice)
+        require(
+            not head.startswith(mark),
+            "recording.path",
+            rule,
+            f"'{known_as(path).name}', {kind}",
+            advice,
+        )
     if kind := _document(head):
         # A table would be looked for in it at length.
-        rule, got = "hold a table of numbers", f"'{path.name}', which is {kind}"
+        rule, got = "hold a table of numbers", f"'{known_as(path).name}', which is {kind}"
         raise InputError("recording.path", rule, got, "save it as CSV, or add a reader for it")
     return head.startswith(_GZIP) or _is_text(head)
 
@@ -116,9 +122,12 @@ def _unpacked(path: Path) -> bytes:
     """Contents of a gzip file, which are to be a text of at most `LARGEST` bytes."""
     with gzip.open(path) as packed:
         text = packed.read(LARGEST + 1)
-    rule, got = f"unpack to at most {LARGEST // 1024**2} MB", f"'{path.name}', which goes on"
+    rule, got = (
+        f"unpack to at most {LARGEST // 1024**2} MB",
+        f"'{known_as(path).name}', which goes on",
+    )
     require(len(text) <= LARGEST, "recording.path", rule, got, "unpack it, and see what it holds")
-    rule, got = "hold a text if it is packed", f"'{path.name}' with something else"
+    rule, got = "hold a text if it is packed", f"'{known_as(path).name}' with something else"
     require(_is_text(text[: 1 << 12]), "recording.path", rule, got, "unpack it")
     return text
 
@@ -145,7 +154,7 @@ def _load(
     layout = _layout(file, start, size, path, delimiter, decimal)
     ending = _ending_of(file, size, layout)
     frame, findings = _parse(file, layout, ending.stop)
-    got = f"'{path.name}' with a heading only"
+    got = f"'{known_as(path).name}' with a heading only"
     require(len(frame), "recording.path", "hold rows of numbers", got, "give a recording")
     frame, left_out = _without_text_rows(frame, layout.width)
     findings += left_out

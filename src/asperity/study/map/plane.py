@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Float, between
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, symbol
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, require_influence, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
@@ -67,20 +67,28 @@ class Axis:
         object.__setattr__(self, "name", parameter.name)
         for end in ("low", "high"):
             value = getattr(self, end)
-            label = f"axis of {self.name}"
+            label = f"axis of {symbol(self.name)}"
             # An angle is also a text in degrees.
             si = number(parameter.check(value, label), label, parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
         if not self._ends[0] < self._ends[1]:
             rule = "go from a smaller to a larger value"
             got = f"{self.low:g} to {self.high:g}{_unit(parameter)}"
-            raise InputError(f"axis of {self.name}", rule, got, "write the smaller end first")
+            raise InputError(
+                f"axis of {symbol(self.name)}", rule, got, "write the smaller end first"
+            )
         rule, got = f"have 2 to {_MOST:,} points", shown(self.count)
-        require(2 <= self.count <= _MOST, f"axis of {self.name}", rule, got, "write another number")
+        require(
+            2 <= self.count <= _MOST,
+            f"axis of {symbol(self.name)}",
+            rule,
+            got,
+            "write another number",
+        )
         if self.log and not self._ends[0] > 0:
             rule, got = "start above zero to be logarithmic", f"{self.low:g}{_unit(parameter)}"
             advice = "raise its lower end or make it linear"
-            raise InputError(f"axis of {self.name}", rule, got, advice)
+            raise InputError(f"axis of {symbol(self.name)}", rule, got, advice)
 
     @classmethod
     @typed
@@ -94,12 +102,18 @@ class Axis:
         """
         match = _AXIS.fullmatch(text + " ")
         if match is None:
-            advice = "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
+            advice = f"write it like '{symbol('K')}=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
             raise InputError(label, "be NAME=LOW:HIGH:COUNT UNIT", f"'{text}'", advice)
         name, low, high, count, unit = (part.strip() for part in match.groups())
         parameter = _parameter(name)
-        advice = f"write it like '{name}={low}:{high}:{count} {parameter.unit}'"
-        require(not parameter.unit or unit, f"axis of {name}", "carry a unit", f"'{text}'", advice)
+        advice = f"write it like '{symbol(name)}={low}:{high}:{count} {parameter.unit}'"
+        require(
+            not parameter.unit or unit,
+            f"axis of {symbol(name)}",
+            "carry a unit",
+            f"'{text}'",
+            advice,
+        )
         return cls(name, f"{low} {unit}".strip(), f"{high} {unit}".strip(), int(count), log)
 
     @property
@@ -134,7 +148,7 @@ def _parameter(name: str) -> Parameter:
     name_in_table = canonical_name(str(name), known)
     if name_in_table is None:
         rule = "be a number of an operating point"
-        raise InputError("axis", rule, shown(name), suggestion(str(name), known))
+        raise InputError("axis", rule, shown(symbol(name)), suggestion(str(name), known))
     return known[name_in_table]
 
 

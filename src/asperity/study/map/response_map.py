@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, symbol
 from asperity.laws import get_law
 from asperity.operating_point import SourcedNumber, numbers_for, refuse_foreign, sourced_numbers
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
@@ -179,7 +179,9 @@ def _plane(
 ) -> tuple[MapPlane, dict[str, str]]:
     """The checked plane, and the origin of each fixed number."""
     rule = "be two numbers"
-    require(x.name != y.name, "axes", rule, f"'{x.name}' on both", "choose another one for y")
+    require(
+        x.name != y.name, "axes", rule, f"'{symbol(x.name)}' on both", "choose another one for y"
+    )
     refuse_foreign(law, {x.name: "", y.name: ""})
     known = point_parameters(get_law(law))
     known_numbers = sourced_numbers(numbers, None, law=law)
@@ -187,9 +189,9 @@ def _plane(
         if axis.kind != known[axis.name].kind:
             rule = f"be {KINDS[known[axis.name].kind].noun} for {law}"
             advice = "another registered law has a parameter of that name"
-            raise InputError(f"axis of {axis.name}", rule, KINDS[axis.kind].noun, advice)
+            raise InputError(f"axis of {symbol(axis.name)}", rule, KINDS[axis.kind].noun, advice)
         rule, got = "be given once", "an axis and a fixed value"
-        require(axis.name not in known_numbers, axis.name, rule, got, "leave one out")
+        require(axis.name not in known_numbers, symbol(axis.name), rule, got, "leave one out")
     known_numbers |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
     of_law = numbers_for(law, known_numbers)
     defaults = {
