@@ -267,13 +267,11 @@ def _peak(
         left = int(np.flatnonzero(low[:top]).max(initial=-1)) + 1
         right = top + int(np.argmax(np.append(low[top:], True)))
         if right - left >= _FEWEST:
-            tops.append(_top(time[again + left : again + right], values[left:right]))
+            tops.append(_top(time[again + left : again + right], values[left:right], quick))
     if not tops:
         near = values[max(top - wide // 2, 0) : top + wide // 2 + 1]
         return float(near.mean()), float(quick / np.sqrt(near.size)), np.inf, again + top
     heights, doubts, dofs, places = np.array(tops).T
-    # A top that looks quiet by chance.
-    doubts = np.maximum(doubts, quick / np.sqrt(values.size))
     weight = 1 / np.maximum(doubts, 1e-150) ** 2
     weight /= weight.sum()
     height = float(weight @ heights)
@@ -285,7 +283,7 @@ def _peak(
     return height, doubt, float(dofs.min()), min(max(at, again), again + values.size - 1)
 
 
-def _top(time: Float, friction: Float) -> tuple[float, float, float, float]:
+def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, float, float]:
     """Maximum of the polynomial through a top, its uncertainty with its dof, and its time."""
     middle, half = float(time[-1] + time[0]) / 2, float(time[-1] - time[0]) / 2
     at, means = (time - middle) / half, friction
@@ -295,7 +293,9 @@ def _top(time: Float, friction: Float) -> tuple[float, float, float, float]:
     points = np.linspace(at[0], at[-1], _POINTS)
     curves = columns(points, _DEGREE)
     k = int(np.argmax(curves @ fit.beta))
-    variance = fit.variance * float(curves[k] @ fit.inverse @ curves[k])
+    # The few slow waves of a residual may be weak by chance; many samples show the white noise.
+    noise = max(fit.variance, quick**2 * at.size / friction.size)
+    variance = noise * float(curves[k] @ fit.inverse @ curves[k])
     return (
         float(curves[k] @ fit.beta),
         float(np.sqrt(variance)),
