@@ -292,6 +292,18 @@ def test_the_uncertainty_of_the_reload_slope_includes_slip_on_the_rise(
     assert least < reading.reload_uncertainty / STIFFNESS < most
 
 
+@pytest.mark.parametrize("noise", [1e-3, 1e-4, 1e-5])
+def test_the_top_of_a_peak_is_no_parabola(pulled, sliding_trace, noise) -> None:
+    """Friction rises faster than it falls: a parabola through the top is 8e-5 too low."""
+    for seed in range(3):
+        time, slip, clean, friction, bounds = pulled(
+            (V, 0.0, V), (400e-6, 100.0, 400e-6), (100,) * 3, noise=noise, seed=seed
+        )
+        (hold,) = measure_sliding(sliding_trace(time, friction, slip)).holds
+        healing = clean[time > bounds[2]].max() - clean[time < bounds[1]][-1]
+        assert abs(hold.healing - healing) < hold.interval_95 < 7e-5 + 0.6 * noise
+
+
 def test_a_peak_hidden_in_noise_lies_within_its_interval(pulled, sliding_trace) -> None:
     time, slip, clean, friction, bounds = pulled(
         (V, 0.0, V), (8e-3, 3.0, 8e-3), (10,) * 3, noise=8e-3, resolution=2e-8

@@ -483,11 +483,15 @@ def test_a_stiffness_shared_with_readings_may_be_given_over_the_load(steps_fit):
     assert K.value == pytest.approx(1000.0 * coverage.STIFFNESS, rel=0.01)
 
 
-@pytest.mark.parametrize(("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7)])
+@pytest.mark.parametrize(
+    ("case", "stiffness", "seed"), [("steps", 3e5, 0), ("holds", 1e6, 7), ("holds", 3e5, 5)]
+)
 def test_a_stiff_machine_hides_its_stiffness_only(monkeypatch, case, stiffness, seed):
     """The spring relaxes within 0.03 and 0.01 um of slip; samples are 0.3 to 1 um apart.
 
     The second case has a minimum at which a change of the velocity is one sampling interval late.
+    In the third the jump of friction reaches a sample, which alone seems to say when the velocity
+    changes, and the estimates of A and B are 7 and 17 standard errors off if that counts.
     """
     monkeypatch.setattr(coverage, "STIFFNESS", stiffness)
     runs = runs_of(

@@ -9,6 +9,7 @@ from scipy.stats import norm, t
 
 from asperity.inference.runs.noise import (
     added_by_noise,
+    added_without,
     innovations,
     largest_departure,
     misfit_after_changes,
@@ -43,6 +44,28 @@ def test_predictable_noise_adds_finite_covariance(noise):
     added, variance = added_by_noise(model, curves, np.zeros((400, 0)), np.eye(1))
     assert np.isfinite(added).all()
     assert np.isfinite(variance).all()
+
+
+def test_the_covariance_without_a_sample_is_that_of_the_other_samples():
+    a, n = np.array([1.2, -0.5]), 300
+    s, covariance = np.arange(n) / n, toeplitz(autocovariances(a, n))
+    # The first parameter is known by sample 150 to a hundredth of what the others say.
+    X = np.stack([np.sin(9 * s), np.sin(9 * s) + s**2, np.ones(n)], axis=1)
+    X[150, 0] += 1e4
+
+    def of(kept):
+        information = X[kept].T @ np.linalg.solve(covariance[np.ix_(kept, kept)], X[kept])
+        return np.linalg.inv(information)[:2, :2]
+
+    everything = np.arange(n)
+    known = of(everything)
+    noise, stretches = [model_of(a).whitening], [(0, n)]
+    white = innovations(X, noise, stretches)
+    basis = np.linalg.qr(white[:, 2:])[0]
+    white = white[:, :2] - basis @ (basis.T @ white[:, :2])
+    added, alone = added_without([20, 150], white, known, noise, stretches, basis, 0.99)
+    assert alone == [150]
+    np.testing.assert_allclose(known + added, of(np.delete(everything, 150)), rtol=1e-4)
 
 
 def test_innovations_of_zeros_are_zero():

@@ -249,3 +249,40 @@ def added_by_noise(
     seen = np.einsum("aik,ab,bjk->ij", on_curves, covariance, on_curves, optimize=True)
     seen += np.einsum("cik,cjk->ij", on_nuisances, on_nuisances, optimize=True)
     return square - seen, variance + np.einsum("ki,ki->i", along, along)
+
+
+def added_without(
+    rows: Sequence[int],
+    white: Float,
+    covariance: Float,
+    noise: Sequence[Whitening],
+    stretches: Sequence[tuple[int, int]],
+    basis: Float,
+    least: float,
+) -> tuple[Float, list[int]]:
+    """Covariance added if some samples are unknown, and these samples.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Samples, each once.
+    white : array, shape (n, parameters)
+        Innovations of the derivatives of the signal, with linear nuisances projected out.
+    covariance : array, shape (parameters, parameters)
+        Of the parameters, by all data and priors.
+    noise, stretches, basis
+        As in `innovations`.
+    least : float
+        Samples are unknown from this leverage on: the share that a sample has in its own fitted
+        value.
+    """
+    impulses = innovations(np.eye(white.shape[0])[:, rows], noise, stretches, basis)
+    impulses /= np.sqrt(np.einsum("ij,ij->j", impulses, impulses))
+    along = impulses.T @ white
+    leverage = np.einsum("ki,ij,kj->k", along, covariance, along)
+    alone = np.flatnonzero(leverage > least)
+    along = np.linalg.qr(impulses[:, alone])[0].T @ white
+    # Woodbury: the information without the samples.
+    left, directions = np.linalg.eigh(np.eye(alone.size) - along @ covariance @ along.T)
+    root = covariance @ along.T @ (directions / np.sqrt(np.maximum(left, _EXPLAINED**2)))
+    return root @ root.T, [rows[int(k)] for k in alone]

@@ -26,6 +26,7 @@ from asperity.inference.runs.motion import (
 )
 from asperity.inference.runs.noise import (
     added_by_noise,
+    added_without,
     innovations,
     largest_departure,
     misfit_after_changes,
@@ -50,6 +51,10 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _CUT_INTERVALS = 2.0
 #: The law fails if such large innovations after changes have a lower probability.
 _LAW_FAILS = 1e-4
+#: A sample with a larger leverage says alone when a velocity changes. In 60 recordings of compliant
+#: machines no sample next to a change has more than 0.65; on stiff machines half of them have more
+#: than 0.9, and intervals that count those above 0.99 are too narrow.
+_ALONE = 0.99
 #: Largest number of spikes, or other samples, that a warning names.
 _NAMED = 5
 
@@ -127,6 +132,7 @@ class RunTerm(DataTerm):
         self._columns = _columns(run, linear)
         self._whiteness = math.nan
         self._after_changes = (1.0, 1.0)
+        self._alone: tuple[float, ...] = ()
         steps = [np.diff(run.friction[a:b]) for a, b in run.stretches]
         none = np.zeros(0)
         self.models = [Autoregression(none, max(float(np.mean(s**2)) / 2, 1e-300)) for s in steps]
@@ -309,18 +315,34 @@ class RunTerm(DataTerm):
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """As in `DataTerm`."""
+        """As in `DataTerm`, with the addition of samples that say alone when a velocity changes.
+
+        If the spring relaxes between two samples, friction jumps, and a delay ends where the jump
+        reaches a sample. Close to there the sample seems to determine the delay, as friction at
+        this sample is steep in it; on the other side it does not depend on the delay at all.
+        """
         raw = self.departures(values)
         assert raw is not None  # there is a motion at the estimate
         curves = raw[1] * slopes
-        share = np.linalg.solve(self._triangle, self.basis.T @ self._whitened(curves))
+        white = self._whitened(curves)
+        share = np.linalg.solve(self._triangle, self.basis.T @ white)
         curves = curves - self._columns @ share
         added, variance = np.zeros_like(covariance), np.zeros(slopes.size)
         for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
             more, spread = added_by_noise(model, curves[a:b], self.basis[a:b], covariance)
             added += more
             variance += spread
-        return added, variance
+        delays = [
+            k for k, name in enumerate(values) if self._own.get(name, "").startswith("shift_")
+        ]
+        rows = np.unique(np.argmax(np.abs(raw[1][:, delays]), axis=0)).tolist()
+        white -= self.basis @ (self.basis.T @ white)
+        noise = [m.whitening for m in self.models]
+        more, alone = added_without(
+            rows, white, covariance, noise, self.run.stretches, self.basis, _ALONE
+        )
+        self._alone = tuple(self.run.time[alone].tolist())
+        return added + more, variance
 
     def fitted_friction(self, values: Mapping[str, float]) -> Float:
         """Friction at the samples by the law with linear nuisances; NaN without a motion.
@@ -367,6 +389,12 @@ class RunTerm(DataTerm):
                 self._sentence_on(self.run.wrong, what, "is", "are")
                 + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
                 "if friction itself is so, the law or the drive is not that of the recording"
+            )
+        if self._alone:
+            said.append(
+                self._sentence_on(self._alone, "sample", "says", "say")
+                + " alone when the velocity of the drive changes there, because friction jumps "
+                "between two samples: the intervals are those without it; sample faster"
             )
         if self.run.jumps:
             times = ", ".join(f"{t:.6g}" for t in self.run.jumps)

@@ -17,6 +17,7 @@ from asperity.lock_in.rounding import rounding_variance
 from asperity.measurement.series import (
     bin_means,
     columns,
+    effective_dof,
     fit_trend,
     moving_mean,
     neighbour_scatter,
@@ -30,8 +31,15 @@ _RESTED = 6
 _HIDDEN = 5
 #: Friction between these shares of the rise on sliding again gives the stiffness.
 _RISE = (0.1, 0.5)
-#: The top of a peak: where smoothed friction is within this share of the peak's height.
-_TOP = 0.15
+#: The top of a peak: where smoothed friction is within one of these shares of the peak's height.
+_TOPS = (0.15, 0.3, 0.5)
+#: Degree of the polynomial through a top. A parabola through a top of 15 % is 0.2 % of the peak's
+#: height too low, one of this degree 0.01 %.
+_DEGREE = 4
+#: Fewest samples of a top, and the most that are fitted one by one and not in bins.
+_FEWEST, _MOST = 16, 400
+#: Points among which the maximum of the polynomial is taken.
+_POINTS = 201
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,7 @@ class HoldReading:
     healing, healing_uncertainty : float
         Peak less level.
     dof : float
-        Degrees of freedom of the uncertainties.
+        Degrees of freedom of the uncertainty of `healing`.
     interval_95 : float
         Half of the 95 % interval of `healing`.
     reload_slope, reload_uncertainty : float
@@ -158,9 +166,10 @@ def read_hold(
     ends = max(hold + 1, int(np.searchsorted(time, edges[1] - unsure)))
     low, low_doubt, falls = _rested(time[hold:ends] - edges[1], friction[hold:ends], quick)
     low_doubt = np.sqrt(low_doubt**2 + slow + rounding(friction[hold:ends][-_RESTED:]))
-    peak, peak_doubt, at = _peak(time, friction, again, stop, level, quick)
+    peak, peak_doubt, dof, at = _peak(time, friction, again, stop, level, quick)
     peak_doubt = float(np.sqrt(peak_doubt**2 + slow + rounding(np.array([peak]))))
-    half = float(stdtrit(fit.dof, 0.975))
+    dof = effective_dof([(doubt, fit.dof), (peak_doubt, dof)])
+    half = float(stdtrit(dof, 0.975))
     healing_doubt = float(np.hypot(doubt, peak_doubt))
     creep = -falls / abs(velocity) if velocity else np.nan
     slope, slope_doubt = _reload(friction, displacement, again, at, low, peak, creep)
@@ -177,7 +186,7 @@ def read_hold(
         peak_time=float(time[at]),
         healing=peak - level,
         healing_uncertainty=healing_doubt,
-        dof=float(fit.dof),
+        dof=dof,
         interval_95=half * healing_doubt,
         reload_slope=slope,
         reload_uncertainty=slope_doubt,
@@ -230,11 +239,13 @@ def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
 
 def _peak(
     time: Float, friction: Float, again: int, stop: int, level: float, quick: float
-) -> tuple[float, float, int]:
-    """Top of the peak after a hold, its uncertainty, and its sample.
+) -> tuple[float, float, float, int]:
+    """Top of the peak after a hold, its uncertainty with degrees of freedom, and its sample.
 
-    The largest of many noisy samples is too high: a parabola is fitted to the samples about the
-    top of smoothed friction instead.
+    The largest of many noisy samples is too high: polynomials are fitted to the samples about the
+    top of smoothed friction instead. Samples of a narrow top are chosen by their noise, and a wide
+    top is no polynomial: tops of several widths are read, and their spread is a part of the
+    uncertainty.
     """
     values = friction[again:stop]
     # The peak is over within half of the sliding.
@@ -250,40 +261,46 @@ def _peak(
     height = max(
         float(smooth[top]) - max(level, float(values[0])), 3 * quick / np.sqrt(wide), 0.2 * rise
     )
-    edge = float(smooth[top]) - max(_TOP * height, 2 * quick / np.sqrt(wide))
-    left, right = top, top
-    while left > 0 and smooth[left - 1] > edge:
-        left -= 1
-    while right < values.size - 1 and smooth[right + 1] > edge:
-        right += 1
-    at = time[again + left : again + right + 1]
-    tops = values[left : right + 1]
-    if tops.size < 6:
+    tops = []
+    for share in _TOPS:
+        low = smooth <= float(smooth[top]) - max(share * height, 2 * quick / np.sqrt(wide))
+        left = int(np.flatnonzero(low[:top]).max(initial=-1)) + 1
+        right = top + int(np.argmax(np.append(low[top:], True)))
+        if right - left >= _FEWEST:
+            tops.append(_top(time[again + left : again + right], values[left:right], quick))
+    if not tops:
         near = values[max(top - wide // 2, 0) : top + wide // 2 + 1]
-        return float(near.mean()), float(quick / np.sqrt(near.size)), again + top
-    scale = max(float(at[-1] - at[0]) / 2, 1e-300)
-    u = (at - at.mean()) / scale
-    matrix = np.stack([np.ones_like(u), u, u**2], axis=1)
-    beta, *_ = np.linalg.lstsq(matrix, tops)
-    residual = tops - matrix @ beta
-    where = (
-        float(np.clip(-beta[1] / (2 * beta[2]), -1, 1))
-        if beta[2] < 0
-        else float(u[np.argmax(tops)])
-    )
-    row = np.array([1.0, where, where**2])
-    inverse = np.linalg.pinv(matrix.T @ matrix, hermitian=True)
-    spread = float(np.sum(residual**2)) / max(tops.size - 3, 1)
-    # Noise that neighbours have in common does not average out.
-    doubt = float(np.sqrt(spread * (row @ inverse @ row) * _inflation(residual)))
-    height = float(row @ beta)
+        return float(near.mean()), float(quick / np.sqrt(near.size)), np.inf, again + top
+    heights, doubts, dofs, places = np.array(tops).T
+    weight = 1 / np.maximum(doubts, 1e-150) ** 2
+    weight /= weight.sum()
+    height = float(weight @ heights)
+    doubt = float(np.hypot(weight @ doubts, np.sqrt(weight @ (heights - height) ** 2)))
     if not seen:
         # A short peak may be hidden by the noise of as few samples.
         doubt = float(np.hypot(doubt, (float(_smoothed(values, _HIDDEN).max()) - height) / 2))
+    at = int(np.searchsorted(time, weight @ places))
+    return height, doubt, float(dofs.min()), min(max(at, again), again + values.size - 1)
+
+
+def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, float, float]:
+    """Maximum of the polynomial through a top, its uncertainty with its dof, and its time."""
+    middle, half = float(time[-1] + time[0]) / 2, float(time[-1] - time[0]) / 2
+    at, means = (time - middle) / half, friction
+    if at.size > _MOST:
+        at, means = bin_means(at, means)
+    fit = fit_trend(columns(at, _DEGREE), means)
+    points = np.linspace(at[0], at[-1], _POINTS)
+    curves = columns(points, _DEGREE)
+    k = int(np.argmax(curves @ fit.beta))
+    # The few slow waves of a residual may be weak by chance; many samples show the white noise.
+    noise = max(fit.variance, quick**2 * at.size / friction.size)
+    variance = noise * float(curves[k] @ fit.inverse @ curves[k])
     return (
-        height,
-        doubt,
-        again + int(np.clip(left + round((where + 1) / 2 * (right - left)), 0, values.size - 1)),
+        float(curves[k] @ fit.beta),
+        float(np.sqrt(variance)),
+        float(fit.dof),
+        middle + half * float(points[k]),
     )
 
 

@@ -14,6 +14,7 @@ from asperity.lock_in.demodulation import DRIFTS
 from asperity.measurement.samples import about_channels
 from asperity.measurement.series import (
     MeanLevel,
+    Rate,
     block_means,
     mean_level,
     moving_mean,
@@ -248,6 +249,10 @@ def _steps(
     """Steps between two sliding segments, and sentences on steps that cannot be read."""
     steps: list[VelocityStep] = []
     unread: list[str] = []
+    # Velocities of the user are exact.
+    exact = [Rate(velocity, 0.0, np.inf) for velocity in cut.velocities]
+    pairs = zip(cut.rates or exact, cut.velocities, strict=True)
+    rates = [rate._replace(value=velocity) for rate, velocity in pairs]
     # The first segment may begin with the loading.
     first = segments[0]
     speed = abs(first.velocity) if np.isfinite(first.velocity) and first.velocity else 1.0
@@ -264,7 +269,7 @@ def _steps(
             settling = np.inf
             continue
         sides = []
-        for (low, high), velocity in (((a, b), cut.velocities[k]), ((b, c), cut.velocities[k + 1])):
+        for (low, high), velocity in (((a, b), rates[k]), ((b, c), rates[k + 1])):
             part = signals.friction[low:high]
             # Friction is counted against the motion, whatever its direction.
             turned = -1.0 if np.median(part) < 0 else 1.0

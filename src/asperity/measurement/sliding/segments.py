@@ -19,7 +19,7 @@ import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.errors import InputError, require
-from asperity.measurement.series import slope_of
+from asperity.measurement.series import Rate, bin_means, fit_trend, neighbour_scatter, slope_of
 from asperity.recording.defects.levels import recorder_step
 
 #: First sample of a piece, and the sample after its last.
@@ -53,6 +53,9 @@ _LINE = 50.0
 _FEWEST = 4
 #: A segment that moves by at most this multiple of the noise is at rest.
 _STILL = 6.0
+#: A gauge jumps between two parts of a segment if the displacement does by more than this multiple
+#: of the noise.
+_JUMP = 10.0
 #: A segment slower than this share of its neighbours' velocity is a hold, unless it slides
 #: steadily.
 _HOLD = 5e-3
@@ -92,12 +95,16 @@ class Partition:
         Which segments stand still.
     doubts : tuple of str
         Sentences on other ways to cut this recording.
+    rates : tuple of Rate
+        Velocities as measured, with their uncertainties; empty where the velocities are given, and
+        without displacement.
     """
 
     cuts: tuple[Cut, ...]
     velocities: tuple[float, ...]
     holds: tuple[bool, ...]
     doubts: tuple[str, ...] = ()
+    rates: tuple[Rate, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,9 +145,9 @@ def partition(time: Float, displacement: Float | None) -> Partition:
     cuts = tuple(_intersection(motion, before, after) for before, after in pairwise(pieces))
     # A piece may hold samples from beyond the cut.
     between = pairwise([0, *(cut.sample for cut in cuts), time.size])
-    means = [_mean_velocity(motion, *each) for each in zip(parts, between, strict=True)]
-    speeds, holds, unsure = _speeds(motion, pieces, means)
-    return Partition(cuts, speeds, holds, (*doubts, *unsure))
+    rates = [_mean_velocity(motion, *each) for each in zip(parts, between, strict=True)]
+    speeds, holds, unsure = _speeds(motion, pieces, [rate.value for rate in rates])
+    return Partition(cuts, speeds, holds, (*doubts, *unsure), tuple(rates))
 
 
 def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
@@ -186,12 +193,14 @@ def partition_at(
     at = np.searchsorted(time, times)
     cuts = tuple(Cut(float(t), int(i)) for t, i in zip(times, at, strict=True))
     speeds, holds = (np.nan,) * (len(cuts) + 1), (False,) * (len(cuts) + 1)
+    rates: list[Rate] = []
     if displacement is not None:
         pieces = list(pairwise([0, *at.tolist(), time.size]))
         motion = _motion(time, displacement)
-        speeds, holds, _ = _speeds(motion, pieces, [_velocity(motion, piece) for piece in pieces])
+        rates = [_mean_velocity(motion, [piece], piece) for piece in pieces]
+        speeds, holds, _ = _speeds(motion, pieces, [rate.value for rate in rates])
     if velocities is None:
-        return Partition(cuts, speeds, holds)
+        return Partition(cuts, speeds, holds, rates=tuple(rates))
     doubts = tuple(_contradicted(velocities, speeds))
     return Partition(cuts, tuple(velocities), tuple(v == 0 for v in velocities), doubts)
 
@@ -343,15 +352,28 @@ def _velocity(motion: _Motion, piece: Piece) -> float:
     return slope_of(t, x) if t.size > 1 else np.nan
 
 
-def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> float:
-    """Mean of the slopes over the parts of a segment that lie between two samples, m/s.
+def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> Rate:
+    """Slope of the line through the parts of a segment that lie between two samples, m/s.
 
-    A gauge that jumps from one part to the next has no share in it.
+    A motor or a gear that does not run evenly leaves a residual, which is slow noise. A gauge that
+    jumps from one part to the next has no share in the slope: its line goes on at another height.
     """
     inside = [(max(a, between[0]), min(b, between[1])) for a, b in parts]
     inside = [part for part in inside if part[1] - part[0] >= _FEWEST] or parts
-    slopes = [_velocity(motion, part) for part in inside]
-    return float(np.average(slopes, weights=[_duration(motion, part) for part in inside]))
+    t, x = (
+        np.concatenate([of[a:b] for a, b in inside]) for of in (motion.time, motion.displacement)
+    )
+    since = t - t.mean()
+    left = x - slope_of(t, x) * since
+    firsts = np.cumsum([b - a for a, b in inside])[:-1]
+    apart = np.abs(left[firsts] - left[firsts - 1])
+    jumps = firsts[apart > _JUMP * max(neighbour_scatter(left), motion.noise)]
+    line = np.searchsorted(jumps, np.arange(t.size), side="right")
+    at, means = bin_means(since, x - x.mean())
+    shares = [bin_means(since, (line == k).astype(float))[1] for k in range(jumps.size + 1)]
+    fit = fit_trend(np.stack([at, *shares], axis=1), means)
+    variance = float(fit.variance * fit.inverse[0, 0])
+    return Rate(float(fit.beta[0]), float(np.sqrt(variance)), float(fit.dof))
 
 
 def _duration(motion: _Motion, piece: Piece) -> float:
@@ -398,9 +420,12 @@ def _segments(
         least = int(np.argmin(ratios / allowed))
         if ratios[least] < allowed[least]:
             whole = pieces[least][0], pieces[least + 1][1]
+            weights = [
+                sum(_duration(motion, part) for part in parts[k]) for k in (least, least + 1)
+            ]
+            speeds[least : least + 2] = [np.average(speeds[least : least + 2], weights=weights)]
             parts[least : least + 2] = [parts[least] + parts[least + 1]]
             pieces[least : least + 2] = [whole]
-            speeds[least : least + 2] = [_mean_velocity(motion, parts[least], whole)]
             continue
         transition = _transition(motion, pieces, speeds)
         if transition is None:

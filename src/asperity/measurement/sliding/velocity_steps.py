@@ -17,7 +17,15 @@ from scipy.special import stdtrit
 
 from asperity.arrays import Float
 from asperity.lock_in.rounding import rounding_variance
-from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend, moving_mean
+from asperity.measurement.series import (
+    Rate,
+    TrendFit,
+    bin_means,
+    columns,
+    effective_dof,
+    fit_trend,
+    moving_mean,
+)
 
 #: Lengths of windows, over the slip of the shorter side.
 _WINDOWS = (1.0, 1.5, 2.25)
@@ -80,7 +88,8 @@ class VelocityStep:
         Half of the 95 % interval of `change`.
     rate_dependence, rate_uncertainty, rate_interval_95 : float
         A - B = change/ln(V2/V1): positive where friction rises with velocity (a - b of
-        geophysics); NaN without velocities or where the direction turns.
+        geophysics); NaN without velocities or where the direction turns. The uncertainty includes
+        that of measured velocities.
     peak : float
         Extreme of friction after the step, in the direction of the velocity's change, less the
         level before; NaN without velocities.
@@ -123,8 +132,8 @@ class _Side:
 
 def read_step(
     time: float,
-    before: tuple[Float, Float, float],
-    after: tuple[Float, Float, float],
+    before: tuple[Float, Float, Rate],
+    after: tuple[Float, Float, Rate],
     *,
     degree: int,
     first_settling: float = 0.0,
@@ -136,7 +145,7 @@ def read_step(
     ----------
     time : float
         Time of the step (s).
-    before, after : (array (n,), array (n,), float)
+    before, after : (array (n,), array (n,), Rate)
         Times, friction and velocity (m/s, NaN if unknown) of the segments on its two sides.
     degree : int
         0 for levels without trend, 1 for a linear trend, 2 for one that is quadratic as well.
@@ -145,8 +154,9 @@ def read_step(
     recorded : float
         Step in which the recorder has the friction.
     """
-    known = all(np.isfinite(side[2]) and side[2] != 0 for side in (before, after))
-    speeds = [abs(side[2]) if known else 1.0 for side in (before, after)]
+    velocities = [side[2].value for side in (before, after)]
+    known = all(np.isfinite(velocity) and velocity != 0 for velocity in velocities)
+    speeds = [abs(velocity) if known else 1.0 for velocity in velocities]
     slips = [speed * (side[0] - time) for side, speed in zip((before, after), speeds, strict=True)]
     usable = slips[0] >= slips[0][0] + min(first_settling, _MOST_CUT * -float(slips[0][0]))
     earlier = _Side(slips[0][usable], before[1][usable])
@@ -251,8 +261,8 @@ def _combined(
 
 def _result(
     time: float,
-    before: tuple[Float, Float, float],
-    after: tuple[Float, Float, float],
+    before: tuple[Float, Float, Rate],
+    after: tuple[Float, Float, Rate],
     readings: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]],
     settling: float,
     known: bool,
@@ -281,14 +291,21 @@ def _result(
     spread = float(np.sqrt(weight @ (change - mean) ** 2))
     uncertainty = float(np.hypot(from_noise, spread))
     half = float(stdtrit(dof, 0.975)) * uncertainty
-    velocities = before[2], after[2]
+    velocities = before[2].value, after[2].value
     turned = known and velocities[0] * velocities[1] < 0
     lever = float(np.log(abs(velocities[1] / velocities[0]))) if known and not turned else np.nan
     middle = readings[len(readings) // 2]
     slopes = [float(fit.beta[1]) if degree else 0.0 for fit in middle[3:]]
     level = float(np.mean([left.beta[0] for *_, left, _ in readings]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        rate = [float(np.divide(v, lever)) for v in (mean, uncertainty, half)]
+        rate = float(np.divide(mean, lever))
+        # The logarithm of the velocities' ratio is as uncertain as the velocities.
+        parts = [(float(np.divide(uncertainty, abs(lever))), dof)]
+        parts += [
+            (float(np.divide(abs(rate) * v.uncertainty, abs(v.value * lever))), v.dof)
+            for v in (before[2], after[2])
+        ]
+    rate_uncertainty = float(np.sqrt(sum(part**2 for part, _ in parts)))
     return VelocityStep(
         time=time,
         velocity_before=velocities[0],
@@ -299,9 +316,9 @@ def _result(
         choice_uncertainty=spread,
         dof=dof,
         interval_95=half,
-        rate_dependence=rate[0],
-        rate_uncertainty=abs(rate[1]),
-        rate_interval_95=abs(rate[2]),
+        rate_dependence=rate,
+        rate_uncertainty=rate_uncertainty,
+        rate_interval_95=float(stdtrit(effective_dof(parts), 0.975)) * rate_uncertainty,
         peak=_peak(after[0], after[1], time, lever, settling, abs(velocities[1])) - level,
         trend="one slope" if one_slope else ("two slopes" if degree else "none"),
         slope_before=slopes[0],
