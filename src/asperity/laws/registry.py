@@ -26,7 +26,7 @@ from typing import TypeGuard
 from asperity.errors import InputError, closest, code_of_others, require
 from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
-from asperity.parameters.arguments import shown, typed
+from asperity.parameters.arguments import file_path, shown, typed
 
 _LAWS: dict[str, type[Law]] = {}
 
@@ -165,7 +165,7 @@ def _module(where: str, place: str) -> ModuleType:
     file = where.endswith(".py")
     with code_of_others("law", where=f"'{place}'"):
         try:
-            return _from_file(Path(where)) if file else importlib.import_module(where)
+            return _from_file(file_path(where, "law")) if file else importlib.import_module(where)
         except (FileNotFoundError, ModuleNotFoundError) as error:
             rule, advice = "be in a module or file that exists", "correct the path, or install it"
             raise InputError("law", rule, f"'{place}' ({error})", advice) from None
