@@ -66,6 +66,7 @@ def test_a_law_in_a_module_is_known_by_its_name(law_file, monkeypatch) -> None:
         ("asperity.laws:Law", "must be a subclass"),
         ("{broken}:Mine", "code that runs"),
         ("{folder}:Mine", "file that exists"),
+        ("\0.py:Mine", "law must be the path of a file"),
     ],
 )
 def test_a_wrong_place_is_refused(law_file, place: str, message: str) -> None:

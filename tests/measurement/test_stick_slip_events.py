@@ -37,6 +37,15 @@ CASES = {
 }
 
 
+def test_slips_from_one_sample_to_the_next_without_noise_are_read() -> None:
+    """No residual tells one shape of the slip from another."""
+    _, events = read(np.arange(1500.0) % 10, rate=10.0)
+    # The line of the stick would reach 10, at one sample, where the force is 0.
+    np.testing.assert_allclose(np.diff(events.onset), 1.0, rtol=1e-9)
+    assert np.all((events.drop >= 9.0) & (events.drop <= 10.0))
+    assert np.all(np.isfinite(events.timing_uncertainty))
+
+
 @pytest.mark.parametrize("seed", population(5))
 @pytest.mark.parametrize("case", CASES)
 def test_every_event_is_read_and_no_other(case, seed) -> None:

@@ -27,7 +27,7 @@ from asperity.errors import InputError, Symbols, closest, code_of_others, requir
 from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
 from asperity.parameters import Names, display_name
-from asperity.parameters.arguments import shown, typed
+from asperity.parameters.arguments import file_path, shown, typed
 
 _LAWS: dict[str, type[Law]] = {}
 
@@ -178,7 +178,7 @@ def _module(where: str, place: str) -> ModuleType:
     file = where.endswith(".py")
     with code_of_others("law", where=f"'{place}'"):
         try:
-            return _from_file(Path(where)) if file else importlib.import_module(where)
+            return _from_file(file_path(where, "law")) if file else importlib.import_module(where)
         except (FileNotFoundError, ModuleNotFoundError) as error:
             rule, advice = "be in a module or file that exists", "correct the path, or install it"
             raise InputError("law", rule, f"'{place}' ({error})", advice) from None

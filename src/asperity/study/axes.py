@@ -19,7 +19,7 @@ from asperity.arrays import between, spaced
 from asperity.errors import InputError, require
 from asperity.laws import get_law, known_law
 from asperity.parameters import Parameter, canonical_name, suggestion
-from asperity.parameters.arguments import number, shown
+from asperity.parameters.arguments import file_path, number, shown
 from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
@@ -197,7 +197,9 @@ def _column(
 def law_place(law: Any, folder: Path) -> str:
     """A law as a plan names it; a path relative to the plan's folder becomes absolute."""
     file, _, name = str(law).rpartition(":")
-    return f"{(folder / file).resolve()}:{name}" if file.endswith(".py") else str(law)
+    if not file.endswith(".py"):
+        return str(law)
+    return f"{(folder / file_path(file, 'law')).resolve()}:{name}"
 
 
 def law_name(law: Any, folder: Path) -> str:

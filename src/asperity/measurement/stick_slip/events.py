@@ -374,22 +374,25 @@ def _timing(
     # Distances between the shapes, in standard deviations of the noise.
     power, axes = np.linalg.eigh(covariances[best])
     known = power > 1e-12 * power[-1]
-    away = np.array([*means, seen]) - means[best]
-    away = away @ axes[:, known] / np.sqrt(power[known])
-    # The shares of a mixture add up to one: a row of large weight.
-    unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
-    columns = np.hstack([away, unit])
-    mixture, left = nnls(columns[:-1].T, columns[-1])
-    # A part that neither a mixture nor noise explains is due to an unknown shape. It is assumed to
-    # move onset or end, per distance, no more than the worst of the known shapes.
-    far = (away[:-1] ** 2).sum(1)
-    others = np.arange(len(_SHAPES)) != best
-    lever = (moved[others] ** 2 / far[others, None]).max(0)
-    beyond = max(left**2 - known.sum(), 0.0) * lever
+    variance = weight @ moved**2
+    if known.any():  # Falls from one sample to the next have the same residuals in every shape.
+        away = np.array([*means, seen]) - means[best]
+        away = away @ axes[:, known] / np.sqrt(power[known])
+        # The shares of a mixture add up to one: a row of large weight.
+        unit = np.full((len(means) + 1, 1), 1e3 * np.abs(away).max())
+        columns = np.hstack([away, unit])
+        mixture, left = nnls(columns[:-1].T, columns[-1])
+        # A part that neither a mixture nor noise explains is due to an unknown shape. It is assumed
+        # to move onset or end, per distance, no more than the worst of the known shapes.
+        far = (away[:-1] ** 2).sum(1)
+        others = np.arange(len(_SHAPES)) != best
+        lever = (moved[others] ** 2 / far[others, None]).max(0)
+        beyond = max(left**2 - known.sum(), 0.0) * lever
+        variance = variance + (mixture @ moved) ** 2 + beyond
     return _Timing(
         _SHAPES[best],
         float(factors[best][best]),
-        float(np.sqrt((weight @ moved**2 + (mixture @ moved) ** 2 + beyond).max())),
+        float(np.sqrt(variance.max())),
     )
 
 

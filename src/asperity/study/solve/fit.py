@@ -22,6 +22,7 @@ from asperity.parameters import (
     known_name,
     point_parameters,
 )
+from asperity.parameters.arguments import file_path
 from asperity.parameters.columns import readable
 from asperity.parameters.toml_file import file_content
 from asperity.questions.sweep import FitTable, Sweep
@@ -141,6 +142,8 @@ def data_files(plan: Sweep) -> list[str]:
     rule = "be left out where an axis has data"
     require(not axis or not table.data, "fit.data", rule, "both", "leave one of them out")
     files = list(dict.fromkeys([*(table.data or ()), *axis]))
+    for file in files:
+        file_path(file, "fit.data")
     if not files:
         raise InputError(
             "fit.data must name a table of readings, got nothing; write it like "
