@@ -253,7 +253,7 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
     if not math.isfinite(coarse.chi2(best)):
         coarse = objective
     highest = coarse.chi2(best) + _CONTINUED
-    others = []
+    others: list[Minimum] = []
     for i, unknown in enumerate(objective.unknowns):
         if not unknown.logarithmic or unknown.nuisance or unknown.parameter.kind != "length":
             continue
