@@ -1,13 +1,16 @@
 """Coverage of intervals of fits to recordings: the share that contains the true value.
 
-``python -m benchmarks.coverage [--sets 200] [--case steps|holds|loads] [--residual FILE]``
+``python -m benchmarks.coverage [--sets 200] [--case steps|holds|loads] [--residual FILE]
+[--stiff K]``
 
 Recordings are computed by SciPy (LSODA, relative tolerance 1e-11) from the printed equations, with
 noise like that of real recordings: white, correlated over half a second and over eight, and a line.
 Each is fitted by `asperity.inference.fit` twice, the second time with white noise of the size of
 the residuals, as by least squares with its covariance. The share of 68 and 95 % intervals that
 contain the truth is printed for both. With ``--residual`` the noise is that of a real recording,
-velstep1_TR2_exp013_sepiolite.txt.
+velstep1_TR2_exp013_sepiolite.txt. ``--stiff 3e5`` is a machine of that stiffness over the load
+(1/m), whose spring relaxes between two samples: the velocities change at random times between
+samples, and the noise is white.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import argparse
 import json
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -36,6 +39,8 @@ STIFFNESS, LOAD = 4e3, 2e7
 NOISE = 8e-4
 #: Standard deviation of a load that changes, over the load.
 LOAD_NOISE = 2e-4
+#: Standard deviation of the white noise of stiff machines.
+STIFF_NOISE = 2e-4
 #: Window (s) of the recording whose residual is resampled.
 WINDOW = (10000, 10800)
 
@@ -206,6 +211,18 @@ def runs_of(
         yield recorded_run(trace_of(time, noisy, displacement, load), name="run")
 
 
+def runs_of_stiff(case: Case, sets: int, seed: int = 0) -> Iterator[RecordedRun]:
+    """Recordings in white noise whose velocities change at random times between two samples."""
+
+    def white(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
+        return STIFF_NOISE * random.normal(size=n)
+
+    for k in range(seed, seed + sets):
+        late = np.random.default_rng([99, k]).uniform(0, 1 / case.rate, len(case.changes))
+        changes = tuple((np.array(case.changes) + late).tolist())
+        yield from runs_of(replace(case, changes=changes), 1, 1000 + k, white)
+
+
 TRUE = CASES["steps"].true
 
 
@@ -275,11 +292,15 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=200)
     parser.add_argument("--case", choices=list(CASES), action="append")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--stiff", type=float, metavar="K", help="stiffness over the load (1/m)")
     parser.add_argument("--white-only", action="store_true")
     parser.add_argument("--coloured-only", action="store_true")
     parser.add_argument("--residual", type=Path, metavar="FILE", help="of the sepiolite step")
     arguments = parser.parse_args()
     noise = resampled(arguments.residual) if arguments.residual else None
+    if arguments.stiff:
+        global STIFFNESS
+        STIFFNESS = arguments.stiff
     for name in arguments.case or list(CASES):
         ways = {"autoregressive": RunOptions(), "white": RunOptions(order=0)}
         if arguments.white_only:
@@ -288,7 +309,8 @@ def main() -> None:
             ways.pop("white")
         for way, options in ways.items():
             case = CASES[name]
-            runs = runs_of(case, arguments.sets, arguments.seed, noise)
+            which = (case, arguments.sets, arguments.seed)
+            runs = runs_of_stiff(*which) if arguments.stiff else runs_of(*which, noise)
             result = covered(runs, case, options)
             print(json.dumps({"case": name, "noise": way, **result}), flush=True)
             print_shares(f"{name:6} {way:14}", result)

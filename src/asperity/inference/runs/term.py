@@ -383,8 +383,8 @@ class RunTerm(DataTerm):
                 + ", which no motion of the slider makes; replaced by the line between the "
                 "neighbours"
             )
+        what = "sample" if self.run.blocks is None else "mean"
         if self.run.wrong:
-            what = "sample" if self.run.blocks is None else "mean"
             said.append(
                 self._sentence_on(self.run.wrong, what, "is", "are")
                 + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
@@ -392,7 +392,7 @@ class RunTerm(DataTerm):
             )
         if self._alone:
             said.append(
-                self._sentence_on(self._alone, "sample", "says", "say")
+                self._sentence_on(self._alone, what, "says", "say")
                 + " alone when the velocity of the drive changes there, because friction jumps "
                 "between two samples: the intervals are those without it; sample faster"
             )
