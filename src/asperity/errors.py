@@ -98,8 +98,8 @@ class Naming(NamedTuple):
     files: Mapping[Path, str] = {}
 
 
-_IN_PYTHON_NAMES = Naming()
-_naming: ContextVar[Naming] = ContextVar("naming", default=_IN_PYTHON_NAMES)
+_OF_PYTHON = Naming()
+_naming: ContextVar[Naming] = ContextVar("naming", default=_OF_PYTHON)
 
 
 def name_by(
@@ -193,10 +193,10 @@ class InputError(ValueError):
             return self
         return type(self)(field, self.rule, self.got, self.advice)
 
-    def shortened(self, most: int) -> InputError:
-        """The same mistake, its parts as one line of at most so many characters each."""
-        parts = (printable(part, most) for part in (self.rule, self.got, self.advice))
-        return type(self)(self.field._replace(name=printable(self.field.name, most)), *parts)
+    def shortened(self) -> InputError:
+        """The same mistake, its parts as lines that a terminal can show."""
+        parts = map(printable, (self.rule, self.got, self.advice))
+        return type(self)(self.field._replace(name=printable(self.field.name)), *parts)
 
     def worded(self) -> InputError:
         """The same mistake, its field in the words of the door in use, for every door."""
@@ -270,6 +270,10 @@ class MistakesError(InputError):
         self.source = source
         # Which a copy in another process is made of.
         self.args = (self.errors, source)
+
+    def shortened(self) -> InputError:
+        """As of `InputError`, for every mistake."""
+        return type(self)([error.shortened() for error in self.errors], self.source)
 
     def worded(self) -> InputError:
         """As of `InputError`, for every mistake."""

@@ -243,9 +243,10 @@ def test_a_sentence_names_what_the_page_names(measured_here, content, source, be
     with pytest.raises(InputError) as refused:
         measured_here(content, source=source)
     with naming(in_labels):
-        assert str(refused.value).startswith(begin)
-    assert "columns=" not in str(refused.value)
-    assert "columns[" not in str(refused.value)
+        sentence = str(refused.value)
+    assert sentence.startswith(begin)
+    assert "columns=" not in sentence
+    assert "columns[" not in sentence
 
 
 def test_the_sentence_of_a_file_reaches_the_page(measured):

@@ -353,3 +353,12 @@ def test_an_ambiguous_column_is_chosen_by_an_option(asperity, tmp_path) -> None:
         '--force "shear force 1"',
         "--force must name one channel, got several, ",
     )
+
+
+def test_a_report_renames_parameters_only(asperity, recording, tmp_path):
+    path = tmp_path / "A W0.csv"
+    path.write_bytes(recording.read_bytes())
+    shown = asperity("measure", path, "--names", "geophysics").stdout
+    assert shown.startswith("A W0.csv: ")
+    assert "mean of F/sigma_n" in shown
+    assert "W0" not in shown.removeprefix("A W0.csv")

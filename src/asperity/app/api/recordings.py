@@ -9,6 +9,7 @@ import json
 import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,8 @@ from pydantic import field_validator
 
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming
-from asperity.laws.registry import symbols_of
 from asperity.outputs.tables import Section
-from asperity.parameters import NAMES, OUTPUTS, Names
+from asperity.parameters import NAMES, OUTPUTS, Names, display_name
 from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions
 from asperity.questions.options import measure_options, source_options
@@ -54,7 +54,7 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
     ``table`` for a lock-in table.
     """
     path, name = Path(argument["path"]), argument["name"]
-    symbols = symbols_of(argument.get("names", NAMES[0]))
+    symbols = partial(display_name, names=argument.get("names", NAMES[0]))
     with naming(in_labels, symbols, {path: name}):
         table = _table_in(path, name)
         if table is not None:

@@ -164,10 +164,6 @@ def raw_recording(
     return recorded
 
 
-#: Largest length of a part of a message, which may quote the file.
-_LONGEST = 400
-
-
 @typed
 def read(
     path: FilePath,
@@ -304,7 +300,7 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
         try:
             yield caught
         except InputError as error:
-            raise error.shortened(_LONGEST) from None
+            raise error.shortened() from None
 
 
 def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:
