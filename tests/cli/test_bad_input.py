@@ -186,6 +186,10 @@ def test_friction_without_motion_says_which_options_give_it(asperity, tmp_path: 
         ("V,epsilon,frequency\n1e-6,0.2,120\n", ["got no column 'law'; add it or give --law"]),
         (f"{HEADER}\nrice-runia,1e-6,0.2,120\n", ["did you mean 'rice-ruina'?"]),
         (f"{HEADER}\nrice-ruina,quick,0.2,120\n", ["in column 'V', got 'quick' in row 1"]),
+        (
+            f"{HEADER}\nrice-ruina,{'x' * 70_000},0.2,120\n",
+            ["in column 'V', got a text of 70000 characters in row 1"],
+        ),
         (f"{HEADER}\nrice-ruina,nan,0.2,120\n", ["in column 'V', got 'nan' in row 1"]),
         (f"{HEADER}\nrice-ruina,,0.2,120\n", ["got none for V;"]),
         (

@@ -278,6 +278,12 @@ def test_channels_of_another_length_or_shape_are_refused():
         Channel(np.zeros((2, 2)))
 
 
+def test_a_unit_in_place_of_a_kind_is_refused():
+    message = "Channel.kind must be a kind of quantity, got 'N'; choose one of "
+    with pytest.raises(InputError, match=message):
+        Channel([1.0, 2.0], "N")
+
+
 @pytest.fixture
 def rock():
     channels = {

@@ -19,6 +19,7 @@ from typing import BinaryIO
 
 from asperity.errors import Argument, InputError, known_as, require
 from asperity.parameters.toml_file import file_content
+from asperity.units.kinds import shown
 
 _DELIMITERS = (",", ";", "\t")
 #: Bytes that are decoded at a time.
@@ -303,5 +304,5 @@ def _number(cell: str, name: str, unit: str, where: str) -> float | str:
         number = float(cell)
     except ValueError:
         advice = "correct the cell, and write the unit into the heading"
-        raise InputError(where, f"have a number in column {name}", f"'{cell}'", advice) from None
+        raise InputError(where, f"have a number in column {name}", shown(cell), advice) from None
     return f"{number!r} {unit}" if unit else number

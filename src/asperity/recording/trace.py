@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError, listed, require
+from asperity.errors import Argument, InputError, listed, require, require_known
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel
-from asperity.units import from_si, to_si
+from asperity.units import KINDS, from_si, to_si
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +47,8 @@ class Channel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", _column(self.values, "Channel.values"))
+        if self.kind is not None:
+            require_known(self.kind, KINDS, "Channel.kind", "be a kind of quantity")
 
     def to(self, unit: str) -> Float:
         """Values in another unit, such as ``"MPa"``; raises `InputError` if it does not fit."""

@@ -29,7 +29,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
-from asperity.parameters.arguments import counted
+from asperity.parameters.arguments import counted, shown
 from asperity.parameters.columns import headings, sheet
 from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
@@ -239,7 +239,7 @@ class TableSource:
         everywhere = set.intersection(*(set(required(law)) for law in known))
         for name, (text, row) in texts.items():
             holds, advice = name not in everywhere or not text, "write SI numbers without units"
-            got = f"'{text}' in row {row} and none in any other"
+            got = f"{shown(text)} in row {row} and none in any other"
             require(holds, str(self.path), f"have finite numbers in column '{name}'", got, advice)
         missing = everywhere - (set(self.columns) - set(texts)) - set(self.filled)
         if missing:

@@ -113,6 +113,19 @@ def test_draws_average_over_the_uncertain_values():
     assert result.efficiency >= 0.999
 
 
+def test_a_draw_in_which_nothing_slides_steadily_is_left_out():
+    plan = {
+        **PLAN, "law": "rice-ruina", "free": ["A", "B"], "measure": "A", "values": {},
+        "ranges": {**PLAN["ranges"], "epsilon": {"from": 0.05, "to": 0.25, "levels": 3}},
+        "fixed": {"K": "0.4 N/um"}, "noise": {"mean_friction": 1e-3, "mu1": 2e-5},
+        "draws": 16, "uncertainty": {"A": 0.001},
+    }  # fmt: skip
+    result = design(plan)
+    assert result.candidates == 2
+    assert result.readings == 8
+    assert 0 < result.parameters["A"].se < 0.001
+
+
 def test_the_record_and_the_table_hold_the_points(result):
     record = result.record()
     assert [p["readings"] for p in record["points"]] == [p.readings for p in result.points]

@@ -482,6 +482,8 @@ class _Task:
         parts = []
         for k, values in enumerate(self.candidates.draws):
             rows = np.flatnonzero(self.candidates.usable[k])
+            if not rows.size:  # Nothing slides steadily: this draw prefers no point.
+                continue
             some = some_of(points, rows)
             label = f"derivatives, draw {k + 1} of {len(self.candidates.draws)}"
             at = predicted(plan, plan.truth, some, values, labelled(self.report, label))

@@ -329,7 +329,7 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
             values[row] = float(cell or math.nan)
         except ValueError:
             rule = f"have numbers without unit in column {name}"
-            got = f"'{cell}' in row {row + 1}"
+            got = f"{shown_value(cell)} in row {row + 1}"
             advice = "write it with a decimal point, and the unit into the heading"
             raise InputError(shown, rule, got, advice) from None
     return values
