@@ -115,6 +115,11 @@ def test_a_quantity_is_a_number_or_a_text(value) -> None:
         (lambda: asp.fit(SLIDER), "data"),
         (lambda: asp.compare("data.csv", [SLIDER]), "laws"),
         (lambda: asp.run(Hold("1 s"), "run.nc"), "protocol"),
+        (lambda: asp.inference.averaged_cycle(3), "measurement"),
+        (lambda: asp.ledger.reproduce("bureau2000", "paper"), "paper"),
+        (lambda: asp.theory.closed_forms.determinant(PMMA), "p"),
+        (lambda: asp.experiment.Exciter(120.0, "all"), "transfer"),
+        (lambda: asp.recording.Channel("x"), "Channel.values"),
     ],
 )
 def test_public_functions_are_checked(call, name) -> None:
@@ -123,6 +128,7 @@ def test_public_functions_are_checked(call, name) -> None:
 
 
 TRACE = asp.samples.modulated()
+RECORDER = asp.tribometer.Recorder(rate=9.0)
 READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "mu1_err": [1e-5]}
 
 
@@ -146,6 +152,14 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.run(3, "run.csv"), "protocol must be a Protocol"),
         (lambda: asp.experiment.hold_response(SLIDER, hold_time=[], velocity=1e-6), "have a point"),
         (lambda: asp.write([], "a.csv"), "data must hold a measurement, got none"),
+        (lambda: asp.experiment.Exciter("120 mm"), "Exciter.frequency must be a frequency"),
+        (lambda: asp.recording.Trace([0.0], {"F": [1.0]}), r"Trace.channels\['F'\] must be a Chan"),
+        (
+            lambda: asp.tribometer.Tribometer(sensors={}, recorder=RECORDER).record(
+                [0.0], {}, seed=-1
+            ),
+            "seed must be a whole number of at least 0",
+        ),
         (
             lambda: asp.tribometer.Recorder(rate=9.0, clock_error="x"),
             "clock_error must be a number",

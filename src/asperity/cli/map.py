@@ -14,6 +14,7 @@ from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from asperity.questions.point import Point
     from asperity.study.map import Axis
@@ -69,7 +70,6 @@ def map(
     of the mode at each of its points.
     """
     from asperity.cli.progress import bar
-    from asperity.figures.map import draw_map
     from asperity.laws import get_law
     from asperity.operating_point import offered_numbers, require_given_influence
     from asperity.outputs import output_files, require_netcdf
@@ -111,7 +111,7 @@ def map(
         boundaries.append(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
     table = [Section("", rows=rows), Section("", tuple(boundaries))]
     output.answer(lambda: record, lambda: table, point.law, "")
-    output.draw(lambda: draw_map(result, show or _SHOWN))
+    output.draw(lambda: _figure(result, show or _SHOWN))
     unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
     say(
         unresolved
@@ -133,6 +133,13 @@ def _axis(text: str, log: bool, option: str) -> Axis:
         return Axis.parse("=".join([parameter_name(name.strip()), *values]), log, option)
     except InputError as error:
         raise error.about(option) from None
+
+
+def _figure(dataset: xarray.Dataset, show: str) -> Figure:
+    # Matplotlib takes a third of a second to import.
+    from asperity.figures.map import draw_map
+
+    return draw_map(dataset, show)
 
 
 def _record(dataset: xarray.Dataset, out: Path) -> dict[str, Any]:

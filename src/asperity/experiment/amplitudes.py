@@ -23,10 +23,11 @@ from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
 from asperity.loads import Modulate, Programme, ProgrammeStep, Slide
 from asperity.measurement.campaign import column_unit, modulated_rows
 from asperity.measurement.measure import Measurement, measure
-from asperity.parameters.arguments import at_least, typed
+from asperity.parameters.arguments import at_least, number, typed
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
+from asperity.tribometer.sensors import Given
 from asperity.tribometer.tribometer import Tribometer
 from asperity.units import to_si
 
@@ -34,24 +35,30 @@ if TYPE_CHECKING:
     import xarray
 
 
+@typed
 @dataclass(frozen=True)
 class Exciter:
     """A harmonic load, of which an air layer may carry a part.
 
     Attributes
     ----------
-    frequency : float
+    frequency : float or str
         Hz.
     transfer : complex
         T, borne over applied modulation, e^{+i w t}: eps_eff = abs(T) eps.
     """
 
-    frequency: float
+    frequency: Given
     transfer: complex = 1.0
 
+    def __post_init__(self) -> None:
+        hertz = number(self.frequency, "Exciter.frequency", "frequency", "positive")
+        object.__setattr__(self, "frequency", hertz)
+
     @classmethod
+    @typed
     def through_air(
-        cls, frequency: float | str, slider: Slider, lambda_z: float | str, layer: AirLayer | None
+        cls, frequency: Given, slider: Slider, lambda_z: Given, layer: AirLayer | None
     ) -> Exciter:
         """The exciter of a slider on elastic contacts and an air layer, None for a vacuum.
 
@@ -74,6 +81,7 @@ class Exciter:
         )
         return cls(hertz, complex(transfer))
 
+    @typed
     def steps(self, epsilon: float, duration: float, rise: float) -> tuple[Modulate, Modulate]:
         """The applied modulation, and that of the load on the contacts.
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from cmcrameri import cm
 from matplotlib import patheffects
 from matplotlib.axes import Axes
@@ -22,11 +23,8 @@ from scipy.ndimage import distance_transform_edt
 from asperity.arrays import Float
 from asperity.figures.style import new_figure
 from asperity.parameters import DRIVE, INTERFACE, MACHINE, OUTPUTS
+from asperity.parameters.arguments import typed
 from asperity.units import display_unit
-
-if TYPE_CHECKING:
-    import xarray
-
 
 #: Line of each kind of bifurcation.
 KIND_LINES: dict[str, Any] = {
@@ -80,6 +78,7 @@ def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
     return figure
 
 
+@typed
 def draw_plane(axis: Axes, dataset: xarray.Dataset, show: str) -> QuadMesh:
     """The plane alone, without colour bar and legend.
 

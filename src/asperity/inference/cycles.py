@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -20,12 +20,10 @@ from asperity.arrays import Float
 from asperity.errors import Argument, InputError, require, symbol
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
+from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+from asperity.parameters.arguments import typed
 from asperity.slider.named import slider_from
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
-
-if TYPE_CHECKING:
-    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
-
 
 REGULAR = "regular stick-slip"
 #: Smallest number of cycles.
@@ -91,6 +89,7 @@ class AveragedCycle:
         return self.slip_duration >= _RESOLVED * self.step
 
 
+@typed
 def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -> AveragedCycle:
     """Average the cycles of regular stick-slip.
 

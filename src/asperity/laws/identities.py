@@ -26,6 +26,7 @@ from jax.test_util import check_grads
 
 from asperity.laws.law import Law
 from asperity.parameters import law_parameters
+from asperity.parameters.arguments import typed
 from asperity.units import KINDS
 from asperity.units.scale import base_units
 
@@ -62,6 +63,7 @@ class BrokenIdentityError(AssertionError):
         super().__init__(f"{type(law).name} breaks {', '.join(broken)}\n\n{result}")
 
 
+@typed
 def check_law(
     law: Law, *, slope: Slope | None = None, load_step: LoadStep | None = None
 ) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind
 from asperity.ledger.sentences import fill
 from asperity.materials import Material
 from asperity.outputs.json import plain
-from asperity.parameters.arguments import counted, shown
+from asperity.parameters.arguments import counted, shown, typed
 
 Verdict: TypeAlias = Literal["reproduced", "misprint", "differs", "undecided"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -51,6 +51,7 @@ def check(claim: str, *arguments: Any) -> Callable[[Function], Function]:
     return mark
 
 
+@typed
 def find_checks(module: ModuleType) -> dict[str, Check]:
     """Marked functions of a module, or of all modules of a package, by the id of their claim.
 
@@ -265,6 +266,7 @@ def formula_verdict(
     return "misprint" if confirmed(derived) else "differs"
 
 
+@typed
 def judge_claims(
     contents: Contents,
     checks: Mapping[str, Check],
@@ -345,6 +347,7 @@ def computed_numbers(
     return values
 
 
+@typed
 def printed_numbers(numbers: Material) -> dict[str, float]:
     """The paper's single values in SI, and as NAME.low and so on parts of its other numbers.
 
@@ -364,6 +367,7 @@ def printed_numbers(numbers: Material) -> dict[str, float]:
     return stated
 
 
+@typed
 def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
     """The paper's numbers with the values `changes` replaced, in the printed units."""
     new = {

@@ -23,6 +23,7 @@ from asperity.ledger.claims import printed_numbers
 from asperity.ledger.contents import read_words
 from asperity.ledger.rules import formula_value
 from asperity.ledger.sentences import fill
+from asperity.parameters.arguments import typed
 from asperity.questions.record import Question, Record
 
 if TYPE_CHECKING:
@@ -293,6 +294,7 @@ class FiguresFile(Question):
         )  # fmt: skip
 
 
+@typed
 def figure_words(package: str) -> FiguresFile:
     """The content of a paper's figures.toml.
 

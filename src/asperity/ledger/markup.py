@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape, unescape
 from pathlib import Path
 
+from asperity.parameters.arguments import typed
+
 #: Names of Greek letters. In HTML the letters have the same names, but for eps.
 _GREEK = re.compile(
     r"\b(alpha|Delta|eps|eta|gamma|kappa|lambda|mu|omega|Phi|pi|Sigma|sigma)(?=\b|[_\d])"
@@ -46,6 +48,7 @@ def _greek(name: re.Match[str]) -> str:
     return unescape(f"&{name[1].replace('eps', 'epsi')};")
 
 
+@typed
 def rich(text: str) -> str:
     """Escape a plain text and set eps_eff, 1e-3 and mu1 in signs and subscripts."""
     shown = _GREEK.sub(_greek, escape(str(text), quote=False))
@@ -54,6 +57,7 @@ def rich(text: str) -> str:
     return shown
 
 
+@typed
 def table(
     heads: Mapping[str, str], rows: Iterable[Sequence[str]], label: str, kind: str = "ledger"
 ) -> str:

@@ -12,10 +12,12 @@ import numpy as np
 
 from asperity._version import __version__
 from asperity.errors import InputError
+from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 from asperity.units import to_si
 
 
+@typed
 def read_columns(
     path: Path,
     columns: Mapping[str, str],

@@ -13,16 +13,17 @@ from asperity._version import __version__
 from asperity.ledger.claims import Claim
 from asperity.ledger.contents import KINDS
 from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, build_page, counts
+from asperity.ledger.paper import Paper
 from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import write_table, written_folder
 from asperity.outputs.json import to_json
 from asperity.outputs.tables import aligned
+from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.parameter import count_text
 
 if TYPE_CHECKING:
     from asperity.ledger.figures import PaperFigure, Section
-    from asperity.ledger.paper import Paper
 
 #: Called with the number of finished steps, of all steps, and the name of the present step.
 Progress = Callable[[int, int, str], None]
@@ -89,24 +90,25 @@ class ReproductionSummary:
         return lines
 
 
+@typed
 def reproduce(
     paper: Paper,
-    out: Path,
+    out: FilePath,
     progress: Progress | None = None,
     *,
-    data: Path | None = None,
+    data: FilePath | None = None,
 ) -> ReproductionSummary:
     """Write the figures of a paper, their numbers, the ledger of its claims and the report page.
 
     Parameters
     ----------
     paper : Paper
-    out : Path
+    out : path
         Folder, made if absent. It receives figures/ (PNG, PDF), data/ (CSV), claims.json,
         claims.csv and index.html, all of them or none; other files in it are left alone.
     progress : callable, optional
         Called before each step with the steps done, all steps, and a label of the step.
-    data : Path, optional
+    data : path, optional
         CSV of measured or digitised points (`asperity.ledger.points.read_points`), which
         are drawn on the figures and compared with their curves; data/points.csv and
         agreement.json are written too.

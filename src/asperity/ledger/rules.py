@@ -39,6 +39,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.errors import InputError, closest, code_of_others
+from asperity.parameters.arguments import typed
 
 #: Relative tolerance of "about".
 ABOUT = 0.05
@@ -82,6 +83,7 @@ class AcceptanceRule:
         return math.isfinite(value) and bool(self.accepts(value))
 
 
+@typed
 def rounds_to(stated: float, last_digit: float, what: str = "the value") -> AcceptanceRule:
     """Half a unit of the last digit stated, `last_digit` being one unit of it."""
     half = last_digit / 2
@@ -91,11 +93,13 @@ def rounds_to(stated: float, last_digit: float, what: str = "the value") -> Acce
     )
 
 
+@typed
 def about(stated: float, what: str = "the value") -> AcceptanceRule:
     """Within 5 %."""
     return within(stated, ABOUT, what)
 
 
+@typed
 def within(stated: float, tolerance: float, what: str = "the value") -> AcceptanceRule:
     """Within a relative tolerance that was fixed beforehand."""
     return AcceptanceRule(
@@ -104,6 +108,7 @@ def within(stated: float, tolerance: float, what: str = "the value") -> Acceptan
     )
 
 
+@typed
 def of_order(stated: float, what: str = "the value") -> AcceptanceRule:
     """Within half a decade."""
     return AcceptanceRule(
@@ -112,21 +117,25 @@ def of_order(stated: float, what: str = "the value") -> AcceptanceRule:
     )
 
 
+@typed
 def below(limit: float, what: str) -> AcceptanceRule:
     """Less than `limit`."""
     return AcceptanceRule(f"{what} below {limit:g}", lambda value: value < limit)
 
 
+@typed
 def above(limit: float, what: str) -> AcceptanceRule:
     """More than `limit`."""
     return AcceptanceRule(f"{what} above {limit:g}", lambda value: value > limit)
 
 
+@typed
 def between(low: float, high: float, what: str) -> AcceptanceRule:
     """From `low` to `high`, both included."""
     return AcceptanceRule(f"{what} from {low:g} to {high:g}", lambda value: low <= value <= high)
 
 
+@typed
 def change_below(limit: float, what: str) -> AcceptanceRule:
     """A relative change, of either sign, of less than `limit`."""
     return AcceptanceRule(
@@ -152,6 +161,7 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
 }
 
 
+@typed
 def formula_value(
     formula: str,
     numbers: Mapping[str, float],
@@ -211,6 +221,7 @@ RULES: Mapping[str, Callable[..., AcceptanceRule]] = {
 }
 
 
+@typed
 def number(value: float | str, numbers: Mapping[str, float], place: str) -> float:
     """A number of a rule: itself, a word of `WORDS`, or the name of one of the paper's numbers.
 

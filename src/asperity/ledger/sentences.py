@@ -12,6 +12,7 @@ from string import Formatter
 from typing import Any
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import typed
 
 _FIELD = re.compile(r"(?:(-?[\d.]+(?:e-?\d+)?)\*)?(.*)", re.DOTALL)
 
@@ -30,6 +31,7 @@ def _parts(field: str) -> tuple[str | None, str]:
     return match[1], match[2]
 
 
+@typed
 def names_in(sentence: str) -> tuple[str, ...]:
     """Names of the numbers that a sentence quotes.
 
@@ -41,6 +43,7 @@ def names_in(sentence: str) -> tuple[str, ...]:
     return tuple(_parts(field)[1] for _, field, _, _ in Formatter().parse(sentence) if field)
 
 
+@typed
 def fill(sentence: str, values: Mapping[str, Any], where: str) -> str:
     """The sentence with its numbers.
 

@@ -43,6 +43,7 @@ from asperity.lock_in.reference import (
     window_basis,
 )
 from asperity.lock_in.settling import Settling, find_settlings, without
+from asperity.parameters.arguments import typed
 
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
@@ -59,6 +60,7 @@ DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
 _OFF = 0.1
 
 
+@typed
 def lock_in(
     time: Float,
     load: Float,
@@ -236,6 +238,7 @@ def _check_resolved(time: Float, frequency: float, harmonics: int) -> None:
     require(not 2 * harmonics * frequency >= rate, "lock_in.harmonics", rule, got, "ask for fewer")
 
 
+@typed
 class LockInStream:
     """Lock-in of samples that are added one piece after the other.
 

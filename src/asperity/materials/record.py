@@ -154,6 +154,7 @@ def available() -> tuple[str, ...]:
     return tuple(sorted(packaged()))
 
 
+@typed
 def load_from(folder: Path, name: str) -> Material:
     """Load a material by its name, or by a path relative to the folder.
 

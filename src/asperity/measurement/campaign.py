@@ -22,6 +22,7 @@ from asperity.errors import Argument, InputError, closest, require
 from asperity.measurement.record import observable_covariance
 from asperity.measurement.verdicts.verdict import Judged, doubts_text
 from asperity.outputs import UnfinishedText, output_file, write_table, written_file
+from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class CampaignSummary:
     table: list[Row]
 
 
+@typed
 def run_campaign(
     files: Sequence[Path],
     rows_of: Callable[[Path], list[Row]],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
@@ -38,12 +38,10 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
-
-if TYPE_CHECKING:
-    from asperity.recording.trace import Trace
-
+from asperity.recording.trace import Trace
 
 _DEFAULTS = Question()
 #: A line this often above its background is a modulation.
@@ -116,6 +114,7 @@ class Measurement(Judged):
         return [*lines, SummaryLine("verdict", self.verdict)]
 
 
+@typed
 def measure(trace: Trace, question: Question = _DEFAULTS) -> Measurement:
     """Read the response to a modulated load out of a recording, and judge it.
 
@@ -142,6 +141,7 @@ def measure(trace: Trace, question: Question = _DEFAULTS) -> Measurement:
     return _measured(_prepared(trace, question), None)
 
 
+@typed
 def measure_amplitudes(
     trace: Trace, question: Question = _DEFAULTS
 ) -> list[Measurement | InputError]:

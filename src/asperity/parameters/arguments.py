@@ -141,12 +141,11 @@ def _converted(value: Any, kind: Any, name: str) -> Any:
     elif origin is Literal:
         if isinstance(value, type(parts[0])):
             return one_of(value, parts, name)
-    elif origin in (bool, int, float):
+    elif origin in _NUMBERS:
         if origin is float and _is_one_number(value):
             return value
         plain = value.item() if isinstance(value, np.generic) else value
-        number = int | float if origin is float else origin
-        if isinstance(plain, number) and isinstance(plain, bool) == (origin is bool):
+        if isinstance(plain, _NUMBERS[origin]) and isinstance(plain, bool) == (origin is bool):
             return plain
     elif origin in (tuple, Sequence):
         alike = origin is Sequence or parts[-1] is ...
@@ -176,11 +175,20 @@ def _is_one_number(value: Any) -> bool:
     return shape in ((), (1,)) and kind in "iuf"
 
 
+#: Types of numbers, each with those whose values it takes.
+_NUMBERS: Mapping[Any, Any] = {
+    bool: bool,
+    int: int,
+    float: int | float,
+    complex: int | float | complex,
+}
+
 #: Types in the words of a message.
 _WORDS: Mapping[Any, str] = {
     bool: "True or False",
     int: "a whole number",
     float: "a number",
+    complex: "a number",
     str: "a text",
     NoneType: "None",
     os.PathLike: "a path",

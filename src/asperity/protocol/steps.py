@@ -80,7 +80,15 @@ def follow(channels: str, file: Path) -> Follow:
         if name not in _CHANNELS:
             rule = "name what is followed"
             raise InputError("follow", rule, f"'{name}'", closest(name, _CHANNELS))
-    trace = read(file)
+    try:
+        trace = read(file)
+    except InputError as error:
+        if error.field.name == "recording.path":
+            raise error.about("follow.file") from None
+        # A step has no options, in which the reader's advice is.
+        rule, got = "be read by its headings alone", f"'{file.name}' with {error.got}"
+        advice = "give each column a name and a unit, as in 'time (s)' and 'load (N)'"
+        raise InputError("follow.file", rule, got, advice) from None
     for finding in trace.findings:
         rule = f"take a recording without '{finding.name}'"
         got = f"'{file.name}': {finding.sentence} Cut it to a part without this defect"
@@ -194,7 +202,14 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
         match = form.expression.fullmatch(line)
         if match is not None:
             parts = {key: value for key, value in match.groupdict().items() if value is not None}
-            return form.build(**_arguments(parts, name, line, form.example, folder))
+            arguments = _arguments(parts, name, line, form.example, folder)
+            try:
+                return form.build(**arguments)
+            except InputError as error:
+                field = error.field.name
+                if field.startswith("follow"):
+                    raise error.about(name + field.removeprefix("follow")) from None
+                raise
     examples = " or ".join(f"'{form.example}'" for form in forms)
     raise InputError(name, "be a complete step", f"'{line}'", f"write it like {examples}")
 

@@ -61,6 +61,7 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
+@typed
 def stress_to_force(trace: Trace, area: float | str) -> Trace:
     """Convert all stresses to forces by the nominal contact area.
 
@@ -96,6 +97,7 @@ def stress_to_force(trace: Trace, area: float | str) -> Trace:
     return replace(trace, channels=channels, provenance=provenance)
 
 
+@typed
 def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
     """Convert a stiffness in friction per length to force per length, K = k W.
 

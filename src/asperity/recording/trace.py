@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError, listed, require, require_known
+from asperity.errors import Argument, InputError, InputTypeError, listed, require, require_known
+from asperity.parameters.arguments import of_type, shown
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.defects.sampling import even_rate
@@ -85,7 +86,8 @@ class Trace(Displayed):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", _column(self.time, "Trace.time"))
-        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+        channels = of_type(self.channels, Mapping[str, Channel], "Trace.channels")
+        object.__setattr__(self, "channels", MappingProxyType(dict(channels)))
         object.__setattr__(self, "findings", tuple(self.findings))
         for name, channel in self.channels.items():
             rule, advice = "be as long as time", "cut them to the same length"
@@ -205,7 +207,10 @@ def checked(trace: Trace) -> Trace:
 
 def _column(values: Any, name: str) -> Float:
     """A read-only float64 view; the caller's array is unchanged."""
-    column = np.asarray(values, dtype=np.float64).view()
+    try:
+        column = np.asarray(values, dtype=np.float64).view()
+    except (TypeError, ValueError):
+        raise InputTypeError(name, "be numbers in SI", shown(values)) from None
     require(column.ndim == 1, name, "have one dimension", column.ndim, "give one array per channel")
     column.flags.writeable = False
     return column

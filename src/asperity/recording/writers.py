@@ -6,17 +6,16 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import InputError, closest
 from asperity.outputs import output_file, written_file
+from asperity.parameters.arguments import typed
+from asperity.recording.trace import Trace
 from asperity.units import KINDS
-
-if TYPE_CHECKING:
-    from asperity.recording.trace import Trace
 
 #: Unit and values of each channel in the file.
 _Columns = Mapping[str, tuple[str, Float]]
@@ -27,6 +26,7 @@ _ROWS = 100_000
 _GROUP = "recording"
 
 
+@typed
 def write(
     trace: Trace, path: str | os.PathLike[str], *, units: Mapping[str, str] | None = None
 ) -> Path:

@@ -29,7 +29,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.parameters.arguments import one_of
+from asperity.parameters.arguments import one_of, typed
 from asperity.theory.closed_forms import SmallModulation
 
 AgeVelocity: TypeAlias = Literal["slider", "plastic"]
@@ -67,6 +67,7 @@ class _Order(NamedTuple):
     relaxation: Array  # n i + nu
 
 
+@typed
 def ageing_response(p: SmallModulation, age_velocity: AgeVelocity = "slider") -> AgeingResponse:
     """Exact first- and second-order response; equations in the module's docstring.
 

@@ -25,7 +25,7 @@ from jax.typing import ArrayLike
 
 from asperity.errors import InputError
 from asperity.laws.parameter import checked
-from asperity.parameters.arguments import one_of
+from asperity.parameters.arguments import one_of, typed
 
 Form: TypeAlias = Literal["derived", "as_printed"]
 
@@ -86,6 +86,7 @@ class SmallModulation(eqx.Module):
         return self.V * self.K / (self.omega * self.W0)
 
 
+@typed
 def steady_position(p: SmallModulation, t: ArrayLike, form: Form = "derived") -> Array:
     """x_st (m) at the time `t` (s), Eq. (10).
 
@@ -95,6 +96,7 @@ def steady_position(p: SmallModulation, t: ArrayLike, form: Form = "derived") ->
     return p.V * t - mu * p.W0 / p.K
 
 
+@typed
 def determinant(p: SmallModulation, form: Form = "derived") -> Array:
     """Delta (kg/s^3), Eq. (17): the determinant of the linear system (13)-(14).
 
@@ -115,6 +117,7 @@ def determinant(p: SmallModulation, form: Form = "derived") -> Array:
     return p.K * p.V / p.D0 * slow**-2 * bracket
 
 
+@typed
 def position_amplitude(p: SmallModulation, form: Form = "derived") -> Array:
     """X1 (m), Eq. (15); the two forms differ by their Delta.
 
@@ -124,16 +127,19 @@ def position_amplitude(p: SmallModulation, form: Form = "derived") -> Array:
     return -p.W0 * p.mu / determinant(p, form) * (1j * p.omega + p.V / p.D0)
 
 
+@typed
 def age_amplitude(p: SmallModulation, form: Form = "derived") -> Array:
     """Phi1 (s), Eq. (16); the two forms differ by their Delta."""
     return 1j * p.omega * p.W0 * p.mu / (p.V * determinant(p, form))
 
 
+@typed
 def critical_stiffness(p: SmallModulation) -> Array:
     """Kc = (B - A) W0 / D0 (N/m), Eq. (18): rigid asperities, no inertia."""
     return (p.B - p.A) * p.W0 / p.D0
 
 
+@typed
 def critical_pulsation(p: SmallModulation) -> Array:
     """omega_c = sqrt((B - A)/A) V/D0 (rad/s), Eq. (19), the pulsation at K = Kc.
 
@@ -149,16 +155,19 @@ def critical_pulsation(p: SmallModulation) -> Array:
     return jnp.sqrt((p.B - p.A) / p.A) * p.V / p.D0
 
 
+@typed
 def inertial_pulsation(p: SmallModulation) -> Array:
     """omega_0 = sqrt(K/M) (rad/s), after Eq. (19)."""
     return jnp.sqrt(p.K / p.M)
 
 
+@typed
 def first_harmonic(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """mu1 at high frequency: eps |mu - alpha| V K/(A omega W0), Eqs. (20) and (25)."""
     return epsilon * jnp.abs(p.mu - p.alpha) / p.A * p.kappa
 
 
+@typed
 def second_harmonic(p: SmallModulation, epsilon: ArrayLike, form: Form = "derived") -> Array:
     """mu2 at high frequency, Eq. (21).
 
@@ -168,6 +177,7 @@ def second_harmonic(p: SmallModulation, epsilon: ArrayLike, form: Form = "derive
     return p.kappa * factor / p.A**2 * jnp.square(epsilon)
 
 
+@typed
 def second_harmonic_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """mu2 at high frequency with alpha (not in the paper).
 
@@ -177,11 +187,13 @@ def second_harmonic_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> 
     return p.kappa * jnp.abs(bracket) / (8 * p.A**2) * jnp.square(epsilon)
 
 
+@typed
 def mean_shift(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """Change of the mean friction coefficient at high frequency, Eq. (22), negative."""
     return -p.mu * (p.mu + 2 * p.A) / (4 * p.A) * jnp.square(epsilon)
 
 
+@typed
 def mean_shift_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """Change of the mean friction coefficient at high frequency with alpha (not in the paper).
 
@@ -191,6 +203,7 @@ def mean_shift_linker_dieterich(p: SmallModulation, epsilon: ArrayLike) -> Array
     return -curvature * jnp.square(epsilon)
 
 
+@typed
 def age_to_velocity_ratio(p: SmallModulation, form: Form = "derived") -> Array:
     """Relative modulation of the age over that of the velocity, Eq. (23).
 
@@ -202,6 +215,7 @@ def age_to_velocity_ratio(p: SmallModulation, form: Form = "derived") -> Array:
     return critical_pulsation(p) / p.omega
 
 
+@typed
 def velocity_modulation(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """Relative modulation of the velocity at high frequency, eps mu/A, Eq. (24).
 
@@ -210,6 +224,7 @@ def velocity_modulation(p: SmallModulation, epsilon: ArrayLike) -> Array:
     return epsilon * p.mu / p.A
 
 
+@typed
 def first_harmonic_plateau(p: SmallModulation, epsilon: ArrayLike) -> Array:
     """mu1 of elastic asperities in the limit V -> 0 without inertia (not in the paper).
 
@@ -220,6 +235,7 @@ def first_harmonic_plateau(p: SmallModulation, epsilon: ArrayLike) -> Array:
     return epsilon * p.mu * ratio / (1 + ratio)
 
 
+@typed
 def critical_stiffness_inertial(p: SmallModulation) -> Array:
     """Kc (N/m) of rigid asperities with inertia: Eq. (18) times 1 + M V^2/(A W0 D0).
 
@@ -228,6 +244,7 @@ def critical_stiffness_inertial(p: SmallModulation) -> Array:
     return critical_stiffness(p) * (1 + p.M * p.V**2 / (p.A * p.W0 * p.D0))
 
 
+@typed
 def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider") -> Array:
     """Kc (N/m) of elastic asperities without inertia (not in the paper).
 
@@ -243,6 +260,7 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
     return (p.B - p.A) * p.W0 / lengths[chosen]
 
 
+@typed
 def critical_stiffness_form(
     law: str, *, elastic: bool, inertia: bool
 ) -> Callable[[SmallModulation], Array] | None:

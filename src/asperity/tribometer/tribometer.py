@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require
-from asperity.parameters.arguments import number, one_of, typed
+from asperity.parameters.arguments import at_least, number, one_of, typed
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
@@ -112,7 +112,7 @@ class Tribometer:
         time: ArrayLike,
         signals: Mapping[str, ArrayLike],
         *,
-        seed: int | np.random.Generator = 0,
+        seed: Annotated[int, at_least(0)] | np.random.Generator = 0,
         provenance: Mapping[str, Any] | None = None,
     ) -> Trace:
         """Record signals with the sensors and the recorder.

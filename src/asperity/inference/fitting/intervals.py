@@ -16,6 +16,7 @@ from scipy.special import chdtrc, ndtr, ndtri
 
 from asperity.arrays import Bool, Float
 from asperity.inference.objective import Objective, Residuals
+from asperity.parameters.arguments import typed
 
 Interval = tuple[float, float]
 
@@ -57,6 +58,7 @@ def bounded_threshold(distance: float, level: float) -> float:
     return float(brentq(covered, 0.0, far + 1e-9, xtol=1e-12)) if covered(far) > 0 else far
 
 
+@typed
 def bounded_interval(
     estimate: float, sd: float, level: float, lower: float, upper: float
 ) -> Interval:

@@ -21,6 +21,7 @@ from asperity.inference.runs.assembly import stiffness_in
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
+from asperity.parameters.arguments import typed
 
 #: A fixed or shared stiffness is contradicted if AICc falls by more with a free K for each run.
 _CONTRADICTED_AICC = 6.0
@@ -156,6 +157,7 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     )
 
 
+@typed
 def shift_of_estimates(
     fit: Fit, high: Mapping[str, float], low: Mapping[str, float]
 ) -> dict[str, float]:

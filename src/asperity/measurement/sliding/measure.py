@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,14 +26,12 @@ from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings, friction
 from asperity.measurement.verdicts.verdict import SLIDING, Check, Judged
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import SummaryLine
 from asperity.questions.recording import Measurement as Question
 from asperity.recording.defects.levels import recorder_step
 from asperity.recording.defects.spikes import away_from_changes, spikes, without
-
-if TYPE_CHECKING:
-    from asperity.recording.trace import Trace
-
+from asperity.recording.trace import Trace
 
 _DEFAULTS = Question()
 #: Samples on each side that a step needs, and in a hold's surroundings.
@@ -141,6 +138,7 @@ class SlidingMeasurement(Judged):
         ]
 
 
+@typed
 def measure_sliding(trace: Trace, question: Question = _DEFAULTS) -> SlidingMeasurement:
     """Friction, its velocity steps and its holds in a recording without modulation.
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import jax
 import numpy as np
@@ -32,6 +32,7 @@ from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.orbit.solution import SearchOptions
+from asperity.parameters.arguments import at_least, typed
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
@@ -115,6 +116,7 @@ class SearchedOrbits(NamedTuple):
         self.parts.append((index, orbits))
 
 
+@typed
 @dataclass
 class KnownOrbits:
     """The latest orbit of each point, the initial guess of the next call.
@@ -133,7 +135,7 @@ class KnownOrbits:
         of twelve tables the other guesses found two orbits, and transients 126.
     """
 
-    points: int
+    points: Annotated[int, at_least(0)]
     orbit: Orbit | None = None
     known: Bool = field(init=False)
     near: Bool = field(init=False)
