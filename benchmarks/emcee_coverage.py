@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 
-import emcee
 import jax
 import numpy as np
 
@@ -30,6 +29,10 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=100)
     parser.add_argument("--steps", type=int, default=300)
     chosen = parser.parse_args()
+    try:
+        import emcee
+    except ModuleNotFoundError as absent:
+        raise SystemExit(f"not installed: {absent.name}") from None
     inside = {name: np.zeros(2) for name in TRUE}
     program = jax.jit(lambda density, z, data: density(z, data), static_argnums=0)
     for k, run in enumerate(runs_of(CASES["steps"], chosen.sets)):

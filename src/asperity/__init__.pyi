@@ -44,7 +44,7 @@ from asperity.orbit import (
     response_function as response_function,
     sensitivities as sensitivities,
 )
-from asperity.protocol.run import run_experiment
+from asperity.protocol.run import run_protocol
 from asperity.recording.readers import read as read
 from asperity.slider import Slider as Slider
 from asperity.study.map import response_map
@@ -53,7 +53,7 @@ from asperity.theory import perturbation_response as perturbation_response
 from asperity.transients import transient as transient
 
 measure = measure_recording
-run = run_experiment
+run = run_protocol
 map = response_map
 #: What a study is called where it is run.
 sweep = study

@@ -240,7 +240,7 @@ _START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import asperity.protocol.run as module
-module._ROWS, module.run_protocol.__kwdefaults__["rows"] = 500, 500
+module._ROWS, module.run_protocol.__wrapped__.__kwdefaults__["rows"] = 500, 500
 from asperity.cli.main import main
 main(sys.argv[1:], prog_name="asperity")
 """

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from asperity.outputs import (
     require_netcdf,
     undisturbed,
 )
-from asperity.parameters.arguments import FilePath, typed
+from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.protocol.protocol import Protocol, fields_of_protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.slider import Slider, equation_of_motion
@@ -187,23 +187,25 @@ class RunSummary:
     unstable_start: str = ""
 
 
+@typed
 def run_protocol(
-    protocol: Protocol,
-    out: str | Path,
+    protocol: Protocol | FilePath,
+    out: FilePath,
     *,
     resume: bool = False,
     progress: Callable[[float, float], None] | None = None,
-    rows: int = _ROWS,
+    rows: Annotated[int, at_least(1)] = _ROWS,
 ) -> RunSummary:
-    """Integrate the motion of a protocol and write it block by block.
+    """Integrate the motion of a protocol and write it block by block, as ``asperity run`` does.
 
     Every block starts from the checkpoint of the block before. An interrupted and resumed run
     therefore gives the same numbers, to the last bit, as an uninterrupted run.
 
     Parameters
     ----------
-    protocol : Protocol
-    out : str or path
+    protocol : Protocol or path
+        A protocol, or the path of its TOML file.
+    out : path
         NetCDF file, written when the run is finished. Until then the finished blocks are in
         ``OUT.partial``, which can be read.
     resume : bool
@@ -221,12 +223,26 @@ def run_protocol(
     Raises
     ------
     InputError
-        If `out` cannot be written, the disk cannot hold the rows, an unfinished run of
-        this name exists, or the interface has no contact at the beginning.
+        If the protocol has a mistake, `out` cannot be written, the disk cannot hold the rows, an
+        unfinished run of this name exists, or the interface has no contact at the beginning.
     Interrupted
         On Ctrl-C.
+
+    Examples
+    --------
+    >>> import asperity as asp
+    >>> protocol = asp.protocol.Protocol(
+    ...     law="rice-ruina",
+    ...     material="bureau2000",
+    ...     start={"velocity": "1 um/s"},
+    ...     steps=["slide for 2 s", "hold 10 s", "slide at 10 um/s for 2 s"],
+    ... )
+    >>> print(asp.run(protocol, "run.nc"))
     """
+    if not isinstance(protocol, Protocol):
+        protocol = load_protocol(protocol)
     target = output_file(out, example="run.nc")
+    require_netcdf(target, "out", "run.nc")
     output = UnfinishedOutput(target, {**protocol.inputs, "rows of a block": rows})
     done = _saved_progress(output, resume)
     require_room(protocol, target, done.lengths.get("time", 0))
@@ -360,49 +376,3 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
         "rejected_steps": done.rejected,
         "stopped": done.stopped or "end of the programme",
     }
-
-
-@typed
-def run_experiment(
-    protocol: Protocol | FilePath,
-    out: FilePath,
-    *,
-    resume: bool = False,
-    progress: Callable[[float, float], None] | None = None,
-) -> RunSummary:
-    """Run a protocol, as ``asperity run`` does.
-
-    Parameters
-    ----------
-    protocol : Protocol or path
-        A protocol, or the path of its TOML file.
-    out : path
-        NetCDF file of the motion.
-    resume : bool
-        Whether to continue an interrupted run.
-    progress : callable, optional
-        Called now and then with the time reached and the end of the programme (s).
-
-    Returns
-    -------
-    RunSummary
-
-    Raises
-    ------
-    InputError
-        If the protocol has a mistake, or `out` cannot be written.
-
-    Examples
-    --------
-    >>> import asperity as asp
-    >>> protocol = asp.protocol.Protocol(
-    ...     law="rice-ruina",
-    ...     material="bureau2000",
-    ...     start={"velocity": "1 um/s"},
-    ...     steps=["slide for 2 s", "hold 10 s", "slide at 10 um/s for 2 s"],
-    ... )
-    >>> print(asp.run(protocol, "run.nc"))
-    """
-    chosen = protocol if isinstance(protocol, Protocol) else load_protocol(protocol)
-    require_netcdf(Path(out), "out", "run.nc")
-    return run_protocol(chosen, Path(out), resume=resume, progress=progress)
