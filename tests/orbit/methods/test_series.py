@@ -152,6 +152,23 @@ def test_harmonics_near_round_off_are_left_to_methods_that_keep_their_digits():
     )
 
 
+def test_a_heavy_slider_that_round_off_moves_is_left_unsolved():
+    """A thousand times as heavy as at resonance, it keeps its velocity under the force mu W."""
+    stiffness, ratio, frequency = 10 ** np.arange(3.0, 9.0)[:, None], 1e3, 0.045
+    law = RiceRuina(mu0=MU0, A=0.07, B=1e-5, D0=6.5e-5, V0=2e-4)
+    mass = ratio * stiffness / (2 * np.pi * frequency) ** 2
+    epsilon = np.geomspace(1e-3, 0.3, 4)
+    response = asp.periodic_response(
+        asp.Slider(law, spring=stiffness, mass=mass, load=0.3),
+        velocity=2e-4, epsilon=epsilon, frequency=frequency, inertia=True, methods=("series",),
+    )  # fmt: skip
+    expected = MU0 * epsilon / (ratio - 1) * np.ones_like(stiffness)
+    solved = response.converged
+    assert solved.any()
+    assert not solved[-1].any()
+    np.testing.assert_allclose(response.mu1[solved], expected[solved], rtol=1e-8)
+
+
 def tides(turns, epsilon):
     """A fault that creeps at 1 nm/s on a spring 5 % above Kc; `turns` is V T/D0."""
     a, b, v0 = 0.017, 0.025, 1e-9

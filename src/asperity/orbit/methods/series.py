@@ -57,6 +57,8 @@ _PATIENCE, _FAR = 7, 0.5
 #: Largest change of a state from one series to the next at which the latter is exact: errors fall
 #: exponentially with the nodes.
 _AGREED = 1e-10
+#: Share of the first harmonic that round-off may reach: the accuracy that is promised of mu1.
+_DIGITS = 1e-8
 #: Limit of the extrapolated error of the longest series, below which that series is tried.
 _HOPEFUL = 1e-8
 
@@ -138,11 +140,27 @@ def _solve(problem: Problem, numbers: tuple[int, ...]) -> tuple[Complex, Bool]:
         error = gap ** (nodes / before)
         harmonics[:, : nodes // 2 + 1, ~exact] = np.fft.rfft(Y[..., ~exact], axis=1) / nodes
         agreed = gap[at] < _AGREED
-        exact[at[agreed]] = True
-        at = at[~agreed]
+        ended, at = at[agreed], at[~agreed]
+        exact[ended] = _above_round_off(problem, Y, ended)
         if not len(at):
             break
     return harmonics, exact
+
+
+def _above_round_off(problem: Problem, Y: Float, at: Index) -> Bool:
+    """Whether round-off leaves the first harmonic of the first state at each point its digits.
+
+    A step from a solution is round-off; other nodes round differently. Heavy sliders move so little
+    that it may be all they do. Without modulation there is no harmonic to resolve.
+    """
+    again = _resampled(Y, Y.shape[1] + 2)
+    _newton(problem, again, at, 1)
+    before, now = (np.fft.rfft(y[0][:, at], axis=0, norm="forward")[1] for y in (Y, again))
+    phases = even_phases(Y.shape[1]) * np.ones(Y.shape[2])
+    excitation = excitation_at(problem.load, phases)
+    swings = [np.ptp(part, axis=0) for part in (excitation.w, excitation.shear, excitation.pull)]
+    steady = np.max(np.broadcast_arrays(*swings), axis=0) == 0
+    return np.asarray((np.abs(now - before) <= _DIGITS * np.abs(before)) | steady[at])
 
 
 def _newton(problem: Problem, Y: Float, at: Index, most_steps: int) -> Index:
