@@ -59,11 +59,8 @@ def test_every_example_is_valid(form) -> None:
         ("slide at 10 um for 1 s", ["step 4.velocity", "'10 um'", "'slide at 10 um/s for 60 s'"]),
         ("modulate 24 % at 120 rad/s for 1 s", ["step 4.frequency", "rad/s"]),
         ("step load to heavy", ["step 4.load", "'heavy'", "'step load to 9 N'"]),
-        (
-            "follow force from x.csv",
-            ["step 4 must name what", "'force'", "choose one of load, velocity"],
-        ),
-        ("follow load from nowhere.csv", ["step 4.file must be a file", "nowhere.csv"]),
+        ("follow force from x.csv", ["step 4.channels", "'force'", "choose one of load, velocity"]),
+        ("follow load from nowhere.csv", ["step 4.file", "'nowhere.csv'", "check the name"]),
         ("", ["step 4 must be a step", "'hold 10 s'", "'ramp load to 9 N in 5 s'"]),
         ("fly to the moon", ["'fly to the moon'", "'hold 10 s'"]),
     ],
@@ -121,14 +118,10 @@ def test_a_recorded_load_and_velocity_are_followed(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("header", "cell", "message"),
     [
-        (
-            "a,load (N)",
-            "7",
-            "step 1.file must be read by its headings alone, got 'rec.csv' with none",
-        ),
         ("time (s),load", "7", "write the unit into its heading"),
         ("time (s),load (N)", "nan", "got none in row 1"),
         ("time (s),load (N)", "7\n5.0,8", "without 'backward time'"),
+        ("time (s),x (mm)", "7", r"step 1\.file must name a channel, .*save it as CSV"),
     ],
 )
 def test_a_recording_that_cannot_be_followed(tmp_path, header, cell, message) -> None:

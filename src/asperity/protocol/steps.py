@@ -79,28 +79,25 @@ def follow(channels: str, file: Path) -> Follow:
     for name in names:
         if name not in _CHANNELS:
             rule = "name what is followed"
-            raise InputError("follow", rule, f"'{name}'", closest(name, _CHANNELS))
+            raise InputError("channels", rule, f"'{name}'", closest(name, _CHANNELS))
+    advice = "save it as CSV with a heading such as 'time (s),load (N),velocity (um/s)'"
     try:
         trace = read(file)
+        followed = {name: trace.channel(_CHANNELS[name][0]) for name in names}
     except InputError as error:
-        if error.field.name == "recording.path":
-            raise error.about("follow.file") from None
-        # A step has no options, in which the reader's advice is.
-        rule, got = "be read by its headings alone", f"'{file.name}' with {error.got}"
-        advice = "give each column a name and a unit, as in 'time (s)' and 'load (N)'"
-        raise InputError("follow.file", rule, got, advice) from None
+        # A step has none of the arguments of `read` that the sentence advises to give.
+        known = InputError("file", error.rule, error.got, advice) if error.rule else error
+        raise (known if file.exists() else error.about("file")) from None
     for finding in trace.findings:
         rule = f"take a recording without '{finding.name}'"
         got = f"'{file.name}': {finding.sentence} Cut it to a part without this defect"
-        require(finding.name not in _UNUSABLE, "follow", rule, got)
+        require(finding.name not in _UNUSABLE, "file", rule, got)
     values: dict[str, np.ndarray] = {}
-    for name in names:
-        role, kind = _CHANNELS[name]
-        channel = trace.channel(role)
+    for name, channel in followed.items():
         rule = f"take the {name} from a channel of its unit"
         got = f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{file.name}'"
         advice = "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'"
-        require(channel.kind == kind, "follow", rule, got, advice)
+        require(channel.kind == _CHANNELS[name][1], "file", rule, got, advice)
         values[name] = channel.values
     finite = np.isfinite(trace.time)
     for column in values.values():
@@ -108,7 +105,7 @@ def follow(channels: str, file: Path) -> Follow:
     if not finite.all():
         row = int(np.argmin(finite))
         rule, got = "have a number in every row", f"none in row {row} of '{file.name}'"
-        raise InputError("follow", rule, got, "cut or fill the recording first")
+        raise InputError("file", rule, got, "cut or fill the recording first")
     return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))
 
 
@@ -206,10 +203,8 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
             try:
                 return form.build(**arguments)
             except InputError as error:
-                field = error.field.name
-                if field.startswith("follow"):
-                    raise error.about(name + field.removeprefix("follow")) from None
-                raise
+                known = error.field.name in arguments
+                raise (error.about(f"{name}.{error.field}") if known else error) from None
     examples = " or ".join(f"'{form.example}'" for form in forms)
     raise InputError(name, "be a complete step", f"'{line}'", f"write it like {examples}")
 

@@ -26,10 +26,21 @@ from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 
+#: A law whose chi-squared has a lower probability is excluded if another law fits better.
+IMPOSSIBLE = 1e-3
+#: Differences of AICc from which a law is disfavoured (weight 1/7) and excluded (1/150).
+DISFAVOURED, EXCLUDED = 4.0, 10.0
+#: A law whose evidence is lower by this factor is disfavoured: strong evidence.
+FACTOR = 20.0
+
 #: Degrees of freedom of the distribution from which samples are drawn.
 _TAILS = 5.0
 #: With fewer effective samples the evidence is not reliable.
 _ENOUGH = 50.0
+
+#: Number of parts of a recording. A stretch that holds this share of the difference between two
+#: laws is named if it is shorter than the last share of the recording.
+_PARTS, _MOST, _SHORT = 200, 0.8, 0.1
 
 
 @dataclass(frozen=True)
@@ -205,11 +216,6 @@ def _predictive(fit: Fit, term: LockInTerm, left_out: Bool) -> float:
     )
 
 
-#: Number of parts of a recording. A stretch that holds this share of the difference between two
-#: laws is named if it is shorter than the last share of the recording.
-_PARTS, _MOST, _SHORT = 200, 0.8, 0.1
-
-
 def support(best: Fit, other: Fit) -> tuple[str, str]:
     """Sentences on doubts about the verdict between two laws, and on stretches that decide it.
 
@@ -297,11 +303,3 @@ def _shortest(edges: Float, total: Float, share: float, time: Float) -> tuple[fl
     length = np.where(np.triu(within, 1), edges[None, :] - edges[:, None], edges[-1] + 1)
     i, j = np.unravel_index(np.argmin(length), length.shape)
     return float(time[edges[i]]), float(time[edges[j] - 1]), float(total[j] - total[i])
-
-
-#: A law whose chi-squared has a lower probability is excluded if another law fits better.
-IMPOSSIBLE = 1e-3
-#: Differences of AICc from which a law is disfavoured (weight 1/7) and excluded (1/150).
-DISFAVOURED, EXCLUDED = 4.0, 10.0
-#: A law whose evidence is lower by this factor is disfavoured: strong evidence.
-FACTOR = 20.0

@@ -18,16 +18,15 @@ from asperity.inference.runs.term import RunTerm
 
 #: Largest number of rounds of estimating noise and parameters; the change (standard deviations)
 #: that ends them.
-_ROUNDS, _STILL = 8, 0.03
+_ROUNDS, _CONVERGED = 8, 0.03
 #: Starts closer than this many standard deviations are the same.
-_ONE_END = 1.0
+_SAME_START = 1.0
 #: Two starts lead to the same minimum if they differ by fewer standard deviations.
-_ALLOWED = 5.0
+_MOST_APART = 5.0
 #: Tolerance of all minima but the last (relative change of the coordinates).
 _COARSE = 1e-4
 #: Evaluations under white noise, whose minimum is only a start.
 _EVALUATIONS = 30
-
 
 #: Sort key of minima with noise.
 _DEVIANCE = attrgetter("deviance")
@@ -54,8 +53,8 @@ def with_noise(
 
     Returns
     -------
-    list of (array, float)
-        Minima, best first. The chi-squared of the best is that under its noise; the others exceed
+    list of Minimum
+        Best first. The chi-squared of the best is that under its noise; the others exceed
         it by twice the difference of the log likelihoods.
     bool
         Whether noise and parameters agree at the best minimum.
@@ -63,12 +62,12 @@ def with_noise(
     starts: list[Float] = []
     for k, (u, value) in enumerate(minima):
         # Most of the random starts lead to the same minimum.
-        near = [v for v, other in minima[:k] if value - other < _ONE_END]
+        near = [v for v, other in minima[:k] if value - other < _SAME_START]
         if len(_distinct_starts(searched, [*near, u])) == len(_distinct_starts(searched, near)):
             continue
         white = objective.minimise(u, tolerance=_COARSE, evaluations=_EVALUATIONS).u
         # Chi-squared per sample estimates the size of the drift: noise has 1.
-        allowed = value * (1 + _ALLOWED**2 / searched.residuals(u)[0].size)
+        allowed = value * (1 + _MOST_APART**2 / searched.residuals(u)[0].size)
         starts += [white] if searched.chi2(white) <= allowed else [u, white]
     ends: list[_MinimumWithNoise] = []
     for u in _distinct_starts(objective, starts):
@@ -100,7 +99,7 @@ def _distinct_starts(objective: Objective, starts: list[Float]) -> list[Float]:
     kept: list[Float] = []
     for u in starts:
         _, jacobian = objective.residuals(u)
-        if all(float(np.linalg.norm(jacobian @ (u - other))) > _ONE_END for other in kept):
+        if all(float(np.linalg.norm(jacobian @ (u - other))) > _SAME_START for other in kept):
             kept.append(u)
     return kept
 
@@ -138,14 +137,14 @@ def _estimated_in_turn(
         begin, u = objective.ordered(begin), objective.ordered(u)
         _, jacobian = objective.residuals(u)
         # The first noise includes the misfit of the start.
-        if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _ONE_END for end in known):
+        if turn and any(np.linalg.norm(jacobian @ (u - end.u)) < _SAME_START for end in known):
             return []
         before, deviance = deviance, _deviance(objective, u)
         if deviance - _ROUNDS * (before - deviance) > lowest + RIVAL:
             return []
         away = jacobian @ (u - begin)
         # Chi-squared of the change under the present noise.
-        if agreed := float(away @ away) < _STILL**2:
+        if agreed := float(away @ away) < _CONVERGED**2:
             break
     return [_MinimumWithNoise(u, _deviance(objective, u), objective, agreed)]
 

@@ -196,8 +196,8 @@ def _mismatch(layout: Layout) -> Finding:
     )
     text = (
         f"The heading has {count} names for {width} columns; the first {first} columns were given "
-        f"the first {first} names, and {others}. Where the names stopped to fit is not in the "
-        "file: check that each column holds what its name says."
+        f"the first {first} names, and {others}. The file does not say from which column on "
+        "the names are wrong: check that each column holds what its name says."
     )
     if width == 2 * count and layout.delimiter == ",":
         text += " Commas seem to be decimal marks, too: save it with semicolons between cells."
