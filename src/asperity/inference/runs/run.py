@@ -210,7 +210,7 @@ def recorded_run(
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
-    label = Path(str(trace.provenance.get("file") or "run")).stem if name is None else name
+    label = run_name(trace) if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
     segments = constant_velocities(signals, label, steps, velocities)
@@ -260,6 +260,11 @@ def recorded_run(
         wrong=None if spikes is None else (),
         level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
     )
+
+
+def run_name(trace: Trace) -> str:
+    """Name of a recording without another: that of its file, or "run"."""
+    return Path(str(trace.provenance.get("file") or "run")).stem
 
 
 def _named_times(
