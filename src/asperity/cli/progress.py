@@ -21,8 +21,8 @@ _SILENT, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
 def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callable[..., None]]:
     """Progress, to be called with the work done, all work, and what is being worked on.
 
-    A short job stays silent. Inside, Ctrl-C raises, or ends the
-    process at once where there are no files to put in order (`raising` False).
+    A short job prints nothing. Within the block, Ctrl-C raises, or ends the process at once where
+    there are no files to put in order (`raising` False).
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ def sweep(context: click.Context) -> None:
 @option("--workers", "N", "Processes of this machine; one a core by default.", Count())
 @option("--cluster", "N", "A Dask cluster of N workers on this machine, instead.", Count())
 @option("--scheduler address", "ADDRESS", "A Dask scheduler that runs, instead.")
-@switch("--extend extend_store", "The plan has more rows behind those of the store.")
+@switch("--extend extend_store", "The plan has more rows after those of the store.")
 @switch("--retry-failed", "Solve chunks with failed points again.")
 @switch("--dry-run", "Only say what it would take, from a sample.")
 @output_options()

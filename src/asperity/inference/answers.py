@@ -19,7 +19,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
 from asperity.inference.holds import HEALING, HealingTable, read_healing
 from asperity.inference.runs.assembly import Linear, RunOptions
-from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.runs.run import RecordedRun, recorded_run, run_name
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.inference.unknowns import Prior
@@ -348,7 +348,7 @@ def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> lis
             question = questions.Fit(data=(file,), fixed=dict(fixed or {}))
             loaded += read_data(question)
         elif isinstance(one, Trace):
-            loaded.append(_stick_slip(one, "run", fixed or {}) or one)
+            loaded.append(_stick_slip(one, run_name(one), fixed or {}) or one)
         else:
             loaded.append(one)
     return loaded

@@ -232,7 +232,7 @@ def _top(
     bend = left - 2 * top + right
     # A line at the edge of the allowed range may have a higher neighbour outside.
     offset = float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else 0.0
-    around = amplitude[max(1, at // 2) : 2 * at + 2]
+    neighbours = amplitude[max(1, at // 2) : 2 * at + 2]
     return SpectralLine(
-        float(frequency[1] * (at + offset)), float(amplitude[at]), float(np.median(around))
+        float(frequency[1] * (at + offset)), float(amplitude[at]), float(np.median(neighbours))
     )

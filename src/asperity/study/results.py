@@ -158,11 +158,11 @@ def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, flo
             x = values[name][solved & np.isfinite(values[name])]
             if x.size:
                 parts[name].append((x.size, x.mean(), x.var(), x.min(), x.max()))
-    return {name: _whole(part) for name, part in parts.items()}
+    return {name: _pooled(part) for name, part in parts.items()}
 
 
-def _whole(parts: list[tuple[float, ...]]) -> dict[str, float]:
-    """Statistics of all values from those of the chunks; NaN without a value."""
+def _pooled(parts: list[tuple[float, ...]]) -> dict[str, float]:
+    """Statistics of all values, pooled from those of the chunks; NaN without a value."""
     if not parts:
         return {"count": 0, **dict.fromkeys(("mean", "std", "min", "max"), math.nan)}
     count, mean, variance, low, high = np.array(parts).T

@@ -210,15 +210,15 @@ def recorded_run(
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     trace = replace(trace, time=even_times(trace.time))
-    shown = Path(str(trace.provenance.get("file") or "run")).stem if name is None else name
+    label = run_name(trace) if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
-    segments = constant_velocities(signals, shown, steps, velocities)
+    segments = constant_velocities(signals, label, steps, velocities)
     speeds, doubts = segments.velocities, list(segments.doubts)
     origin = float(time[0])
     cut_times = [cut.time - origin for cut in segments.cuts]
     times = time - origin
-    W, unit, varies, knots, load_values = _load(trace, load, shown, time, signals.load_unit)
+    W, unit, varies, knots, load_values = _load(trace, load, label, time, signals.load_unit)
     cut_times = _with_corners(times, cut_times, knots - origin)
     drive, cuts = _drive(times, cut_times, speeds, knots - origin, load_values / W)
     slip = np.interp(
@@ -230,7 +230,7 @@ def recorded_run(
     changes = bool(np.ptp(friction) > 1e-9 * np.abs(friction).max())
     got = f"{friction[0]:.6g} throughout"
     advice = "it holds nothing to fit; name the channel of the shear force"
-    require(changes, f"the friction of {shown}", "vary", got, advice)
+    require(changes, f"the friction of {label}", "vary", got, advice)
     doubts += [finding.sentence for finding in signals.signs]
     doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)
@@ -240,7 +240,7 @@ def recorded_run(
             "not increase"
         )
     return RecordedRun(
-        name=shown,
+        name=label,
         time=times,
         friction=friction,
         slip=slip,
@@ -262,14 +262,19 @@ def recorded_run(
     )
 
 
+def run_name(trace: Trace) -> str:
+    """Name of a recording without another: that of its file, or "run"."""
+    return Path(str(trace.provenance.get("file") or "run")).stem
+
+
 def _named_times(
-    given: Sequence[float] | None, origin: float, times: Float, name: str
+    named: Sequence[float] | None, origin: float, times: Float, name: str
 ) -> tuple[float, ...] | None:
     """Times, from the first sample on, of samples that the user has named; None by default."""
-    if given is None:
+    if named is None:
         return None
     result = []
-    for at in given:
+    for at in named:
         k = int(np.argmin(np.abs(times - (at - origin))))
         if not 0 < k < times.size - 1:
             advice = f"it runs from {origin:.10g} s to {origin + times[-1]:.10g} s"
@@ -297,7 +302,7 @@ def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | N
     return [
         f"{level.rows.size} samples from {time[level.rows[0]]:.6g} s on are at the {level.side} "
         f"value, {level.value:.6g}: the gauge seems to be at the end of its range, and a fit to "
-        "clipped friction is wrong; give a window without"
+        "clipped friction is wrong; give a window without these samples"
         for level in saturated(values)
         # Extreme samples at the beginning or end of a recording are at rest, not clipped.
         if level.rows[0] > 0 and level.rows[-1] < values.size - 1
@@ -311,21 +316,21 @@ def strange_friction(friction: Float) -> list[str]:
     ----------
     friction : array, shape (n,)
     """
-    said = []
+    sentences = []
     usual = float(np.median(np.abs(friction)))
     if usual > _LARGEST_FRICTION:
-        said.append(
+        sentences.append(
             f"the median friction is {usual:.4g}, more than contacts have: correct the units of "
             "force and load, or the column"
         )
     rounded = coarsely_rounded(friction)
     if rounded is not None:
-        said.append(
+        sentences.append(
             f"{rounded[0]:.0%} of the values of friction repeat the one before, and others differ "
             f"from it by {rounded[1]:.2g}: it was rounded more coarsely than its noise, which may "
             "change parameters by more than the intervals say; record or write more digits"
         )
-    return said
+    return sentences
 
 
 def recorded_load(

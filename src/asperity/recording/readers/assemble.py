@@ -113,11 +113,11 @@ def _unique(names: list[str], findings: list[Finding]) -> list[str]:
         free = free_name(plain, unique)
         unique[free] = None
         if free != plain:
-            again = names[: i + 1].count(name)
+            number = names[: i + 1].count(name)
             text = (
                 f"The name '{plain}' stands on more than one column; this one is called '{free}'."
             )
-            findings.append(Finding("repeated name", "warning", again, f"column {i}", text))
+            findings.append(Finding("repeated name", "warning", number, f"column {i}", text))
     return list(unique)
 
 

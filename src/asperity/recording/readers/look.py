@@ -61,7 +61,7 @@ class _Header:
 
     @property
     def elements(self) -> int:
-        """Numbers behind the header."""
+        """Count of numbers after the header."""
         return sum(channel.elements for channel in self.channels)
 
 
@@ -83,16 +83,16 @@ def read(path: Path) -> RawRecording:
         if header.size + header.elements * np.dtype(dtype).itemsize == raw.size
     ]
     if not pairs:
-        raise refuse_truncated(path, "which has not as many numbers as its LOOK header says")
-    scores = [_sense(raw, *pair) for pair in pairs]
+        raise refuse_truncated(path, "which has another number of values than its LOOK header says")
+    scores = [_plausibility(raw, *pair) for pair in pairs]
     best = int(np.argmax(scores))
     header, dtype = pairs[best]
-    sure = all(scores[best] - s > 0.05 for i, s in enumerate(scores) if i != best)
+    unambiguous = all(scores[best] - s > 0.05 for i, s in enumerate(scores) if i != best)
     # A damaged file may hold signalling NaN.
     with np.errstate(all="ignore"):
         data = raw[header.size :].view(dtype).astype(np.float64)
     columns, findings = _columns(header, data)
-    if not sure:
+    if not unambiguous:
         text = f"The numbers were read as {dtype}, but another format makes as much sense."
         findings.append(Finding("byte order", "warning", np.dtype(dtype).itemsize, "data", text))
     columns, counted = _in_seconds(columns, header.dtime)
@@ -131,7 +131,7 @@ def _header(head: bytes, slots: int) -> _Header | None:
         elements = fields[4]
         if name is None or units is None or not 0 <= elements <= records:
             return None
-        # An empty slot of a program that does not write `no_val` holds nothing.
+        # An empty slot of a program that does not write `no_val` holds zeros.
         if name and not name.startswith(_UNUSED):
             # Like xlook: a channel without a count has all rows.
             used.append(_Channel(name, units, comment or "", elements or records))
@@ -146,10 +146,10 @@ def _text(raw: bytes) -> str | None:
     return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
 
 
-def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
+def _plausibility(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
     """Share of plausible numbers, minus the roughness of the first columns.
 
-    Half of a float64 is no sensible float32 and makes a rough column; two float32 in one float64
+    Half of a float64 is no plausible float32 and makes a rough column; two float32 in one float64
     make a column run on into the next.
     """
     item = np.dtype(dtype).itemsize
@@ -159,9 +159,9 @@ def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
         if not data.size:
             return 0.0
         size = np.abs(data)
-        sensible = np.isfinite(data) & (size > _SMALLEST) & (size < _LARGEST)
-        nothing = float((data == 0).mean())
-        share = float(sensible.mean()) + 0.5 * nothing
+        plausible = np.isfinite(data) & (size > _SMALLEST) & (size < _LARGEST)
+        zeros = float((data == 0).mean())
+        share = float(plausible.mean()) + 0.5 * zeros
         first = data[: header.channels[0].elements]
         spread = float(np.var(first))
         rough = float(np.mean(np.diff(first) ** 2)) / spread if first.size > 2 and spread else 0.0
