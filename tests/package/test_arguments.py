@@ -80,6 +80,7 @@ def test_a_value_has_the_type_of_its_annotation(kind, right, wrong) -> None:
         (Literal["auto", "explicit"], "explicitt", "did you mean 'explicit'?"),
         (tuple[Literal["auto"], ...], ["auto", "quick"], "x[1] must be one of auto, got 'quick'"),
         (FilePath, "a\0b", "x must be the path of a file"),
+        (FilePath, "a\ud800b", "x must be the path of a file"),
     ],
 )
 def test_a_value_obeys_the_rule_of_its_annotation(kind, value, sentence) -> None:

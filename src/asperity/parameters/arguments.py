@@ -7,6 +7,7 @@ Physical quantities, numbers in SI or texts with units, are checked where they a
 from __future__ import annotations
 
 import collections.abc
+import contextlib
 import inspect
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -296,14 +297,16 @@ def file_path(value: Any, label: str) -> Path:
     Raises
     ------
     InputError
-        For anything that is no path, and for a text with a NUL in it.
+        For anything that is no path, and for a text with a NUL or half a surrogate pair in it.
     """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     # File systems refuse long names with errors that differ between systems.
     if isinstance(text, str) and text and "\0" not in text and len(text) < 4000:
         path = Path(text)
-        if all(len(os.fsencode(part)) < 256 for part in path.parts):
-            return path
+        # Half a surrogate pair names no file.
+        with contextlib.suppress(UnicodeEncodeError):
+            if all(len(os.fsencode(part)) < 256 for part in path.parts):
+                return path
     value = value if text is None else text
     short = isinstance(value, str | bytes) and len(value) < 60
     what = repr(value) if short else shown(value)
