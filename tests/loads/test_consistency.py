@@ -69,13 +69,6 @@ class OtherAmplitude(Skewed):
         return self.a
 
 
-class NotEven(Skewed):
-    even = True
-
-    def at(self, theta):
-        return super().at(theta + 1.0)
-
-
 class NotScaled(Skewed):
     def scaled(self, share):
         return self
@@ -95,7 +88,6 @@ class Fails(Skewed):
         (SlopeInTime, "w_slope as the derivative of w with respect to theta"),
         (NoShearSlope, "shear_slope as the derivative of shear"),
         (OtherAmplitude, "that of the first harmonic of W/W0, 0.535898, got 0.5"),
-        (NotEven, "even must be False"),
         (Fails, r"work on arrays of jax.numpy, got AttributeError .*'b'"),
         (NotScaled, r"scaled\(0\) must be a constant load"),
     ],
@@ -140,8 +132,6 @@ def test_pulses_of_any_width_pass(a: float) -> None:
 
 def test_a_load_with_a_kink_passes() -> None:
     class Triangle(Skewed):
-        even = True
-
         def at(self, theta):
             x = jnp.abs(jnp.mod(theta + jnp.pi, 2 * jnp.pi) - jnp.pi) / jnp.pi
             rising = jnp.mod(theta, 2 * jnp.pi) > jnp.pi

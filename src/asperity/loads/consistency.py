@@ -122,13 +122,6 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
             f"{name}.scaled(0) must be a constant load, W/W0 = 1, got one that changes; multiply "
             "the strength by the share"
         )
-    # Samples at theta and at 2 pi - theta.
-    odd = max(np.abs(v[1:] - v[:0:-1]).max() for v in (w, values["shear"], pull))
-    if modulation.even and odd > _MEAN:
-        return (
-            f"{name}.even must be False for a load that is not even in theta, got True; leave the "
-            "member out"
-        )
     return ""
 
 

@@ -63,11 +63,6 @@ class Modulation(eqx.Module):
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
 
     @property
-    def even(self) -> bool:
-        """Whether load, shear force and pulling velocity are known to be even in theta."""
-        return False
-
-    @property
     @abstractmethod
     def formula(self) -> str:
         """What is modulated and how, as a text for provenance."""
@@ -95,11 +90,6 @@ class Harmonic(Modulation):
     def amplitude(self) -> ArrayLike:
         """Relative amplitude epsilon."""
         return self.epsilon
-
-    @property
-    def even(self) -> bool:
-        """True: there is a cosine only."""
-        return True
 
     @property
     def formula(self) -> str:
@@ -143,12 +133,6 @@ class Periodic(Modulation):
     def amplitude(self) -> ArrayLike:
         """Amplitude of the first harmonic of the load; 0 where the load is constant."""
         return jnp.hypot(*self.load[0]) if self.load else 0.0
-
-    @property
-    def even(self) -> bool:
-        """Whether there are no sines."""
-        series = (*self.load, *self.shear, *self.pull)
-        return not any(np.any(sine) for _, sine in series)
 
     @property
     def formula(self) -> str:
