@@ -77,7 +77,6 @@ def registered() -> dict[str, type[Law]]:
     return dict(_LAWS)
 
 
-@typed
 def symbols_of(names: Names, *laws: type[Law]) -> Symbols:
     """Names of parameters in a set of names, for `asperity.errors.naming`.
 
@@ -90,6 +89,7 @@ def symbols_of(names: Names, *laws: type[Law]) -> Symbols:
     return lambda name: display_name(name, names, *laws, *registered().values())
 
 
+@typed
 def get_law(name: str) -> type[Law]:
     """Look a law up by name: one of the package, registered, or of an installed package.
 
