@@ -60,8 +60,8 @@ def _threshold(machine: Machine, read: FigureNumbers) -> dict[str, Any]:
     for variant in variants(machine):
         curves = [f"{variant}, {speed}" for speed in SPEEDS]
         low, high = np.array([_bracket(read.curve(curve)) for curve in curves]).T
-        found = thresholds(machine, variant, np.array(machine.velocities), (low, high))
-        crossed |= dict(zip(curves, found, strict=True))
+        limits = thresholds(machine, variant, np.array(machine.velocities), (low, high))
+        crossed |= dict(zip(curves, limits, strict=True))
     return {"threshold": crossed.__getitem__}
 
 

@@ -216,11 +216,11 @@ def compare(
         got = f"'{symbol(nobodys[0])}', which none of {', '.join(dict.fromkeys(laws))} has"
         raise InputError("free", rule, got, "leave it out, or add a law with it")
     several = listed_data(data, options.get("runs") or RunOptions())
-    own = {
+    free_by_law = {
         name: (
             free_by_default(get_law(name), several, options.get("fixed"), options.get("material"))
             if free is None
-            else _own_parameters(name, free, laws)
+            else _applicable(name, free, laws)
         )
         for name in dict.fromkeys(laws)
     }
@@ -232,7 +232,7 @@ def compare(
     }
     not_compared: dict[str, str] = {}
 
-    work = _STEPS * len(own) * (2 if evidence else 1)
+    work = _STEPS * len(free_by_law) * (2 if evidence else 1)
 
     def report(laws: float) -> None:
         if progress is not None:
@@ -245,11 +245,11 @@ def compare(
     ) -> dict[str, Fit]:
         done: dict[str, Fit] = {}
         # Special cases are fitted before the laws that contain them, whose fits start there.
-        ordered = sorted(own.items(), key=lambda pair: len(_parameters(pair[0])))
+        ordered = sorted(free_by_law.items(), key=lambda pair: len(_parameters(pair[0])))
         ordered = [pair for pair in ordered if before is None or pair[0] in before]
         for k, (name, names) in enumerate(ordered):
             mine: dict[str, Any] = {
-                key: {n: values[n] for n in _own_parameters(name, list(values), laws)}
+                key: {n: values[n] for n in _applicable(name, list(values), laws)}
                 for key, values in given.items()
             }
             if before and before[name].converged:
@@ -291,7 +291,9 @@ def compare(
     ) * bool(not_compared)
     verdict = doubt + result.verdict + stretches + _with_free_stiffness(result) + lacking
     result = replace(result, not_compared=not_compared, verdict=verdict)
-    return _with_evidence(result, lambda laws: report(len(own) + laws)) if evidence else result
+    return (
+        _with_evidence(result, lambda laws: report(len(free_by_law) + laws)) if evidence else result
+    )
 
 
 def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
@@ -301,16 +303,16 @@ def _better_at_extension(fits: Mapping[str, Fit]) -> dict[str, Fit]:
     the law describes the table worse at that minimum.
     """
     missed = {}
-    for name, own in fits.items():
-        objective = own.objective
+    for name, result in fits.items():
+        objective = result.objective
         for other in fits.values():
-            if not (own.converged and other.converged and objective.has_table):
+            if not (result.converged and other.converged and objective.has_table):
                 continue
             extended = extends(other.objective.law, objective.law)
             extended &= set(objective.names) <= set(other.values)
-            if not extended or other.chi2 > own.chi2 - GAIN:
+            if not extended or other.chi2 > result.chi2 - GAIN:
                 continue
-            here, there = (objective.chi2(objective.coordinates(f.values)) for f in (own, other))
+            here, there = (objective.chi2(objective.coordinates(f.values)) for f in (result, other))
             if there < here - GAIN:
                 missed[name] = other
     return missed
@@ -444,10 +446,10 @@ def _parameters(law: str) -> Collection[str]:
     return law_parameters(get_law(law))
 
 
-def _own_parameters(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
+def _applicable(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in _parameters(law)}
-    own = _parameters(name)
-    return [p for p in free if p in own or p not in others]
+    known = _parameters(name)
+    return [p for p in free if p in known or p not in others]
 
 
 def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:

@@ -195,15 +195,17 @@ def probability_of_deciding(jacobian: Float, rival: Misfit, readings: Float, see
     apart = (rival.residual[rows] * root).ravel()
     data = round(float(readings[rows].sum())) * rival.residual.shape[1]
     q = rival.prior_residual.size
-    own = (jacobian[rows] * root[..., None]).reshape(apart.size, -1)
-    theirs = (rival.jacobian[rows] * root[..., None]).reshape(apart.size, -1)
+    law_columns = (jacobian[rows] * root[..., None]).reshape(apart.size, -1)
+    rival_columns = (rival.jacobian[rows] * root[..., None]).reshape(apart.size, -1)
     apart = np.concatenate([apart, rival.prior_residual])
-    own = np.vstack([own, np.zeros((q, own.shape[1]))])
-    theirs = np.vstack([theirs, rival.prior_jacobian])
+    law_columns = np.vstack([law_columns, np.zeros((q, law_columns.shape[1]))])
+    rival_columns = np.vstack([rival_columns, rival.prior_jacobian])
     noise = np.random.default_rng(seed).normal(size=(_DRAWS, apart.size))
     noise[:, apart.size - q :] = 0.0
-    difference = _outside(theirs, apart - noise) - _outside(own, noise)
-    behind = difference + penalty(theirs.shape[1], data) - penalty(own.shape[1], data)
+    difference = _outside(rival_columns, apart - noise) - _outside(law_columns, noise)
+    behind = (
+        difference + penalty(rival_columns.shape[1], data) - penalty(law_columns.shape[1], data)
+    )
     return float((behind >= EXCLUDED).mean())
 
 

@@ -410,13 +410,13 @@ def _rivals(
     objective: Objective, minima: Sequence[tuple[Float, float]], sd: Float
 ) -> list[tuple[Float, float]]:
     """Other minima that the data do not exclude and that differ in the parameters of interest."""
-    asked = np.array([not k.nuisance for k in objective.unknowns])
+    of_interest = np.array([not k.nuisance for k in objective.unknowns])
     kept = [minima[0]]
     for u, chi2 in minima[1:]:
         if chi2 - minima[0][1] > RIVAL:
             continue
         # Minima that differ only in nuisances, such as the times of steps, are the same answer.
-        away = [(np.abs(u - v)[asked] / sd[asked]).max(initial=0.0) for v, _ in kept]
+        away = [(np.abs(u - v)[of_interest] / sd[of_interest]).max(initial=0.0) for v, _ in kept]
         if min(away) >= _NEAR:
             kept.append((u, chi2))
     return kept[1:]

@@ -223,8 +223,8 @@ def fit(
     if not recordings:
         other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
         return replace(result, warnings=(*result.warnings, other)) if other else result
-    said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
-    said += unusual_numbers(result, recordings)
+    warnings = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
+    warnings += unusual_numbers(result, recordings)
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
@@ -242,8 +242,8 @@ def fit(
             starts=1,
             seed=seed,
         )
-        said += contradicted_stiffness(result, freed, recordings, given)
-    return replace(result, warnings=(*said, *result.warnings))
+        warnings += contradicted_stiffness(result, freed, recordings, given)
+    return replace(result, warnings=(*warnings, *result.warnings))
 
 
 class _Given(NamedTuple):
@@ -446,7 +446,7 @@ def _objective(
             unknowns.append(shared_stiffness(recordings, begun, priors))
         if "mu0" in free and table is None:
             options = replace(options, linear=tuple(n for n in options.linear if n != "offset"))
-        own, nuisances = run_terms(
+        terms_of_runs, nuisances = run_terms(
             recordings,
             law,
             {n: v for n, v in constants.items() if np.ndim(v) == 0},
@@ -458,7 +458,7 @@ def _objective(
             options=options,
             motion=motion,
         )
-        terms += own
+        terms += terms_of_runs
         unknowns += nuisances
     # The start of a K that is fixed has no influence.
     of_free = {n: v for n, v in (given.start or {}).items() if not (n == "K" and recordings)}

@@ -359,5 +359,5 @@ def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float
 
 def extends(law: type[Law], other: type[Law]) -> bool:
     """Whether a law has the parameters of another law and extending parameters, which may be 0."""
-    own, others = set(law_parameters(law)), set(law_parameters(other))
-    return others < own and own - others <= set(_EXTENSIONS)
+    names, others = set(law_parameters(law)), set(law_parameters(other))
+    return others < names and names - others <= set(_EXTENSIONS)

@@ -52,27 +52,28 @@ def contradicted_stiffness(
         if n in fit.values and n in freed.values
     )
     moved = f", which gives {moved}" if moved else ""
-    own, said = [], []
+    stiffnesses, sentences = [], []
     for run in runs:
         K = freed.parameters["K" if len(runs) == 1 else f"K[{run.name}]"]
         low, high = K.interval_95
-        found = f"{run.name} has {K.value:.4g} ({low:.4g} to {high:.4g}, 95 %)"
+        measured = f"{run.name} has {K.value:.4g} ({low:.4g} to {high:.4g}, 95 %)"
         if given is None:
-            own.append(f"{found}, {K.value / fit.values['K']:.3g} times it")
+            stiffnesses.append(f"{measured}, {K.value / fit.values['K']:.3g} times it")
         elif not low <= (fixed := stiffness_in(run, given)) <= high:
-            said.append(
-                f"the fixed {symbol('K')} of {fixed:.4g} {K.unit} is contradicted: {found}; AICc "
-                f"falls by {gain:.3g} with {symbol('K')} free{moved}; "
+            sentences.append(
+                f"the fixed {symbol('K')} of {fixed:.4g} {K.unit} is contradicted: {measured}; "
+                f"AICc falls by {gain:.3g} with {symbol('K')} free{moved}; "
                 f"leave {symbol('K')} free, or give it a prior"
             )
     if given is None:
         shared = fit.parameters["K"]
-        said.append(
+        sentences.append(
             f"the {symbol('K')} of {shared.value:.4g} {shared.unit} that the recordings share is "
-            f"contradicted: {', '.join(own)}; AICc falls by {gain:.3g} with a {symbol('K')} for "
-            f"each{moved}; leave {symbol('K')} out of the free parameters, so that each has its own"
+            f"contradicted: {', '.join(stiffnesses)}; AICc falls by {gain:.3g} with a "
+            f"{symbol('K')} for each{moved}; leave {symbol('K')} out of the free parameters, so "
+            "that each has its own"
         )
-    return said
+    return sentences
 
 
 def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
@@ -92,17 +93,17 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
         if name is not None:
             numbers.append((f"{name}/W0", fit.values[name] / run.W0, "1/m"))
             ranges[f"{name}/W0"] = _FAR_STIFFNESS
-    said = []
+    sentences = []
     for name, value, unit in numbers:
         low, high = ranges[name]
         if not low <= value <= high:
-            said.append(
+            sentences.append(
                 f"{symbol(name)} of {value:.3g} {unit}".rstrip()
                 + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
                 "units and signs of displacement, force and load, and look at a picture of the "
                 "recording with the motion"
             )
-    return said
+    return sentences
 
 
 #: A law does not describe a table if the probability of chi-squared is below the first number; with
@@ -129,11 +130,11 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
         return ""
     (term,), (K,) = tables, given.tolist()
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
-    (own,) = unknowns_of(objective.law, ["K"], start={"K": K}, priors={})
+    (stiffness,) = unknowns_of(objective.law, ["K"], start={"K": K}, priors={})
     free = replace(
         objective,
         terms=(LockInTerm(term.table, objective.law, fixed, **term.motion),),
-        unknowns=(*objective.unknowns, own),
+        unknowns=(*objective.unknowns, stiffness),
         fixed=fixed,
     )
     # Starts: special cases, random starts, and the estimate with the given stiffness.

@@ -66,12 +66,12 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
     InputError
         If `rate` is not positive, or leaves fewer than 16 blocks.
     """
-    asked = checked_rate(rate)
-    if run.blocks is not None or asked == math.inf:
+    wanted = checked_rate(rate)
+    if run.blocks is not None or wanted == math.inf:
         return run
-    if asked is None and run.time.size <= LONGEST:
+    if wanted is None and run.time.size <= LONGEST:
         return run
-    length = None if asked is None else 1 / asked
+    length = None if wanted is None else 1 / wanted
     if length is not None:
         shortest = min(
             step * (b - a) for step, (a, b) in zip(_intervals(run), run.stretches, strict=True)

@@ -546,8 +546,8 @@ def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> lis
     for cut in cut_times:
         k = int(np.clip(np.searchsorted(times, cut), 1, times.size - 1))
         corner = float(knots[np.argmin(np.abs(knots - cut))])
-        beside = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
-        moved.append(corner if beside else cut)
+        close = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
+        moved.append(corner if close else cut)
     return sorted(set(moved)) if len(set(moved)) == len(moved) else list(cut_times)
 
 

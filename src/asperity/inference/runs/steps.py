@@ -172,8 +172,8 @@ def integrated(
 
         after, result = jax.vmap(one, 0, 1)(part)
 
-        def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
-            return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
+        def onwards(dy: Array, block: Array) -> tuple[Array, Array]:
+            return block[:count] + jnp.sum(dy[:, :, None] * block[count:], axis=1), dy
 
         change, before = jax.lax.scan(onwards, change, jnp.moveaxis(after, 1, 0))
         by_states = jnp.moveaxis(before, 0, 1)[..., None, None]

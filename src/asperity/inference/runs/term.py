@@ -363,56 +363,56 @@ class RunTerm(DataTerm):
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
         """Warnings about the noise, wrong samples, jumps, and misfit after changes."""
-        said = []
+        sentences = []
         if self._whiteness < _NOT_WHITE:
-            said.append(
+            sentences.append(
                 f"the noise of {self.name} is not the autoregressive process that was fitted (p = "
                 f"{self._whiteness:.2g} for white innovations): the intervals may be too narrow; "
                 "look at the residual, leave out stretches, or give a window"
             )
         effective = float(self.noise["effective_samples"])
         if effective < 3 * (len(self.linear) + 4):
-            said.append(
+            sentences.append(
                 f"the noise of {self.name} is so slow that its {self.run.time.size} samples count "
                 f"as {max(effective, 1):.2g} independent of each other: the intervals are rough; "
                 f"give a longer window, or {Argument('drift')} if friction drifts with time"
             )
         if self.run.spikes:
-            said.append(
+            sentences.append(
                 self._sentence_on(self.run.spikes, "sample", "is a spike", "are spikes")
                 + ", which no motion of the slider makes; replaced by the line between the "
                 "neighbours"
             )
         what = "sample" if self.run.blocks is None else "mean"
         if self.run.wrong:
-            said.append(
+            sentences.append(
                 self._sentence_on(self.run.wrong, what, "is", "are")
                 + f" farther from the motion of {self.law.name} than noise reaches, and left out: "
                 "if friction itself is so, the law or the drive is not that of the recording"
             )
         if self._alone:
-            said.append(
+            sentences.append(
                 self._sentence_on(self._alone, what, "says", "say")
                 + " alone when the velocity of the drive changes there, because friction jumps "
                 "between two samples: the intervals are those without it; sample faster"
             )
         if self.run.jumps:
             times = ", ".join(f"{t:.6g}" for t in self.run.jumps)
-            said.append(
+            sentences.append(
                 f"{self.name} jumps by itself at {times} s after the first sample, as a gauge does "
                 "that slips or is moved: its level there is fitted; look at the recording, or give "
                 "a window without it"
             )
         chance, size = self._after_changes
         if self.law_fails_after_changes:
-            said.append(
+            sentences.append(
                 f"what {self.name} shows just after changes of its drive is {size:.2g} times "
                 f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
                 f"({Argument('gauge')}), the drive or its times are not those of the recording, or "
                 "a sample there is wrong, and intervals do not hold"
             )
-        said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
-        return said
+        sentences += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
+        return sentences
 
     def _sentence_on(self, times: Sequence[float], what: str, one: str, several: str) -> str:
         shown = ", ".join(f"{time:.6g}" for time in times[:_NAMED])

@@ -206,10 +206,10 @@ def _bend(
     rule = "have one slope of the force over the displacement"
     _require_straight(bend, bend_se, rule, "one that changes by {:.1%}", low, high)
     clock = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
-    own = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
-    if own.std() > _INDEPENDENT_SHARE * clock.std():
-        coefficients, covariance = _least_squares(np.column_stack([square, own]), F)
-        scale = float(np.ptp(own)) / (2 * slope)
+    unexplained = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
+    if unexplained.std() > _INDEPENDENT_SHARE * clock.std():
+        coefficients, covariance = _least_squares(np.column_stack([square, unexplained]), F)
+        scale = float(np.ptp(unexplained)) / (2 * slope)
         apart, apart_se = scale * coefficients[3], scale * math.sqrt(covariance[3, 3])
         rule = "have one line of the force on the ways back and forth"
         _require_straight(

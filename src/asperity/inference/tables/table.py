@@ -260,8 +260,8 @@ def _columns(
 
 def _is_read(name: str) -> bool:
     """Whether the reader knows a column; other columns are ignored."""
-    said = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
-    return name in (*_TEXTS, *_OF_EPSILON) or (bool(said) and name not in _OF_RESPONSES)
+    known = canonical_name(name, _known()) or _observable_of(name) or name.endswith("_cov")
+    return name in (*_TEXTS, *_OF_EPSILON) or (bool(known) and name not in _OF_RESPONSES)
 
 
 def _unit_in_si(shown: str, name: str, unit: str) -> float:

@@ -187,9 +187,10 @@ class LockInTerm(DataTerm):
 
     def weighted(self, weights: Float) -> LockInTerm:
         """The term with the residuals of each row multiplied by a weight, shape (rows,)."""
-        result, own = copy(self), self.weights
-        result._weights = own._replace(
-            matrix=own.matrix * weights[:, None, None], target=own.target * weights[:, None]
+        result, weights_now = copy(self), self.weights
+        result._weights = weights_now._replace(
+            matrix=weights_now.matrix * weights[:, None, None],
+            target=weights_now.target * weights[:, None],
         )
         return result
 
@@ -249,10 +250,10 @@ class LockInTerm(DataTerm):
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
         """Warnings about outliers, and about weak amplitudes without a phase."""
-        said = list(self.table.remarks)
+        sentences = list(self.table.remarks)
         if outliers:
             named = " and ".join(str(self.table.row_names[row]) for row in outliers)
-            said.append(
+            sentences.append(
                 f"without {named} chi-squared would be as it should be: "
                 f"{'that is an outlier' if len(outliers) == 1 else 'those are outliers'}, which "
                 "may shift every estimate; check the measurement, or fit without it"
@@ -266,7 +267,7 @@ class LockInTerm(DataTerm):
             # Other readings may be off only because the fit follows the outliers.
             few = beyond[np.isin(residuals.row[beyond], outliers)]
         for j in sorted(few, key=lambda j: -apart[j])[:5]:
-            said.append(
+            sentences.append(
                 f"{residuals.observable[j]} of {self.table.row_names[residuals.row[j]]} is "
                 f"{apart[j]:.3g} standard uncertainties off, more than chance allows; check that "
                 "reading"
@@ -276,12 +277,12 @@ class LockInTerm(DataTerm):
             if name in self.table.values and f"phase{n}" not in self.table.values:
                 weak = self.table.values[name] < 3 * self.table.errors[name]
                 if weak.any():
-                    said.append(
+                    sentences.append(
                         f"{int(weak.sum())} readings of {name} are below three standard "
                         f"uncertainties and have no phase{n}: an amplitude so small is biased "
                         "upwards"
                     )
-        return said
+        return sentences
 
     def _function(self, *, search: bool, coarse: bool) -> ResponseFunction:
         return self._functions[("coarse" if coarse else "direct") if search else False]

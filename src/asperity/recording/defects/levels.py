@@ -109,9 +109,9 @@ def recorder_step(values: Float, repeated: float = 0.05) -> float:
     steps, equal = _steps(values)
     if np.count_nonzero(equal) <= repeated * equal.size or equal.all():
         return 0.0
-    beside = ~equal
-    beside[1:-1] &= equal[:-2] | equal[2:]
-    return float(np.quantile(steps[beside], _LEAST))
+    adjacent = ~equal
+    adjacent[1:-1] &= equal[:-2] | equal[2:]
+    return float(np.quantile(steps[adjacent], _LEAST))
 
 
 def _steps(values: Float) -> tuple[Float, Bool]:

@@ -199,20 +199,20 @@ def healing_scales_as_b(laboratory: Laboratory) -> Numbers:
 @check("long-hold-limit")
 def long_hold_limit(laboratory: Laboratory) -> Numbers:
     """theta/t, and V over the drive's, towards a hold of 1e5 s at both springs."""
-    found: Numbers = {}
+    numbers: Numbers = {}
     times = np.array([1e3, 1e4, 1e5])
     for label, (k, V) in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
         held = laboratory.holds(AGEING, k, V, times)
         age = np.exp(held.states[:, 1]) * laboratory.numbers.D0 / laboratory.numbers.V0
         growth = 1 - held.end_velocity * age / laboratory.numbers.D0
-        found |= {
+        numbers |= {
             f"V falls, {label}": float(np.min(-np.diff(np.log(held.end_velocity)))),
             f"rate rises, {label}": float(np.min(np.diff(growth))),
             f"rate at 1e5 s, {label}": float(growth[-1]),
             f"theta/t at 1e5 s, {label}": float(age[-1] / times[-1]),
             f"V/Vl at 1e5 s, {label}": float(held.end_velocity[-1] / V),
         }
-    return found
+    return numbers
 
 
 @check("rises-with-velocity")
