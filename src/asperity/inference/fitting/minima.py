@@ -190,9 +190,10 @@ def _by_few_rows(
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
     chi2 = objective.chi2_of_many(np.array(drawn))
     if far_off:
-        end = _minimised_beside(objective, drawn[int(np.argmin(chi2))], [], far_off=True)
-        return [end] if math.isfinite(end.chi2) else []
-    ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
+        end = _minimised_near(objective, drawn[int(np.argmin(chi2))], [], far_off=True)
+        ends = [end] if math.isfinite(end.chi2) else []
+    else:
+        ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
     return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
 
 
@@ -235,7 +236,7 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
             # Transients do not reach orbits that are hardly stable; continuation does, in up to
             # seconds a row.
             objective.search_wholly(near.u)
-        minima.append(_minimised_beside(objective, near.u, minima, far_off=far_off))
+        minima.append(_minimised_near(objective, near.u, minima, far_off=far_off))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
 
@@ -275,11 +276,11 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
             ]
             if apart:
                 u = min(apart, key=_CHI2).u
-                others.append(_minimised_beside(objective, u, [*minima, *others]))
+                others.append(_minimised_near(objective, u, [*minima, *others]))
     return sorted([*minima, *others], key=_CHI2)
 
 
-def _minimised_beside(
+def _minimised_near(
     objective: Objective, u: Float, minima: Sequence[Minimum], *, far_off: bool = False
 ) -> Minimum:
     """The minimum reached from u, precise only if it may be one of those that a fit reports."""
@@ -287,8 +288,8 @@ def _minimised_beside(
         evaluations = _FIRST_EVALUATIONS if far_off else _EVALUATIONS
         near = objective.minimise(u, tolerance=_COARSE_TOLERANCE, evaluations=evaluations)
         lowest = min((m.chi2 for m in minima), default=math.inf)
-        again = near.chi2 > lowest and any(_apart(near, m) < _SAME_COARSE for m in minima)
-        if far_off or again or near.chi2 > lowest + RIVAL:
+        repeats = near.chi2 > lowest and any(_apart(near, m) < _SAME_COARSE for m in minima)
+        if far_off or repeats or near.chi2 > lowest + RIVAL:
             return near
         u = near.u
     return objective.minimise(u)
