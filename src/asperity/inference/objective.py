@@ -31,9 +31,9 @@ CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
 #: A coordinate closer to its bound than this is at the bound.
 _AT_BOUND = 1e-6
-#: Relative change of the coordinates at which a minimisation by the coarse model ends; the exact
-#: model continues from there.
-_COARSE = 1e-4
+#: Relative change of the coordinates at which a minimisation by the coarse model ends. The exact
+#: model continues from there: its minimum is farther away.
+_COARSE = 1e-3
 #: Relative decrease of chi-squared that is negligible: with chi-squared of 100, a ten-thousandth of
 #: a standard error. Orbits on the mesh are no more accurate.
 _NEGLIGIBLE = 1e-10

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
 from operator import attrgetter
 
 import numpy as np
@@ -188,11 +189,12 @@ def _by_few_rows(
     if minima or (again and far_off):
         return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
-    chi2 = objective.chi2_of_many(np.array(drawn))
     if far_off:
-        end = _minimised_near(objective, drawn[int(np.argmin(chi2))], [], far_off=True)
-        ends = [end] if math.isfinite(end.chi2) else []
+        best_first = (drawn[i] for i in np.argsort(chi2))
+        solved = (u for u in best_first if math.isfinite(objective.chi2(u)))
+        ends = [_minimised_near(objective, u, [], far_off=True) for u in islice(solved, 1)]
     else:
+        chi2 = objective.chi2_of_many(np.array(drawn))
         ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
     return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
 
