@@ -32,6 +32,53 @@ def test_a_quantised_sine_is_saturated_only_if_it_is_cut_off(step):
     assert len(saturated(np.minimum(values, 0.5))) == 1
 
 
+@pytest.mark.parametrize("samples", [5, 8, 12, 31])
+@pytest.mark.parametrize("noise", [1e-4, 0.01])
+def test_a_narrow_peak_that_is_cut_off_is_saturated(samples, noise):
+    """One sample of each period is cut off, so that no two of them are neighbours."""
+    random = np.random.default_rng(samples)
+    phase = 2 * np.pi * np.arange(100 * samples) / samples
+    values = np.cos(phase) + noise * random.normal(size=phase.size)
+    assert saturated(values) == []
+    level = min((1 + np.cos(2 * np.pi / samples)) / 2, 1 - 5 * noise)
+    (top,) = saturated(np.minimum(values, level))
+    assert set(range(0, phase.size, samples)) <= set(top.rows)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-4, 2e-3])
+@pytest.mark.parametrize("samples", [16, 25, 40])
+def test_equal_samples_in_a_row_are_saturated_without_noise(samples, step):
+    """All periods are equal, so that every level is as frequent as the extreme."""
+    phase = 2 * np.pi * (np.arange(60 * samples) % samples) / samples
+    values = np.cos(phase) + 0.2 * np.cos(2 * phase)
+    clipped = np.minimum(values, 0.75)
+    if step:
+        values, clipped = (step * np.round(x / step) for x in (values, clipped))
+    assert saturated(values) == []
+    (top,) = saturated(clipped)
+    np.testing.assert_array_equal(top.rows, np.flatnonzero(clipped == clipped.max()))
+
+
+def test_equal_maxima_of_periods_are_not_saturated_without_noise():
+    """cos is 1 exactly at each maximum, and differs in its last digits elsewhere."""
+    values = np.cos(2 * np.pi * np.arange(8000) / 8)
+    assert np.count_nonzero(values == 1) > 100
+    assert np.unique(values).size > 100
+    assert saturated(values) == []
+
+
+def test_spikes_of_one_value_are_not_saturated_and_hide_no_saturation():
+    random = np.random.default_rng(5)
+    values = np.sin(np.arange(4000) / 3) + 0.01 * random.normal(size=4000)
+    clipped = np.minimum(values, 0.8)
+    at = np.arange(100, 4000, 390)
+    values[at] = clipped[at] = 12.0
+    np.testing.assert_array_equal(spikes(values), at)
+    assert saturated(values, spikes=at) == []
+    (top,) = saturated(clipped, spikes=at)
+    np.testing.assert_array_equal(top.rows, np.flatnonzero(clipped == 0.8))
+
+
 def test_rounding_is_coarse_where_the_noise_is_finer():
     random = np.random.default_rng(1)
     values = np.cumsum(0.002 * random.normal(size=2000))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Bool, Float, Index
-from asperity.recording.defects.levels import CROWDED, saturated
+from asperity.recording.defects.levels import CROWDED, NONE, saturated
 from asperity.recording.defects.sampling import check_sampling, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding, Severity, at_row
@@ -67,8 +67,9 @@ def check(trace: Trace) -> tuple[Finding, ...]:
         findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
         for name, channel in trace.channels.items():
             findings += _missing(channel.values, trace.time, name)
-            findings += saturation(channel.values, trace.time, name)
-            findings += _spikes(channel.values, trace.time, name)
+            at = spikes(channel.values)
+            findings += saturation(channel.values, trace.time, name, at=at)
+            findings += _spikes(channel.values, trace.time, name, at)
     return tuple(findings)
 
 
@@ -89,7 +90,9 @@ def _missing(values: Float, time: Float, name: str) -> list[Finding]:
     return findings
 
 
-def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) -> list[Finding]:
+def saturation(
+    values: Float, time: Float, name: str, crowded: float = CROWDED, at: Index = NONE
+) -> list[Finding]:
     """Findings ``"saturation"`` for the top and the bottom, or ``"constant"``.
 
     Parameters
@@ -99,6 +102,8 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
         Name of the channel.
     crowded : float
         As in `saturated`.
+    at : array of int
+        Samples that are spikes.
     """
     finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
     if finite.size < 2:
@@ -107,7 +112,7 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
         text = f"'{name}' has one and the same value in the whole recording."
         return [Finding("constant", "note", float(finite[0]), at_row(name, 0, time), text)]
     findings = []
-    for side, value, rows, usual in saturated(values, crowded):
+    for side, value, rows, usual in saturated(values, crowded, at):
         text = (
             f"{rows.size} of {values.size} samples of '{name}' have exactly its {side} value, "
             f"{value:.6g}, and at most {usual} have a neighbouring value: saturated, or held "
@@ -118,12 +123,11 @@ def saturation(values: Float, time: Float, name: str, crowded: float = CROWDED) 
     return findings
 
 
-def _spikes(values: Float, time: Float, name: str) -> list[Finding]:
+def _spikes(values: Float, time: Float, name: str, at: Index) -> list[Finding]:
     """Finding ``"spike"``, for samples that differ from the samples before and after them.
 
     A step, a slip event or a change of the amplitude differs on one side only, and is no spike.
     """
-    at = spikes(values)
     if not at.size:
         return []
     first = int(at[0])
@@ -172,8 +176,8 @@ def rows_to_avoid(time: Float, columns: Sequence[Float], kept: Bool | None = Non
     if kept is not None:
         avoided.append(np.flatnonzero(np.diff(np.flatnonzero(kept)) > 1) + 1)
     for values in columns:
-        avoided.append(spikes(values))
-        for level in saturated(values):
-            # A single largest value is not saturated: saturated samples follow each other.
-            avoided.append(level.rows[1:][np.diff(level.rows) == 1])
+        at = spikes(values)
+        avoided.append(at)
+        # A run of usable samples ends after a saturated one.
+        avoided += [level.rows for level in saturated(values, spikes=at)]
     return np.unique(np.concatenate(avoided))
