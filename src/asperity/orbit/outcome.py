@@ -14,9 +14,9 @@ from asperity.arrays import Float
 class Outcome(IntEnum):
     """Outcome of a periodic solve.
 
-    FOLDED, RUNAWAY and SENSITIVE are results, not failures of a method: the branch of orbits that
-    begins with steady sliding does not reach the requested amplitude, or reaches it only through
-    orbits that no computation and no experiment could stay on. Orbits that are not connected to
+    FOLDED, RUNAWAY, RESTS and SENSITIVE are results, not failures of a method: the branch of
+    orbits that begins with steady sliding does not reach the requested amplitude, or reaches it
+    only through orbits that no computation and no experiment could stay on. Orbits that are not connected to
     steady sliding may exist. OUT_OF_RANGE is given without a search.
     """
 
@@ -29,6 +29,7 @@ class Outcome(IntEnum):
     SENSITIVE = 6
     INVALID = 7
     OUT_OF_RANGE = 8
+    RESTS = 9
 
 
 #: Smallest and largest rate of a disturbance of steady sliding, per radian of the modulation, at
@@ -42,7 +43,9 @@ LARGEST_GROWTH = 15.0
 LARGEST_UNLOADING = 0.999
 
 #: Outcomes of a branch from steady sliding without an orbit; another branch may have one.
-WITHOUT_ORBIT = (Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE)
+WITHOUT_ORBIT = (
+    *(Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE, Outcome.RESTS),
+)
 
 _SENTENCES = {
     Outcome.CONVERGED: "converged",
@@ -71,6 +74,12 @@ _SENTENCES = {
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
         "for part of the period that a disturbance grows by more than e^15, so that no computation "
         "and no experiment can follow it; lower epsilon or stiffen the spring"
+    ),
+    Outcome.RESTS: (
+        "on the branch from steady sliding the slider comes to rest once a period from epsilon = "
+        "{detail:.3g} on, where its velocity has no logarithm: inertia without elastic asperities "
+        "takes it as a state; lower epsilon, leave inertia out, or take a law that is smooth at "
+        "rest, such as 'regularised'"
     ),
     Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }

@@ -11,11 +11,14 @@ from functools import partial
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
 from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Float, Index
+from asperity.loads import Excitation
 from asperity.orbit.batches import put, run_chunks, take
 from asperity.orbit.mesh.arclength import (
     MOVING,
@@ -50,6 +53,10 @@ MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
+
+#: Direct effect, over that of steady sliding, at whose smallest value over the period the slider
+#: comes to rest: the share reached is then as close to that at which it does.
+_AT_REST = 1e-6
 
 #: Distance from the requested amplitude below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
@@ -126,6 +133,8 @@ class MovingBranches(Curves):
         Largest share on the branch.
     fastest : array, shape (points,)
         Largest exponent of the slip rate of the last orbit.
+    rests : bool array, shape (points,)
+        Whether the branch ends because the slider comes to rest.
     limit : array, shape (points,)
         Share at which pulses would reach e^`RUNAWAY`, extrapolated from their latest growth; inf
         where they do not grow.
@@ -150,6 +159,7 @@ class MovingBranches(Curves):
         zero = np.zeros_like(pair.t_before)
         self.span, self.fold, self.limit = zero + _FIRST, zero + np.nan, zero + np.inf
         self.farthest, self.fastest = zero.copy(), zero.copy()
+        self.rests = np.zeros(zero.shape, dtype=bool)
         self.watched_share, self.watched_exponent = zero.copy(), zero.copy()
 
     @property
@@ -216,7 +226,12 @@ class MovingBranches(Curves):
         share = self.share[rows]
         self.farthest[rows] = np.maximum(self.farthest[rows], share)
         self._watch(rows, share)
-        return ["" if goes_on else "ended" for goes_on in continues(share, self.fastest[rows])]
+        goes_on = continues(share, self.fastest[rows])
+        if "log_velocity" in self.line.origin.system.mechanical:
+            line, orbit = take((self.line, self.pair.point.orbit), rows)
+            direct = np.asarray(_least_direct_effect(line.at(share), orbit))
+            self.rests[rows] = goes_on & (direct < _AT_REST)
+        return ["" if more else "ended" for more in goes_on & ~self.rests[rows]]
 
     def _watch(self, rows: Index, share: Float) -> None:
         """Extrapolate the share to where pulses run away, once they have grown enough."""
@@ -231,6 +246,29 @@ class MovingBranches(Curves):
         restart = (rise > _RISE) | (rise < 0)
         self.watched_share[rows] = np.where(restart, share, self.watched_share[rows])
         self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
+
+
+@jax.jit
+def _least_direct_effect(problem: Problem, orbit: Orbit) -> Array:
+    """Smallest d(F_i/W)/d ln v at the nodes of an orbit, over that of steady sliding, (points,).
+
+    It is A of most laws; of a law with a friction at rest it vanishes there with the velocity.
+    """
+    system, load = problem
+    place = system.mechanical.index("log_velocity")
+
+    def direct_effect(states: Array, at: Excitation) -> Array:
+        def friction(log_v: Array) -> Array:
+            return system.slider.law.friction(
+                system.V * jnp.exp(log_v), system.law_state(states), at.w
+            )
+
+        _, slope = jax.jvp(friction, (states[place],), (jnp.ones_like(states[place]),))
+        return jnp.asarray(slope)
+
+    along = direct_effect(orbit.centre[:, None] + orbit.nodes, load.at(orbit.mesh[:-1]))
+    steady = direct_effect(system.steady(), Excitation(jnp.ones_like(system.V)))
+    return (along / steady).min(0)
 
 
 def _extremum(pair: PointPair, step: BranchStep, rows: Index, chosen: Index) -> Float:
@@ -295,7 +333,7 @@ def solve_along_branches(
     """
     branch = follow_from_steady_sliding(problem, mesh)
     arrived, folded = branch.arrived, branch.folded
-    ran_away = ~arrived & ~folded & (branch.end < 1)
+    ran_away = ~arrived & ~folded & ~branch.rests & (branch.end < 1)
     # Of 19 branches with this below 1, none has an orbit on the finer mesh: the pulses of 15 run
     # away, at most 1.1 times as far beyond the last orbit as the limit, and 3 branches turn back.
     beyond = branch.share + _DOUBT * (branch.end - branch.share)
@@ -303,10 +341,11 @@ def solve_along_branches(
     solution.detail[:] = branch.farthest
     for which, outcome, share in (
         (folded, Outcome.FOLDED, branch.fold),
+        (branch.rests, Outcome.RESTS, branch.farthest),
         (ran_away, Outcome.RUNAWAY, np.minimum(beyond, 1.0)),
     ):
         rows = np.flatnonzero(which & (amplitude > 0))
         solution.outcome[rows] = outcome
         solution.detail[rows] = share[rows] * amplitude[rows]
     refine(problem, solution, branch.pair.point.orbit, np.flatnonzero(arrived), options)
-    return arrived | folded | (branch.fastest >= RUNAWAY) | (beyond < 1)
+    return arrived | folded | branch.rests | (branch.fastest >= RUNAWAY) | (beyond < 1)
