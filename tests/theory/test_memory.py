@@ -48,6 +48,20 @@ def test_the_critical_stiffness_of_other_laws_agrees_with_special_cases():
     assert memory.critical_stiffness(same, V0) == pytest.approx((B - A) / D0, rel=1e-8)
 
 
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_no_spring_stabilises_sliding_on_soft_asperities(share):
+    """Spring and asperities in series, with the age on the plastic velocity: k below 1/lambda."""
+    length = share * D0 / (B - A)
+    series = (B - A) / (D0 - (B - A) * length) if share < 1 else np.inf
+    soft = ElastoPlasticAge(**NUMBERS, lambda_=length)
+    assert memory.critical_stiffness(soft, V0) == pytest.approx(series, rel=1e-8)
+    small = closed_forms.SmallModulation(
+        mu=0.6, A=A, B=B, D0=D0, K=1.0, W0=1.0, V=V0, omega=1.0, lambda_=length
+    )
+    closed = closed_forms.critical_stiffness_elastic(small, "plastic")
+    assert float(closed) == pytest.approx(series, rel=1e-8)
+
+
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("ratio", [0.01, 0.5, 10.0, 1e4])
 def test_the_state_after_a_step_is_the_integrated_one(name, ratio):

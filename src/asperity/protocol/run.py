@@ -68,6 +68,8 @@ def stability_statement(protocol: Protocol) -> str:
     fields: dict[str, Any] = {name: numbers[name] for name in ("A", "B", "D0", "K")}
     fields |= {"mu": numbers["mu0"], "W0": level.load, "V": level.velocity, "omega": 1.0}
     critical = kc(cf.SmallModulation(**fields, M=numbers.get("M", 0.0), lambda_=lambda_))
+    if np.isinf(critical):
+        return _linearised(protocol, numbers)
     ratio = float(numbers["K"] / critical)
     if not 0 < ratio < 1:
         return ""

@@ -253,11 +253,13 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
     p : SmallModulation
     age_velocity : {"slider", "plastic"}
         Velocity in the age law. "slider", as printed: (B - A) W0/(D0 + A lambda).
-        "plastic": (B - A) W0/(D0 - (B - A) lambda), the spring and the asperities in series.
+        "plastic": (B - A) W0/(D0 - (B - A) lambda), the spring and the asperities in series;
+        infinite where the asperities alone are too soft, lambda >= D0/(B - A).
     """
     lengths = {"slider": p.D0 + p.A * p.lambda_, "plastic": p.D0 - (p.B - p.A) * p.lambda_}
-    chosen = one_of(age_velocity, lengths, "critical_stiffness_elastic.age_velocity")
-    return (p.B - p.A) * p.W0 / lengths[chosen]
+    length = lengths[one_of(age_velocity, lengths, "critical_stiffness_elastic.age_velocity")]
+    stabilised = length > 0
+    return jnp.where(stabilised, (p.B - p.A) * p.W0 / jnp.where(stabilised, length, 1.0), jnp.inf)
 
 
 @typed

@@ -79,7 +79,8 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
     Returns
     -------
     float
-        (B - A)/D0 of the three laws above; 0 where steady sliding is stable at any stiffness.
+        (B - A)/D0 of the three laws above; 0 where steady sliding is stable at any stiffness,
+        infinite where it is unstable at any.
     """
     rates = np.abs(decay_rates(law, velocity))
     V = number(velocity, "critical_stiffness.velocity", "velocity", "positive")
@@ -94,10 +95,12 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
     require(scale > 0, "law", rule, law.name, "its sliding has no critical stiffness")
     k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
     low = 0.0
-    for _ in range(_REFINEMENTS):
+    for refinement in range(_REFINEMENTS):
         unstable = np.flatnonzero(_growth(law, V, k) > 0)
         if not unstable.size:
             break
+        if refinement == 0 and unstable[-1] == _POINTS - 1:
+            return math.inf
         low, high = (float(k[i]) for i in (unstable[-1], min(unstable[-1] + 1, _POINTS - 1)))
         k = np.geomspace(low, high, _POINTS)
     return low
