@@ -16,8 +16,8 @@ class Outcome(IntEnum):
 
     FOLDED, RUNAWAY, RESTS and SENSITIVE are results, not failures of a method: the branch of
     orbits that begins with steady sliding does not reach the requested amplitude, or reaches it
-    only through orbits that no computation and no experiment could stay on. Orbits that are not connected to
-    steady sliding may exist. OUT_OF_RANGE is given without a search.
+    only through orbits that no computation and no experiment could stay on. Orbits that are not
+    connected to steady sliding may exist. OUT_OF_RANGE is given without a search.
     """
 
     CONVERGED = 0
