@@ -22,7 +22,9 @@ Matrix = list[list[Array]]
 
 
 def inverse_points(matrix: Matrix) -> Matrix:
-    """Inverse of a small matrix for every operating point; not finite where it is singular.
+    """Inverse of a small matrix for every operating point.
+
+    Not finite where the matrix is singular, or so large that its determinant overflows.
 
     Entries are separate arrays, so that XLA writes no stacked matrix to memory.
     """
@@ -31,7 +33,7 @@ def inverse_points(matrix: Matrix) -> Matrix:
         return [[1 / matrix[0][0]]]
     if n == 2:
         (a, b), (c, d) = matrix
-        scale = 1 / (a * d - b * c)
+        scale = 1 / _finite(a * d - b * c)
         return [[d * scale, -b * scale], [-c * scale, a * scale]]
     # By the Schur complement of the first two unknowns: the mechanical ones, which a step of the
     # spring and the mass never makes singular.
@@ -50,6 +52,11 @@ def inverse_points(matrix: Matrix) -> Matrix:
         ),
         *([*(-a for a in b), *c] for b, c in zip(corner, remaining, strict=True)),
     ]
+
+
+def _finite(determinant: Array) -> Array:
+    """NaN in place of infinity: a Newton step divided by infinity would look like convergence."""
+    return jnp.where(jnp.isinf(determinant), jnp.nan, determinant)
 
 
 def inverse_by_elimination(matrix: Array) -> Array:
@@ -128,7 +135,7 @@ def solve_points(matrix: Array, rhs: Array) -> Array:
     Returns
     -------
     array, shape (n, ...)
-        Not finite where a matrix is singular.
+        Not finite where a matrix is singular, or its determinant overflows.
     """
     return solve_columns(matrix, rhs[:, None])[:, 0]
 
@@ -152,7 +159,8 @@ def solve_columns(matrix: Array, rhs: Array) -> Array:
         return rhs / matrix
     if n == 2:
         (a, b), (c, d) = matrix
-        return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
+        determinant = _finite(a * d - b * c)
+        return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / determinant
     rows = jnp.concatenate([matrix, rhs], axis=1)
     # Reflections mix rows: a row larger than the others by 1e16, as in fast motions, would lose
     # the digits of the others.

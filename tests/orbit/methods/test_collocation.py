@@ -92,6 +92,14 @@ def test_a_singular_matrix_gives_no_finite_solution():
         assert not np.isfinite(solution).any()
 
 
+def test_a_determinant_that_overflows_gives_no_finite_solution():
+    """Entries over an infinite determinant would be zero, and a Newton step that moves nothing."""
+    for solution in solve_columns_and_points(
+        repeated([[1e200, 1.0], [1.0, 1e200]]), repeated(np.ones((2, COLUMNS)))
+    ):
+        assert not np.isfinite(solution).any()
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_product_is_the_matrix_product(n):
     a, b = matrices(n), matrices(n, seed=8)
