@@ -67,8 +67,7 @@ class SweepAxis:
     def rows(self, start: int, stop: int) -> dict[str, Column]:
         """The columns from row `start` to before `stop`: SI, NaN where a row has no value.
 
-        A column of texts holds "" where a row has no value. A row is drawn without the rows before
-        it.
+        A row is drawn without the rows before it.
         """
         if self._listed:
             return {name: values[start:stop] for name, values in self._listed.items()}
@@ -273,6 +272,11 @@ def _cases(
 ) -> dict[str, Any]:
     """Columns of the rows of all cases; a case gives every combination of its lists."""
     names = dict.fromkeys(_name(name, known) for case in cases for name in case)
+    for name in (name for name in TEXTS if name in names):
+        # Such a case would take the law of another case, and its label would be empty.
+        without = [str(i) for i, case in enumerate(cases, start=1) if name not in case]
+        got = f"none in case {', '.join(without[:5])}"
+        require(not without, "cases", f"all have '{name}' or none of them", got, "add it there")
     columns: dict[str, list[Any]] = {name: [] for name in names}
     length = 0
     for case in cases:
@@ -288,6 +292,6 @@ def _cases(
         for row in itertools.product(*lists.values()):
             point = dict(zip(lists, row, strict=True))
             for name in names:
-                columns[name].append(point.get(name, "" if name in TEXTS else None))
+                columns[name].append(point.get(name))
     require(columns, "cases", "have at least one case", "none", "write [{ law = '...' }]")
     return columns

@@ -142,7 +142,7 @@ class SweepGrid:
                 along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
                 column = np.broadcast_to(along, shape).ravel()
                 if name == "law":
-                    laws = np.where(column == "", laws, column)
+                    laws = np.array(column, dtype=object)
                 elif name == "data":
                     data = np.array(column, dtype=object)
                 else:

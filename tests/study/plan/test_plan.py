@@ -149,6 +149,14 @@ def test_plans_beyond_memory_are_refused_before_anything(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_every_case_names_its_law_if_one_does() -> None:
+    """The case without a law would be solved with that of another case."""
+    cases = [{"epsilon": 0.1}, {"law": "ruina-slip", "epsilon": 0.1}]
+    axes = {"case": {"cases": cases}}
+    with pytest.raises(InputError, match="cases must all have 'law' or none of them.* case 1;"):
+        SweepGrid.of(SweepPlan(material="bureau2000", parameters=FIXED["parameters"], axes=axes))
+
+
 def test_a_plan_may_not_name_its_reader(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text('self = 5\nlaw = "rice-ruina"\naxes.K.values = []\n')
     with pytest.raises(InputError, match="self must be a known field"):
