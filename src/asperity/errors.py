@@ -247,7 +247,7 @@ class ConstantLoadError(InputError):
 
 
 #: Mistakes that a message lists: a wrong file may hold one a row.
-_MISTAKES_SHOWN = 20
+MISTAKES_SHOWN = 20
 
 
 class MistakesError(InputError):
@@ -292,7 +292,7 @@ class MistakesError(InputError):
         where = f" (in '{self.source}')" if self.source else ""
         if len(self.errors) == 1:
             return f"{self.errors[0]}{where}"
-        first = self.errors[:_MISTAKES_SHOWN]
+        first = self.errors[:MISTAKES_SHOWN]
         numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(first, start=1))
         more = len(self.errors) - len(first)
         rest = f"; and {more} more" if more else ""

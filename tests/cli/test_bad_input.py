@@ -463,6 +463,49 @@ def test_a_protocol_that_cannot_be_run(asperity, tmp_path: Path, text: str, part
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.parametrize("fill", ["x", "9", "\\u001b", "hold 1 s; "])
+@pytest.mark.parametrize(
+    ("command", "place"),
+    [
+        ("run", 'steps = ["FILL"]'),
+        ("run", 'steps = ["hold FILL s"]'),
+        ("run", 'steps = ["repeat FILL"]'),
+        ("run", 'steps = ["step load to 3 FILL"]'),
+        ("run", 'steps = ["slide for 1 s"]\n"FILL" = 1'),
+        ("run", 'steps = ["slide for 1 s"]\nparameters."FILL" = 1'),
+        ("design", 'values."FILL" = 1'),
+        ("design", 'noise."FILL" = 1'),
+        ("sweep", 'axes."FILL".values = [1]'),
+        ("sweep", 'axes.epsilon.values = [1, "FILL"]'),
+    ],
+)
+def test_a_long_text_of_a_file_is_cut_in_the_message(asperity, tmp_path, command, place, fill):
+    file = tmp_path / "a.toml"
+    of_command = {
+        "run": 'start.velocity = "1 um/s"',
+        "design": 'free = ["A"]\nmeasure = "A"\npoints = 9\nranges = { V = 1 }\nnoise.mu1 = 1e-3',
+        "sweep": "",
+    }[command]
+    text = place.replace("FILL", fill * 4000)
+    file.write_text(f'law = "rice-ruina"\nmaterial = "bureau2000"\n{text}\n{of_command}')
+    out = {"run": ("--out", tmp_path / "a.nc"), "sweep": ("--dry-run",)}.get(command, ())
+    result = asperity(command, file, *out)
+    assert result.exit_code == 2
+    for line in result.stderr.splitlines():
+        assert line.isprintable()
+        # Field, rule, value and advice have up to 600 characters each.
+        assert len(line) < 2500
+
+
+def test_many_mistakes_of_a_protocol_are_counted(asperity, tmp_path) -> None:
+    file = tmp_path / "a.toml"
+    steps = ", ".join(["'wait'"] * 100)
+    file.write_text(f'law = "rice-ruina"\nsteps = [{steps}]\nstart.velocity = "1 um/s"')
+    lines = asperity("run", file, "--out", tmp_path / "a.nc").stderr.splitlines()
+    assert len(lines) == 21
+    assert lines[-1].endswith("a.toml: and 81 more mistakes")
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

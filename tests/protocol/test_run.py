@@ -332,6 +332,11 @@ def test_the_tribometer_does_not_change_the_motion(write) -> None:
         ("seed = 3", "order = true", "tribometer.order must be a whole number, got True"),
         ('bandwidth = "500 Hz"', 'bandwidth = "2 kHz"', "solver.sampling must be at least 4000 Hz"),
         ("sensors", "sensor", "tribometer.sensors must have a table"),
+        ('"5 nm"', "5e-9", "sensors.shear force.noise must carry a unit, got 5e-09"),
+        ('"1 kHz"', "1000", "tribometer.rate must carry a unit, got 1000"),
+        ('["0 N", "20 N"]', "[0, 20]", "tribometer.ranges['normal force'] must carry a unit"),
+        ('["0 N", "20 N"]', '["20 N", "0 N"]', "tribometer.ranges['normal force'] must rise"),
+        ('{ "normal', '{ "other', "tribometer.ranges must be of channels with a sensor, got 'oth"),
     ],
 )
 def test_a_mistake_says_where(write, old, new, message) -> None:

@@ -11,7 +11,7 @@ import click
 
 from asperity.cli.options import law_option, option, output_options, switch
 from asperity.cli.report import Output, save_figure, say
-from asperity.errors import InputError, naming
+from asperity.errors import MISTAKES_SHOWN, InputError, naming
 
 if TYPE_CHECKING:
     from asperity.protocol import Protocol, RunSummary
@@ -92,7 +92,10 @@ def run(
         with naming(symbols=str):  # a file has the names of friction
             wanted = load_protocol(protocol)
     except ProtocolError as error:
-        say(*(f"{protocol}: {' '.join(mistake.split())}" for mistake in error.mistakes))
+        shown = [" ".join(mistake.split()) for mistake in error.mistakes[:MISTAKES_SHOWN]]
+        more = len(error.mistakes) - len(shown)
+        shown += [f"and {more:,} more mistakes"] if more else []
+        say(*(f"{protocol}: {mistake}" for mistake in shown))
         return 2
     if law is not None and wanted.law != law:
         got = f"'{law}' and law = '{wanted.law}'"

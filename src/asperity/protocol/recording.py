@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from asperity.errors import InputError, closest, require
-from asperity.parameters.arguments import annotations_of, at_least, of_type, shown, typed
+from asperity.parameters.arguments import annotations_of, at_least, of_type, typed
+from asperity.questions.record import require_unit, shown
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
 from asperity.tribometer.sensors import (
@@ -95,11 +96,19 @@ def setup_of(
             "write it like [tribometer.sensors.'shear force'] with type = 'spring gauge' below it",
         )
     recorder = _made(Recorder, settings, "tribometer")
-    sensors, exposed = {}, {}
+    sensors: dict[str, Sensor] = {}
+    exposed = {}
     for channel, fields in described.items():
         sensors[channel], exposed[channel] = _sensor(channel, fields)
     _check_sampling(sampling, recorder, sensors)
-    return RecordingSetup(Tribometer(sensors=sensors, recorder=recorder), exposed, seed, stiffness)
+    try:
+        tribometer = Tribometer(sensors=sensors, recorder=recorder)
+    except InputError as error:
+        raise error.about(error.field.name.replace("Recorder", "tribometer")) from None
+    for channel, ends in recorder.ranges.items():
+        for end in ends:
+            require_unit(end, sensors[channel].reads, f"tribometer.ranges['{channel}']")
+    return RecordingSetup(tribometer, exposed, seed, stiffness)
 
 
 @typed
@@ -137,7 +146,8 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
     """The sensor of a channel, and the variable of the motion that it measures."""
     place = f"tribometer.sensors.{channel}"
     options = dict(fields) if isinstance(fields, Mapping) else {}
-    name = options.pop("type", None)
+    require("type" in options, f"{place}.type", "be given", "nothing", closest("", SENSORS))
+    name = options.pop("type")
     if not isinstance(name, str) or name not in SENSORS:
         raise InputError(f"{place}.type", "be a sensor", shown(name), closest(str(name), SENSORS))
     made, measurable = SENSORS[name]
@@ -161,6 +171,7 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
             advice = closest(name, known)
             raise InputError(f"{place}.{name}", "be a known field", shown(value), advice)
         of_type(value, known[name], f"{place}.{name}")
+        require_unit(value, kind.kind_of(name), f"{place}.{name}")
     for field in dataclasses.fields(kind):
         needed = field.default is field.default_factory is dataclasses.MISSING
         if needed and field.name not in fields:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest, require
+from asperity.errors import InputError, closest, printable, require
 from asperity.experiment.recipes import SlideHoldSlide, VelocitySteps
 from asperity.loads import (
     Follow,
@@ -58,6 +58,13 @@ _LISTS = ("holds", "velocities")
 
 #: Largest number of steps with repetitions; a misprint must not fill the memory.
 MOST = 100_000
+#: Characters of a line in a message.
+_SHOWN = 200
+
+
+def _quoted(line: str) -> str:
+    """A line in a message."""
+    return f"'{printable(line, _SHOWN)}'"
 
 
 def follow(channels: str, file: Path) -> Follow:
@@ -206,7 +213,7 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
                 known = error.field.name in arguments
                 raise (error.about(f"{name}.{error.field}") if known else error) from None
     examples = " or ".join(f"'{form.example}'" for form in forms)
-    raise InputError(name, "be a complete step", f"'{line}'", f"write it like {examples}")
+    raise InputError(name, "be a complete step", _quoted(line), f"write it like {examples}")
 
 
 def _meant(line: str, name: str) -> list[StepForm]:
@@ -229,7 +236,7 @@ def _meant(line: str, name: str) -> list[StepForm]:
     examples = [example for example, verb in like.items() if near and verb.startswith(near)]
     listed = "' or '".join(examples or [form.example for form in FORMS])
     advice = f"did you mean something like '{listed}'?" if near else f"write it like '{listed}'"
-    raise InputError(name, "be a step", f"'{line}'", advice)
+    raise InputError(name, "be a step", _quoted(line), advice)
 
 
 def _arguments(
@@ -242,7 +249,7 @@ def _arguments(
             try:
                 arguments[key] = to_si(text, _KINDS[key], f"{name}.{key}")
             except InputError as error:
-                raise error.noting(f", as in '{example}' (in '{line}')") from None
+                raise error.noting(f", as in '{example}' (in {_quoted(line)})") from None
         elif key in _LISTS:
             arguments[key] = tuple(part.strip() for part in text.split(","))
         else:
@@ -296,7 +303,7 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
         except InputError as error:
             if one.place not in reported:
                 reported.add(one.place)
-                yield error.noting(f" (in '{one.text}')")
+                yield error.noting(f" (in {_quoted(one.text)})")
 
 
 def _planned(step: Any, place: str, folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
@@ -325,11 +332,13 @@ def _repetition(line: str, place: str) -> tuple[int, list[str]]:
     times = int(match["times"][:1000]) if match and match["times"].isdecimal() else 0
     if match is None or times < 1:
         rule = "say how often what is repeated"
-        raise InputError(place, rule, f"'{line}'", f"write it like '{REPEAT_EXAMPLE}'")
+        raise InputError(place, rule, _quoted(line), f"write it like '{REPEAT_EXAMPLE}'")
     inner = [part.strip() for part in match["steps"].split(";")]
     if any(part.lower().startswith("repeat") for part in inner):
         rule = "not repeat within a line that repeats"
         table = "{ repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
-        raise InputError(place, rule, f"'{line}'", f"write the outer one as a table, like {table}")
+        raise InputError(
+            place, rule, _quoted(line), f"write the outer one as a table, like {table}"
+        )
     # A line may end in a semicolon.
     return times, [part for i, part in enumerate(inner) if part or i == 0]

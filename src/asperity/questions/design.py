@@ -8,9 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, StrictBool, model_validator
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, MistakesError, require
 from asperity.questions.fit import Priors
 from asperity.questions.record import Given, Names, Question, Record, Whole, quantity
+from asperity.questions.sweep import PlanError
 
 #: Readings, levels of an axis, and draws at most.
 MOST, _MOST_DRAWS = 100_000, 1000
@@ -118,6 +119,7 @@ class Design(Question):
     """
 
     subject: ClassVar[str] = "plan"
+    mistakes_error: ClassVar[type[MistakesError]] = PlanError
 
     law: str
     free: Annotated[Names, Field(min_length=1)]

@@ -116,7 +116,9 @@ class Question(Record):
             try:
                 return cls(**content)
             except MistakesError as error:
-                mistakes = [mistake.about(Key(*mistake.field)) for mistake in error.errors]
+                mistakes = [
+                    mistake.about(Key(*mistake.field)).shortened() for mistake in error.errors
+                ]
                 raise cls.mistakes_error(mistakes, source) from None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -238,7 +240,7 @@ Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 def shown(value: Any) -> str:
     """A value of a record in a few words for a message."""
     if isinstance(value, Mapping):
-        return f"a table of {len(value)} fields"
+        return f"a table of {len(value)} field{'s' * (len(value) != 1)}"
     return shown_value(value)
 
 

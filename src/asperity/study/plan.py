@@ -62,7 +62,7 @@ class SweepPlan(Sweep):
         trees = {"parameters": self.parameters, "axes": axes}
         quantities = (q for n, tree in trees.items() for q in _quantities(n, tree, "", known))
         if mistakes := without_unit(quantities):
-            raise PlanError(mistakes)
+            raise PlanError(mistakes).shortened()
         return self
 
 
@@ -133,7 +133,7 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
-        raise PlanError(mistakes)
+        raise PlanError(mistakes).shortened()
     return {
         "solve": plan.solve,
         **({"settings": settings} if settings else {}),

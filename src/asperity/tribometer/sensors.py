@@ -139,6 +139,7 @@ _KINDS = {
     "resonance": "frequency",
     "damping": "dimensionless",
     "impulses": "dimensionless",
+    "drift": "dimensionless",
     "stiffness": "stiffness",
 }
 #: Rules of the fields that may not be zero, or that may be negative.
@@ -195,13 +196,17 @@ class Sensor:
     impulses: Given = 0.0
     impulse_size: Given = 0.0
 
+    @classmethod
+    def kind_of(cls, field: str) -> str:
+        """Kind of the quantity of a field, a key of `KINDS`; a drift is a number in SI."""
+        return _KINDS.get(field, cls.kind)
+
     def __post_init__(self) -> None:
         for field in fields(self):
-            kind = _KINDS.get(field.name, self.kind)
             name = f"{type(self).__name__}.{field.name}"
             stated = getattr(self, field.name)
             rule = _RULES.get(field.name, "not negative")
-            value = number(stated, name, "dimensionless" if field.name == "drift" else kind, rule)
+            value = number(stated, name, self.kind_of(field.name), rule)
             object.__setattr__(self, field.name, value)
         for name in ("damping", "impulses"):
             value, label = getattr(self, name), f"{type(self).__name__}.{name}"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.arrays import Complex, Float
-from asperity.errors import InputError, require
+from asperity.errors import InputError, require, require_known
 from asperity.parameters.arguments import at_least, number, one_of, typed
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
@@ -29,6 +29,9 @@ from asperity.tribometer.sensors import (
     resonant,
 )
 from asperity.units import KINDS, to_si
+
+#: Kinds of the fields of a recorder that have a unit.
+_KINDS = {"rate": "frequency", "cut_off": "frequency", "jitter": "time"}
 
 
 @typed
@@ -64,16 +67,21 @@ class Recorder:
     bits: int = 16
     ranges: Mapping[str, tuple[Given, Given]] = field(default_factory=dict)
 
+    @staticmethod
+    def kind_of(field: str) -> str:
+        """Kind of the quantity of a field, a key of `KINDS`."""
+        return _KINDS.get(field, "dimensionless")
+
     def __post_init__(self) -> None:
-        for name, kind, rule in (
-            ("rate", "frequency", "positive"),
-            ("cut_off", "frequency", "positive"),
-            ("jitter", "time", "not negative"),
-            ("clock_error", "dimensionless", "finite"),
+        for name, rule in (
+            ("rate", "positive"),
+            ("cut_off", "positive"),
+            ("jitter", "not negative"),
+            ("clock_error", "finite"),
         ):
             stated = getattr(self, name)
             if stated is not None or name != "cut_off":
-                value = number(stated, f"Recorder.{name}", kind, rule)
+                value = number(stated, f"Recorder.{name}", self.kind_of(name), rule)
                 object.__setattr__(self, name, value)
         for name, low, high in (("order", 1, 8), ("bits", 0, 32)):
             value, rule = getattr(self, name), f"lie between {low} and {high}"
@@ -105,6 +113,11 @@ class Tribometer:
 
     sensors: Mapping[str, Sensor]
     recorder: Recorder
+
+    def __post_init__(self) -> None:
+        for channel in self.recorder.ranges:
+            require_known(channel, self.sensors, "Recorder.ranges", "be of channels with a sensor")
+            self.recorder.step(channel, self.sensors[channel].reads)
 
     @typed
     def record(

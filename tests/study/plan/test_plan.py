@@ -153,7 +153,7 @@ def test_every_case_names_its_law_if_one_does() -> None:
     """The case without a law would be solved with that of another case."""
     cases = [{"epsilon": 0.1}, {"law": "ruina-slip", "epsilon": 0.1}]
     axes = {"case": {"cases": cases}}
-    with pytest.raises(InputError, match="cases must all have 'law' or none of them.* case 1;"):
+    with pytest.raises(InputError, match=r"cases must all have 'law' or none of them.* case 1;"):
         SweepGrid.of(SweepPlan(material="bureau2000", parameters=FIXED["parameters"], axes=axes))
 
 
