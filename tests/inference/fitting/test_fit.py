@@ -76,6 +76,22 @@ def test_a_fit_needs_neither_a_material_nor_a_start(readings):
     assert result.values["lambda"] == pytest.approx(7e-7, rel=1e-5)
 
 
+def test_a_friction_that_no_contact_has_is_named(readings, pmma):
+    """A mean friction ten times too large."""
+    table = readings(0)
+    mean = 0.5 - 0.013 * np.log(table.points["V"] / 1e-6) + table.values["delta_mu"]
+    error = table.errors["delta_mu"]
+    fixed = {**TRUTH, "V0": 1e-6, "K": 2e5, "W0": 7.0}
+    for factor, named in ((1.0, 0), (10.0, 1)):
+        columns = {**table.points, "mean_friction": factor * mean}
+        readings_of_mean = table_of({**columns, "mean_friction_err": factor * error})
+        free = ["mu0", "A", "B"]
+        others = {n: v for n, v in fixed.items() if n not in free}
+        options = {"fixed": others, "check_stiffness": False}
+        result = fit(readings_of_mean, "elasto-plastic", free, **options)
+        assert sum("mu0 of" in w and "check the units" in w for w in result.warnings) == named
+
+
 @pytest.mark.long
 def test_intervals_contain_the_truth_as_often_as_stated(readings, pmma):
     sets = 60

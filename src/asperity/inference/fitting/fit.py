@@ -220,11 +220,11 @@ def fit(
     if holds or any(term.measured_epsilon for term in objective.terms_of(LockInTerm)):
         minima = _with_estimated_errors(objective, minima)
     result = described_fit(objective, minima, profile=profile, described=steps.described)
-    if not recordings:
-        other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
-        return replace(result, warnings=(*result.warnings, other)) if other else result
     warnings = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
     warnings += unusual_numbers(result, recordings)
+    if not recordings:
+        other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
+        return replace(result, warnings=(*warnings, *result.warnings, *filter(None, [other])))
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):

@@ -25,8 +25,12 @@ from asperity.parameters.arguments import typed
 
 #: A fixed or shared stiffness is contradicted if AICc falls by more with a free K for each run.
 _CONTRADICTED_AICC = 6.0
-#: Usual ranges of A, of D0 (m), and of the stiffness over the load (1/m).
-_FAR: Mapping[str, tuple[float, float]] = {"A": (5e-4, 0.2), "D0": (1e-8, 2e-3)}
+#: Usual ranges of mu0, of A, of D0 (m), and of the stiffness over the load (1/m).
+_FAR: Mapping[str, tuple[float, float]] = {
+    "mu0": (3e-3, 3.0),
+    "A": (5e-4, 0.2),
+    "D0": (1e-8, 2e-3),
+}
 _FAR_STIFFNESS = (1e2, 1e6)
 
 
@@ -76,15 +80,23 @@ def contradicted_stiffness(
     return sentences
 
 
-def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun] = ()) -> list[str]:
     """Sentences on estimates outside the usual ranges: the units or the law may be wrong.
 
     Parameters
     ----------
     fit : Fit
-        A converged fit.
     runs : sequence of RecordedRun
+        Its recordings, if it has any.
     """
+    if not fit.converged:
+        return []
+    advice = (
+        "check the units and signs of displacement, force and load, and look at a picture of the "
+        "recording with the motion"
+        if runs
+        else "check the units of all columns and of the fixed numbers"
+    )
     determined = fit.values.keys() - {*fit.undetermined}
     numbers = [(n, fit.values[n], fit.parameters[n].unit) for n in _FAR if n in determined]
     ranges = dict(_FAR)
@@ -99,9 +111,7 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
         if not low <= value <= high:
             sentences.append(
                 f"{symbol(name)} of {value:.3g} {unit}".rstrip()
-                + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
-                "units and signs of displacement, force and load, and look at a picture of the "
-                "recording with the motion"
+                + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: {advice}"
             )
     return sentences
 
