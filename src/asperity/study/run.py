@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,7 +28,7 @@ from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid
-from asperity.study.job import Job, numerics, package_version
+from asperity.study.job import Job, WorkerError, numerics, package_version
 from asperity.study.plan import SweepPlan, is_extension, law_places, load_plan
 from asperity.study.solve import SOLVES
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out
@@ -105,6 +106,9 @@ def run_sweep(
     pool = _workers(workers, cluster, address)
     with store_lock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
+        if fresh:
+            # Called after the workers have ended.
+            stack.push(partial(_remove_refused, path))
         # Coordinates are written first.
         numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
         what = f"{numbers:.3g} numbers along them"
@@ -130,6 +134,12 @@ def run_sweep(
             str(plan.folder.resolve()), numerics(),
         )  # fmt: skip
         return _run(store, lock, pool_workers, job, progress, log)
+
+
+def _remove_refused(path: Path, kind: object, error: object, trace: object) -> None:
+    """Remove a new store if the workers refused it before a chunk was done."""
+    if isinstance(error, WorkerError) and SweepStore(path).share_done() <= 0:
+        shutil.rmtree(path)
 
 
 def _workers(

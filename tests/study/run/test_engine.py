@@ -234,6 +234,8 @@ def test_a_law_that_no_worker_has_is_no_failure_of_its_points(
     plan = plan_of().model_copy(update={"law": "mine"})
     with pytest.raises(InputError, match="law must be known to the workers, got 'mine'"):
         run_sweep(plan, tmp_path / "s.zarr", workers=Elsewhere())
+    # A store without any chunk would be refused to the next version.
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_store_is_continued_by_what_began_it(
