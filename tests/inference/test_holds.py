@@ -68,6 +68,18 @@ def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise, fitte
         assert mine.se == pytest.approx(known.se * expected / ERROR, rel=0.02)
 
 
+def test_a_wrong_row_is_named_and_does_not_decide(exact, noise):
+    healing = exact[1] + noise
+    healing[3] += 30 * ERROR
+    wrong = table(exact, healing, healing_err=ERROR)
+    done = fit(wrong, "rice-ruina", starts=4)
+    assert done.outliers == (3,)
+    assert any("without row 4 of holds chi-squared" in w for w in done.warnings)
+    result = compare(wrong, ["rice-ruina", "ruina-slip"], starts=4)
+    assert result.left_out == ("row 4 of holds",)
+    assert result.best == "rice-ruina"
+
+
 def test_derivatives_are_those_of_differences(exact):
     term = HoldTerm(table(exact, exact[1], healing_err=1.0), RiceRuina, {"mu0": 0.6, "V0": 1e-6})
     at = {"A": A, "B": B, "D0": D0}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
-from asperity.arrays import Float
+from asperity.arrays import Bool, Float
 from asperity.errors import Argument, InputError, require
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.tables.table import in_all_rows
+from asperity.inference.tables.term import outlier_sentence
 from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import typed
@@ -73,6 +75,16 @@ class HealingTable:
     def rows(self) -> int:
         """Number of holds."""
         return self.healing.size
+
+    @property
+    def row_names(self) -> NDArray[np.str_]:
+        """Names of the rows in messages."""
+        return np.array([f"row {i} of {self.name}" for i in range(1, self.rows + 1)])
+
+    def without(self, rows: Bool) -> HealingTable:
+        """The table without some of its rows."""
+        names = ["hold_time", "healing", "V", "K", *(["errors"] if self.errors is not None else [])]
+        return replace(self, **{n: getattr(self, n)[~rows] for n in names})
 
 
 @typed
@@ -259,9 +271,9 @@ class HoldTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
-        """A sentence on an estimated error."""
+        """A sentence on outliers, or on an estimated error."""
         if not self.profiled:
-            return ()
+            return outlier_sentence(self.table.row_names[list(outliers)])
         return (
             f"{self.name} has no healing_err: one standard uncertainty for all holds, "
             f"{self.error:.3g}, is estimated from the residuals, and chi-squared judges nothing",

@@ -92,6 +92,22 @@ def test_a_friction_that_no_contact_has_is_named(readings, pmma):
         assert sum("mu0 of" in w and "check the units" in w for w in result.warnings) == named
 
 
+def test_an_uncertainty_that_decides_a_fit_is_named(readings, pmma):
+    """A thousandth of the others, by a misprint: the interval of A is as narrow as this error."""
+    table = drops_of(readings(2))
+    named = {}
+    for factor in (1.0, 1e-3):
+        errors = table.errors["delta_mu"].copy()
+        errors[5] *= factor
+        misprinted = LockInTable("drop", table.points, table.values, {"delta_mu": errors})
+        result = fit(misprinted, "elasto-plastic", ["eps_ratio"], material=pmma)
+        named[factor] = [w for w in result.warnings if "goes through" in w]
+        assert result.p_value > 0.001
+    assert named[1.0] == []
+    (warning,) = named[1e-3]
+    assert warning.startswith("delta_mu_err of row 6 is 0.001 times that of the other rows")
+
+
 @pytest.mark.long
 def test_intervals_contain_the_truth_as_often_as_stated(readings, pmma):
     sets = 60

@@ -27,6 +27,7 @@ from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.minima import FAR_OFF, GAIN, extends
 from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit, fit_record
+from asperity.inference.holds import HealingTable, joined_holds
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.residuals import DESCRIBED, residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
@@ -279,7 +280,9 @@ def compare(
     result = judge(fits)
     outliers = _common_outliers(fits)
     if outliers:
-        table = joined([d for d in several if isinstance(d, LockInTable)])[0]
+        tables = [d for d in several if isinstance(d, LockInTable)]
+        holds = [d for d in several if isinstance(d, HealingTable)]
+        table = joined(tables)[0] if tables else joined_holds(holds)
         out = np.isin(np.arange(table.rows), outliers)
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())

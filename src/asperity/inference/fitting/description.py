@@ -25,6 +25,7 @@ from asperity.inference.fitting.intervals import (
 )
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF, RIVAL
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
+from asperity.inference.holds import HoldTerm
 from asperity.inference.objective import Minimum, Objective, Residuals, log_density
 from asperity.inference.tables.residuals import (
     DESCRIBED,
@@ -505,8 +506,10 @@ def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Mini
     Outliers are rows without which the law describes the table. A row that is steep in the
     parameters makes several minima, of which the search may miss the lowest: the fit without that
     row has one minimum, from which that of all rows is reached. In a fit together with recordings,
-    which takes minutes, predictions are linearised.
+    which takes minutes, and in one of holds, predictions are linearised.
     """
+    if any(isinstance(term, HoldTerm) for term in objective.terms) and objective.noise_is_known:
+        return tuple(outlying_rows(at.data[0])), None
     tables = [i for i, term in enumerate(objective.terms) if isinstance(term, LockInTerm)]
     if not tables:
         return (), None

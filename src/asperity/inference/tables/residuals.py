@@ -340,11 +340,8 @@ def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
     return float(chdtrc(away.size, away @ np.linalg.solve(spread, away)))
 
 
-def standardised(residuals: Residuals, information: Float) -> Float:
-    """Residuals over their standard deviations at the minimum, shape (n,).
-
-    A reading with a large influence on the fit has a small residual, which is divided by
-    sqrt(1 - leverage).
+def leverages(residuals: Residuals, information: Float) -> Float:
+    """Share of each residual's variance that the fit removes, shape (n,): 1 if it fits it exactly.
 
     Parameters
     ----------
@@ -356,5 +353,19 @@ def standardised(residuals: Residuals, information: Float) -> Float:
     size = np.sqrt(np.diag(information))
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
-    leverage = np.einsum("ij,jk,ik->i", J / size, inverse, J / size)
+    return np.asarray(np.einsum("ij,jk,ik->i", J / size, inverse, J / size))
+
+
+def standardised(residuals: Residuals, information: Float) -> Float:
+    """Residuals over their standard deviations at the minimum, shape (n,).
+
+    A reading with a large influence on the fit has a small residual, which is divided by
+    sqrt(1 - leverage).
+
+    Parameters
+    ----------
+    residuals, information
+        As of `leverages`.
+    """
+    leverage = leverages(residuals, information)
     return np.asarray(residuals.values / np.sqrt(np.maximum(1 - leverage, 1e-6)))

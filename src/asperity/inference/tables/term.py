@@ -22,6 +22,7 @@ from asperity.inference.tables.residuals import (
     Prediction,
     Weights,
     columns_of,
+    leverages,
     residuals_of,
     slopes_of,
     standardised,
@@ -49,8 +50,22 @@ _NEAR = 0.1
 _LEAST_SHARE = 0.5
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
+#: An uncertainty below this share of those of the other rows, absolute and relative to the reading,
+#: is named if the leverage of the reading exceeds the second number.
+_SMALL_ERROR, _DECISIVE = 0.1, 0.9
 #: Evaluations of an integral; fewer with searched orbits, which take a hundred times as long.
 _SAMPLES, _SEARCHED_SAMPLES = 1024, 80
+
+
+def outlier_sentence(rows: NDArray[np.str_]) -> list[str]:
+    """A sentence on rows without which the law describes a table; none without such rows."""
+    if not rows.size:
+        return []
+    return [
+        f"without {' and '.join(rows)} chi-squared would be as it should be: "
+        f"{'that is an outlier' if rows.size == 1 else 'those are outliers'}, which "
+        "may shift every estimate; check the measurement, or fit without it"
+    ]
 
 
 class LockInTerm(DataTerm):
@@ -249,15 +264,9 @@ class LockInTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> list[str]:
-        """Warnings about outliers, and about weak amplitudes without a phase."""
+        """Warnings about outliers, uncertainties, and weak amplitudes without a phase."""
         sentences = list(self.table.remarks)
-        if outliers:
-            named = " and ".join(str(self.table.row_names[row]) for row in outliers)
-            sentences.append(
-                f"without {named} chi-squared would be as it should be: "
-                f"{'that is an outlier' if len(outliers) == 1 else 'those are outliers'}, which "
-                "may shift every estimate; check the measurement, or fit without it"
-            )
+        sentences += outlier_sentence(self.table.row_names[list(outliers)])
         expected = -ndtri(0.005 / residuals.values.size)
         apart = np.abs(standardised(residuals, information))
         beyond = np.flatnonzero(apart > expected)
@@ -272,6 +281,7 @@ class LockInTerm(DataTerm):
                 f"{apart[j]:.3g} standard uncertainties off, more than chance allows; check that "
                 "reading"
             )
+        sentences += self._small_errors(residuals, information)
         for n in (1, 2):
             name = f"mu{n}"
             if name in self.table.values and f"phase{n}" not in self.table.values:
@@ -282,6 +292,30 @@ class LockInTerm(DataTerm):
                         f"uncertainties and have no phase{n}: an amplitude so small is biased "
                         "upwards"
                     )
+        return sentences
+
+    def _small_errors(self, residuals: Residuals, information: Float) -> list[str]:
+        """Sentences on readings that decide the fit by uncertainties far below the others."""
+        table, decisive = self.table, leverages(residuals, information) > _DECISIVE
+        sentences = []
+        for name, values in table.values.items():
+            size = table.values[f"mu{name[-1]}"] if name.startswith("phase") else np.abs(values)
+            # The error of a phase is one across the phasor.
+            error = table.errors[name] * (size if name.startswith("phase") else 1.0)
+            known = np.isfinite(values) & (size > 0)
+            if not known.any():
+                continue
+            relative = error / np.where(known, size, 1.0)
+            share = np.maximum(
+                error / np.median(error[known]), relative / np.median(relative[known])
+            )
+            rows = residuals.row[decisive & (residuals.observable == name)]
+            sentences += [
+                f"{name}_err of {table.row_names[row]} is {share[row]:.2g} times that of the other "
+                "rows: the fit goes through this reading, and its intervals hold only if this "
+                "uncertainty is right; check it"
+                for row in rows[known[rows] & (share[rows] < _SMALL_ERROR)]
+            ]
         return sentences
 
     def _function(self, *, search: bool, coarse: bool) -> ResponseFunction:
