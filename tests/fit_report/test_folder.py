@@ -11,6 +11,7 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 from asperity import Slider, materials, periodic_response
 from asperity.errors import InputError
 from asperity.fit_report import bands, write_comparison, write_report
+from asperity.fit_report.pictures import run_figure
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
@@ -132,6 +133,10 @@ def test_recordings_are_shown_with_the_motion(tmp_path):
         assert page.count("<svg") == 1
         assert "AR(" in page
         assert nothing_is_fetched(page)
+    # The time of the recording.
+    late = replace(run, origin=3e4)
+    figure = run_figure(late, {"rice-ruina": late.friction})
+    assert figure.axes[0].lines[0].get_xdata()[0] == 3e4
     # Names are those of the screen, and files keep theirs.
     compared = judge({"rice-ruina": own, "the same": own})
     write_report(tmp_path / "faults", own, names="geophysics")

@@ -176,7 +176,7 @@ def data_tables(fit: Fit) -> str:
 def _recording(term: RunTerm) -> str:
     """Drive and noise of a recording."""
     run, noise = term.run, term.noise
-    ends = np.array([0.0, *(run.drive.edges[k] for k in run.cuts), run.time[-1]])
+    ends = run.recorded_times([0.0, *(run.drive.edges[k] for k in run.cuts), run.time[-1]])
     rows = [
         (f"{begin:.6g}", f"{end:.6g}", f"{1e6 * v:.6g}" if v else "hold")
         for begin, end, v in zip(ends[:-1], ends[1:], run.velocities, strict=True)

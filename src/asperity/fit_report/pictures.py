@@ -98,13 +98,14 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
         Friction at the samples by law, with the nuisances of the gauge.
     """
     thin = slice(None, None, max(1, run.time.size // _DRAWN))
+    time = run.recorded_times(run.time)[thin]
     with style():
         figure = new_figure(6.4, 4.8)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-        above.plot(run.time[thin], run.friction[thin], ".", color="0.7", ms=2)
+        above.plot(time, run.friction[thin], ".", color="0.7", ms=2)
         for k, (law, curve) in enumerate(curves.items()):
-            above.plot(run.time[thin], curve[thin], color=f"C{k}", lw=1, label=law)
-            below.plot(run.time[thin], (run.friction - curve)[thin], color=f"C{k}", lw=0.5)
+            above.plot(time, curve[thin], color=f"C{k}", lw=1, label=law)
+            below.plot(time, (run.friction - curve)[thin], color=f"C{k}", lw=0.5)
         above.set_ylabel("friction $F/W$")
         above.legend(fontsize=8)
         below.set_ylabel("data - law")

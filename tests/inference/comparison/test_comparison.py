@@ -19,6 +19,7 @@ from asperity.errors import InputError
 from asperity.inference import answers, compare, fit, table_of
 from asperity.inference.comparison.compare import judge, laws_table
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out, support
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.residuals import outlying_rows
 from asperity.laws import get_law
 from asperity.orbit import response_function
@@ -370,6 +371,13 @@ def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     assert row[-1] == "lowest AICc; B, c not determined"
 
 
+class _Run(SimpleNamespace):
+    """A recording that begins at `origin`."""
+
+    origin = 0.0
+    recorded_times = RecordedRun.recorded_times
+
+
 class _Motion(SimpleNamespace):
     """A recording's part of an objective, with a motion that is what a fit says."""
 
@@ -389,9 +397,9 @@ def _fit_with(law, run, friction, aicc=0.0, **about):
 def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps, doubted):
     time = np.linspace(0, 100, 2001)
     noise = 1e-3 * np.random.default_rng(3).standard_normal(time.size)
-    run = SimpleNamespace(
-        name="run", time=time, friction=0.6 + noise, jumps=jumps, stretches=[(0, time.size)]
-    )
+    run = _Run(name="run", time=time, friction=0.6 + noise, jumps=jumps, stretches=[(0, time.size)])
+    # Times of the verdict are those of the recording, as of a window.
+    run.origin = 300.0
     wrong = np.where((time > 40) & (time < 42), 0.61, 0.6)
     best = _fit_with("good", run, np.full(time.size, 0.6))
     # Outside the stretch the two are one law: it alone excludes the other, if that is excluded.
@@ -399,10 +407,10 @@ def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps
         doubt, stretch = support(best, _fit_with("poor", run, wrong, aicc))
         said = doubt if rests else stretch
         begin, end = map(float, re.search(r"(?:in|on) (\S+) to (\S+) s of run", said).groups())
-        assert 39 < begin < 41
-        assert 41 < end < 43
+        assert 339 < begin < 341
+        assert 341 < end < 343
         assert ("it rests on" in doubt) is rests
-        assert ("the recording jumps at 41 s" in doubt) is doubted
+        assert ("the recording jumps at 341 s" in doubt) is doubted
     # An error everywhere rests on no stretch.
     everywhere = _fit_with("poor", run, np.full(time.size, 0.61), 1e3)
     doubt, stretch = support(best, everywhere)
@@ -415,9 +423,7 @@ def test_a_verdict_rests_on_no_sample_that_is_left_out():
     time = np.linspace(0, 100, 2001)
     friction = 0.6 + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
     friction[500] += 100.0
-    run = SimpleNamespace(
-        name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)]
-    )
+    run = _Run(name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)])
     poor = _fit_with("poor", run, np.where((time > 40) & (time < 42), 0.61, 0.6) - 1e-4, 200.0)
     said = [
         " ".join(support(_fit_with("good", run, np.full(time.size, 0.6), basis=basis), poor))
@@ -430,9 +436,7 @@ def test_a_verdict_rests_on_no_sample_that_is_left_out():
 def test_a_verdict_that_changes_with_the_window_says_so_first():
     time = np.linspace(0, 100, 2001)
     friction = np.where(time < 50, 0.6, 0.601)
-    run = SimpleNamespace(
-        name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)]
-    )
+    run = _Run(name="run", time=time, friction=friction, jumps=(), stretches=[(0, time.size)])
     best = _fit_with("good", run, np.where(time < 50, 0.6, 0.6012))
     # Squares of the halves: 0 and 40 of the better law, 250 and 0 of the other; 210 in all.
     other = _fit_with("poor", run, np.where(time < 50, 0.6005, 0.601), 210.0)

@@ -311,7 +311,7 @@ def _run_pictures(result: Any) -> list[dict[str, Any]]:
     for term in result.objective.terms_of(RunTerm):
         fitted = term.fitted_friction(result.values)
         run = term.run
-        time, recorded = run.time + run.origin, run.friction
+        time, recorded = run.recorded_times(run.time), run.friction
         curves = {"recorded": recorded, "fitted": fitted, "difference": recorded - fitted}
         shown = {name: thinned(time, values, _BLOCKS) for name, values in curves.items()}
         transients = []

@@ -238,7 +238,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
     doubts, stretches = [], []
     pairs = zip(best.objective.terms_of(RunTerm), other.objective.terms_of(RunTerm), strict=True)
     for first, second in pairs:
-        name, time = first.name, first.run.time
+        name, time = first.name, first.run.recorded_times(first.run.time)
         edges, total = _gains(first, best, second, other)
         begin, end, _ = _shortest(edges, total, _MOST, time)
         span = f"{begin:.4g} to {end:.4g} s of {name}"
@@ -264,7 +264,8 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
             for half, gain in halves.items()
             if gain <= -EXCLUDED
         ]
-        inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
+        jumps = first.run.recorded_times(first.run.jumps or ())
+        inside = [f"{t:.4g} s" for t in jumps if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
         doubts += [f"even under {best.law} {doubt}" for doubt in first.doubts]

@@ -158,6 +158,10 @@ class RecordedRun:
         begin = self.time if self.blocks is None else self.blocks.edges[:, 0]
         return np.searchsorted(begin, times, side="right") - 1
 
+    def recorded_times(self, times: Sequence[float] | Float) -> Float:
+        """Times (s) from the first sample as times in the recording, as users give them."""
+        return self.origin + np.asarray(times, float)
+
     @property
     def stiffness_unit(self) -> str:
         """Unit of K: the unit of the load over a length."""

@@ -156,8 +156,10 @@ class RunTerm(DataTerm):
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
             "lines_removed": [] if self.run.blocks is None else list(self.run.blocks.lines),
-            "outliers": sorted({*(self.run.spikes or ()), *(self.run.wrong or ())}),
-            "jumps": list(self.run.jumps or ()),
+            "outliers": self.run.recorded_times(
+                sorted({*(self.run.spikes or ()), *(self.run.wrong or ())})
+            ).tolist(),
+            "jumps": self.run.recorded_times(self.run.jumps or ()).tolist(),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
@@ -397,11 +399,11 @@ class RunTerm(DataTerm):
                 "between two samples: the intervals are those without it; sample faster"
             )
         if self.run.jumps:
-            times = ", ".join(f"{t:.6g}" for t in self.run.jumps)
+            times = ", ".join(f"{t:.6g}" for t in self.run.recorded_times(self.run.jumps))
             sentences.append(
-                f"{self.name} jumps by itself at {times} s after the first sample, as a gauge does "
-                "that slips or is moved: its level there is fitted; look at the recording, or give "
-                "a window without it"
+                f"{self.name} jumps by itself at {times} s, as a gauge does that slips or is "
+                "moved: its level there is fitted; look at the recording, or give a window without "
+                "it"
             )
         chance, size = self._after_changes
         if self.law_fails_after_changes:
@@ -415,10 +417,10 @@ class RunTerm(DataTerm):
         return sentences
 
     def _sentence_on(self, times: Sequence[float], what: str, one: str, several: str) -> str:
-        shown = ", ".join(f"{time:.6g}" for time in times[:_NAMED])
+        shown = ", ".join(f"{time:.6g}" for time in self.run.recorded_times(times[:_NAMED]))
         shown += ", ..." if len(times) > _NAMED else ""
         those, are = (f"{len(times)} {what}s", several) if len(times) > 1 else (f"a {what}", one)
-        return f"{those} of {self.name}, at {shown} s after the first sample, {are}"
+        return f"{those} of {self.name}, at {shown} s, {are}"
 
     @property
     def _linear(self) -> int:
