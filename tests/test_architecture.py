@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "_processes": {"errors"},
     "errors": set(),
     "units": {"errors", "_lazy"},
-    "outputs": {"errors", "_lazy", "_version"},  # files of any content
+    "outputs": {"errors", "_lazy", "_version", "parameters"},  # files of any content
     "parameters": {"errors", "units", "_lazy"},  # reads fields that laws declare
     "questions": _BASE | {"loads"},  # knows nothing of how they are answered
     "algebra": {"arrays", "_jax"},
@@ -56,7 +56,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "protocol": _RESULTS | {"experiment", "operating_point"},
     "samples": _BASE | {"operating_point", "protocol", "recording"},
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
-    "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
+    "figures": _BASE | _SIGNALS | _STUDIES | {"questions"},  # solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
     "ledger": _BASE | {"materials", "figures", "questions"},  # knows no paper
     "app": _RESULTS

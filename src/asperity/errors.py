@@ -234,8 +234,8 @@ def require_known(name: str, known: Iterable[str], field: str | Argument, rule: 
     field, rule : str
         As in `InputError`.
     """
-    if name not in known:
-        raise InputError(field, rule, f"'{printable(name, 80)}'", closest(name, known))
+    name = str(name)
+    require(name in known, field, rule, f"'{printable(name, 80)}'", closest(name, known))
 
 
 class InputTypeError(InputError, TypeError):

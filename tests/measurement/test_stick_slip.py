@@ -20,8 +20,7 @@ from asperity.measurement.stick_slip.events import SlipEvents
 from asperity.measurement.stick_slip.healing import of_campaign
 from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 from asperity.measurement.stick_slip.threshold import linear_frequency, thresholds
-from asperity.recording import Channel, Trace
-from asperity.recording.defects.check import check
+from asperity.recording import Channel, Trace, check
 from asperity.theory import healing_drop
 from references.populations import population
 

@@ -16,10 +16,13 @@ from jax.typing import ArrayLike
 
 import asperity as asp
 from asperity.errors import InputError, InputTypeError, closest
+from asperity.figures.plot import Panel, Plot
 from asperity.laws import Law
 from asperity.loads import CyclicLoading, Hold, Programme, Slide
+from asperity.outputs import UnfinishedText, output_file
 from asperity.parameters.arguments import FilePath, annotations_of, at_least, of_type, typed
 from asperity.study.map import Axis, write_map
+from asperity_papers.bureau2000.machine import Machine
 
 PMMA = asp.materials.load("bureau2000")
 LAW = PMMA.law("rice-ruina")
@@ -121,6 +124,21 @@ def test_a_quantity_is_a_number_or_a_text(value) -> None:
         (lambda: asp.theory.closed_forms.determinant(PMMA), "p"),
         (lambda: asp.experiment.Exciter(120.0, "all"), "transfer"),
         (lambda: asp.recording.Channel("x"), "Channel.values"),
+        (lambda: asp.recording.check(3), "trace"),
+        (lambda: asp.recording.Finding(1, "note", 0.0, "F", "x"), "name"),
+        (lambda: asp.loads.Periodic(load={1: 0.2}), "load"),
+        (lambda: asp.inference.LockInTable("x", None, {}, {}), "points"),
+        (lambda: asp.orbit.PeriodicResponse.from_search(3, (), 0.5, 3, 3), "solution"),
+        (lambda: asp.orbit.ResponseValues.of_columns("x", 0, 2), "columns"),
+        (lambda: asp.orbit.ResponseFunction(3, {}), "program"),
+        (lambda: asp.orbit.response_function("rice-ruina")(["V"]), "parameters"),
+        (lambda: asp.transients.Trajectory.joined(3), "blocks"),
+        (lambda: asp.theory.memory.steady_growth(SLIDER), "motion"),
+        (lambda: asp.parameters.Parameter(3, "length", "positive"), "name"),
+        (lambda: output_file(3), "path"),
+        (lambda: UnfinishedText("out.csv", {}), "target"),
+        (lambda: asp.slider.equation_of_motion(SLIDER, 1e-6, 1.0, eta="x"), "eta"),
+        (lambda: Machine(3), "numbers"),
     ],
 )
 def test_public_functions_are_checked(call, name) -> None:
@@ -130,6 +148,8 @@ def test_public_functions_are_checked(call, name) -> None:
 
 TRACE = asp.samples.modulated()
 RECORDER = asp.tribometer.Recorder(rate=9.0)
+PROGRAMME = Programme(Slide("1 s"), load=7.0, velocity=1e-6)
+PRINTED = {"dimension": "length", "kind": "fitted", "place": "Fig. 1"}
 READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "mu1_err": [1e-5]}
 
 
@@ -186,6 +206,19 @@ READINGS = {"V": [1e-6], "epsilon": [0.1], "frequency": [9.0], "mu1": [1e-3], "m
         (lambda: asp.parameters.known_name(3, {}), "name must be a text, got 3"),
         (lambda: asp.parameters.display_name("A", "x"), "names must be one of friction"),
         (lambda: asp.Slider(LAW, spring=1e-320, load=7.0), "range of double precision, got 9."),
+        (lambda: asp.parameters.obeying(1.0, "x", "velocity", 3), "rule must be a known rule"),
+        (lambda: asp.study.reasons("x", 1.0), "outcome must be the variable of a store"),
+        (lambda: asp.inference.LockInTable("x", {}, {}, {}), "points must have V of each row"),
+        (lambda: TRACE.name_of(asp.recording.Channel([0.0])), "channel must be one of the trace"),
+        (lambda: asp.protocol.outline("none.nc"), "run must be a NetCDF file of a run that can be"),
+        (lambda: PROGRAMME.load("x"), "t must be a finite number with a unit"),
+        (lambda: asp.materials.Number(unit="m"), r"\(1\) Number.dimension must be given"),
+        (lambda: asp.materials.Number(value=1.0, unit=3, **PRINTED), "Number.unit must be a text"),
+        (lambda: asp.materials.Number(unit="m", **PRINTED), "Number must have a value, a range or"),
+        (lambda: asp.protocol.Repeat(repeat="x", steps=[]), "Repeat.repeat must be a whole number"),
+        (lambda: asp.protocol.ProtocolStart(velocity="3 kg"), "ProtocolStart.velocity must be a v"),
+        (lambda: Panel(x=3, y="y"), "Panel.x must be a text, got 3"),
+        (lambda: Plot(panel=[{"x": 3, "y": "y"}]), "Plot.panel.0.x must be a text, got 3"),
     ],
 )
 def test_what_no_call_may_pass_on(call, sentence) -> None:

@@ -74,8 +74,8 @@ class Exciter:
             Normal elastic length (m).
         layer : AirLayer or None
         """
-        hertz = to_si(frequency, "frequency", "exciter.frequency")
-        length = to_si(lambda_z, "length", "exciter.lambda_z")
+        hertz = number(frequency, "exciter.frequency", "frequency", "positive")
+        length = number(lambda_z, "exciter.lambda_z", "length", "positive")
         transfer = transfer_function(
             hertz, W0=np.asarray(slider.W0), M=np.asarray(slider.M), lambda_z=length, layer=layer
         )

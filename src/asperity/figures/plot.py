@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from asperity.errors import require_known
 from asperity.figures.style import COLOURS, DASHES, STATED, STATED_FILL, new_figure
+from asperity.questions.record import Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,11 +40,7 @@ _STATED_RANGE: Look = {
 _STATED_VALUE: Look = {"color": STATED, "linewidth": 2.2, "solid_capstyle": "butt"}
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Panel(_Part):
+class Panel(Record):
     """Axes of a figure.
 
     Attributes
@@ -97,7 +94,7 @@ class Panel(_Part):
     legend: dict[str, Any] = Field(default_factory=dict)
 
 
-class Item(_Part):
+class Item(Record):
     """An element of panels, and its entry in a legend.
 
     Attributes
@@ -149,7 +146,7 @@ class Item(_Part):
     look: dict[str, Any] = Field(default_factory=dict)
 
 
-class Plot(_Part):
+class Plot(Record):
     """A figure: size in inches, panels row by row, and items in the order of the legend."""
 
     size: tuple[float, float] = (5.0, 3.5)

@@ -21,6 +21,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.parameters.arguments import typed
+
 #: Twelve digits: more than the accuracy of any method, and less than round-off.
 _DIGITS = "%.12g"
 
@@ -123,6 +125,7 @@ class Picture(Figure):
         return file.getvalue(), {"width": width, "height": height}
 
 
+@typed
 def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
     """An empty figure (inches), not registered with pyplot."""
     return Picture(figsize=(width, height))

@@ -32,6 +32,7 @@ from asperity.materials import cited_works
 from asperity.outputs.tables import as_html, html_page, html_table
 from asperity.outputs.written import written_folder
 from asperity.parameters import NAMES, Names, law_parameters, point_parameters
+from asperity.parameters.arguments import typed
 
 
 def document(title: str, kicker: str, heading: str, sections: Mapping[str, str]) -> str:
@@ -61,6 +62,7 @@ RUN_CAPTION = (
 )
 
 
+@typed
 def write_report(
     folder: Path, fit: Fit, posterior: Posterior | None = None, names: Names = NAMES[0]
 ) -> None:
@@ -210,6 +212,7 @@ def provenance(fit: Fit) -> str:
 _MOST_NARROW = 2
 
 
+@typed
 def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[0]) -> None:
     """Write the report of a comparison into a folder, completely or not at all.
 

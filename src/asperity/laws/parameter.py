@@ -9,8 +9,10 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from asperity.parameters import INTERFACE, Parameter, obeying, plain_name
+from asperity.parameters.arguments import typed
 
 
+@typed
 def parameter(
     name: str,
     kind: str,

@@ -19,7 +19,7 @@ from jax.typing import ArrayLike
 from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.parameters.arguments import at_least, shown, typed
-from asperity.parameters.parameter import obeying
+from asperity.parameters.rules import obeying
 from asperity.units import to_radians, to_si
 
 
@@ -105,6 +105,7 @@ class Harmonic(Modulation):
 Series: TypeAlias = tuple[tuple[ArrayLike, ArrayLike], ...]
 
 
+@typed
 class Periodic(Modulation):
     """One period of an excitation given by Fourier coefficients.
 

@@ -8,21 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.arrays import Float, Index
 from asperity.errors import Argument, InputError, require
-from asperity.recording.defects.check import check, rows_to_avoid, usable_rows
+from asperity.recording.defects.check import rows_to_avoid, usable_rows
 from asperity.recording.defects.sampling import even_times
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding
 from asperity.recording.roles import role_of
-
-if TYPE_CHECKING:
-    from asperity.recording.trace import Channel, Trace
-
+from asperity.recording.trace import Channel, Trace, check
 
 #: Medians of F/W and of a recorded friction that differ by more than this share contradict each
 #: other. Corrections for jackets, seals and changing areas are some percent; a wrong unit, column

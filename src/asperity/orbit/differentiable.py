@@ -58,6 +58,7 @@ class ResponseFunction:
         Names of the parameters.
     """
 
+    @typed
     def __init__(
         self, program: Program, defaults: Mapping[str, Any], least_points: int = _FEWEST
     ) -> None:
@@ -66,6 +67,7 @@ class ResponseFunction:
         self._least_points = least_points
 
     @classmethod
+    @typed
     def of(
         cls, equations: ParametrisedProblem, *, harmonics: int, multipliers: bool
     ) -> ResponseFunction:
@@ -86,10 +88,12 @@ class ResponseFunction:
     def __repr__(self) -> str:
         return f"response_function of {', '.join(self.parameters)}"
 
-    def compiled_points(self, points: int) -> int:
+    @typed
+    def compiled_points(self, points: Annotated[int, at_least(1)]) -> int:
         """Number of points of the compiled program that a call with `points` points uses."""
         return 1 << (max(points, self._least_points, _FEWEST) - 1).bit_length()
 
+    @typed
     def __call__(
         self,
         parameters: Mapping[str, ArrayLike],
@@ -130,6 +134,7 @@ class ResponseFunction:
         values = _evaluate(padded, orbits.fast, orbits.wanted, program=orbits.program)
         return _cut(_with_searched(values, orbits), points)
 
+    @typed
     def value_and_jacobian(
         self,
         parameters: Mapping[str, ArrayLike],

@@ -16,7 +16,7 @@ from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arg
 from asperity.orbit.outcome import Outcome, sentences
 from asperity.orbit.solution import Solution
 from asperity.parameters import DRIVE, OUTPUTS, Parameter
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import shown, typed
 from asperity.parameters.parameter import (
     Drawn,
     SummaryLine,
@@ -100,11 +100,12 @@ class PeriodicResponse(Drawn):
     load: Modulation
 
     @classmethod
+    @typed
     def from_search(
         cls,
         solution: Solution,
         shape: tuple[int, ...],
-        mu_ss: Float,
+        mu_ss: Float | float,
         motion: Motion,
         load: Modulation,
     ) -> PeriodicResponse:

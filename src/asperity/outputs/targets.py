@@ -8,10 +8,11 @@ from __future__ import annotations
 import os
 import shutil
 import stat
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from asperity.errors import InputError, require
+from asperity.parameters.arguments import typed
 
 #: Share of the free room that one computation may fill.
 _SHARE = 0.8
@@ -19,6 +20,7 @@ _SHARE = 0.8
 _UNITS = ("B", "kB", "MB", "GB", "TB", "PB", "EB")
 
 
+@typed
 def size_text(count: float) -> str:
     """Return a number of bytes with its unit, such as ``"1.2 GB"``."""
     power = 0
@@ -33,6 +35,7 @@ def free_memory() -> float:
     return min(value for value in (*free, float("inf")) if value is not None)
 
 
+@typed
 def free_disk(folder: Path) -> float:
     """Free space on the disk of a folder (bytes); infinite if unknown."""
     try:
@@ -41,6 +44,7 @@ def free_disk(folder: Path) -> float:
         return float("inf")
 
 
+@typed
 def require_memory(size: float, name: str, what: str, way_out: str) -> None:
     """Refuse a computation that does not fit in memory.
 
@@ -59,6 +63,7 @@ def require_memory(size: float, name: str, what: str, way_out: str) -> None:
     _require(size, free_memory(), name, what, way_out, "of memory")
 
 
+@typed
 def require_disk(size: float, folder: Path, name: str, what: str, way_out: str) -> None:
     """Refuse an output that does not fit on the disk; parameters as in `require_memory`.
 
@@ -104,6 +109,7 @@ def _left_in_group() -> float | None:
 _LONGEST = 255
 
 
+@typed
 def output_file(
     path: str | os.PathLike[str],
     name: str = "out",
@@ -157,12 +163,14 @@ def output_file(
     return target
 
 
+@typed
 def require_netcdf(path: str | os.PathLike[str], name: str, example: str) -> None:
     """Refuse a name that does not end as one of NetCDF; parameters as of `output_file`."""
     netcdf = Path(path).suffix.lower() == ".nc"
     require(netcdf, name, "be a NetCDF file", f"'{path}'", f"write it like {example}")
 
 
+@typed
 def output_files(
     paths: Mapping[str, str | os.PathLike[str] | None],
     *,
@@ -221,7 +229,8 @@ def _temporary_files(target: Path) -> tuple[Path, ...]:
     return partial, record, fresh_name(record), fresh_name(target)
 
 
-def require_short(target: Path, files: Iterable[Path], name: str = "out") -> None:
+@typed
+def require_short(target: Path, files: Sequence[Path], name: str = "out") -> None:
     """Refuse a target if the name of a temporary file next to it is too long.
 
     Raises

@@ -23,6 +23,7 @@ from asperity.errors import InputError, require
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
 from asperity.outputs.written import to_disk, writable
+from asperity.parameters.arguments import typed
 
 _Result = TypeVar("_Result")
 
@@ -51,6 +52,7 @@ class Interrupted(KeyboardInterrupt):
         )
 
 
+@typed
 class UnfinishedOutput:
     """The finished blocks of an output, and their record.
 
@@ -252,6 +254,7 @@ def _checksum(progress: Mapping[str, Any]) -> int:
     return zlib.crc32(json.dumps(progress, sort_keys=True).encode())
 
 
+@typed
 def undisturbed(work: Callable[[], _Result]) -> _Result:
     """Run `work` without interruption by Ctrl-C.
 
@@ -272,6 +275,7 @@ def _flat(inputs: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+@typed
 def differences(saved: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     """Differences between inputs, in words; empty if there are none.
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from asperity.errors import InputError
 from asperity.outputs.targets import fresh_name
+from asperity.parameters.arguments import typed
 
 try:
     import fcntl
@@ -22,6 +23,7 @@ except ImportError:  # pragma: no cover  Windows: temporary folders of killed ru
 _PREFIX = ".asperity-unfinished-"
 
 
+@typed
 @contextmanager
 def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[Path]:
     """A temporary path next to `target`, whose file replaces `target` at the end.
@@ -70,6 +72,7 @@ def to_disk(path: Path) -> None:
         os.fsync(stream.fileno())
 
 
+@typed
 def require_folder(folder: Path, name: str = "out") -> None:
     """Refuse a folder that cannot be written, before anything is computed for it.
 
@@ -84,6 +87,7 @@ def require_folder(folder: Path, name: str = "out") -> None:
         os.close(lock)
 
 
+@typed
 @contextmanager
 def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
     """A temporary folder, whose files are moved to `folder` at the end.
@@ -192,6 +196,7 @@ def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
     return InputError(name, rule, f"'{folder}' ({why})", advice)
 
 
+@typed
 def write_table(path: Path, names: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """Write a table: a line of names, and a line for each row."""
     with path.open("w", encoding="utf-8", newline="") as stream:

@@ -5,15 +5,14 @@ every name from here.
 """
 
 from asperity._lazy import public_names
+from asperity.parameters.arguments import typed as typed
 from asperity.parameters.parameter import (
     NAMES as NAMES,
-    RULES as RULES,
     Names as Names,
     Output as Output,
     Parameter as Parameter,
-    Rule as Rule,
-    obeying as obeying,
 )
+from asperity.parameters.rules import RULES as RULES, Rule as Rule, obeying as obeying
 from asperity.parameters.table import (
     DRIVE as DRIVE,
     EXPERIMENT as EXPERIMENT,

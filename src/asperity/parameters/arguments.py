@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.errors import InputError, InputTypeError, closest
-from asperity.parameters.parameter import obeying
+from asperity.parameters.rules import obeying
 from asperity.units.kinds import shown as shown, with_article
 
 P = ParamSpec("P")
@@ -248,7 +248,7 @@ def one_of(value: Any, known: Iterable[str], label: str) -> str:
         For any other text; the message suggests the nearest one.
     """
     known = list(known)
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         near = closest(str(value), known)
         advice = near if near.startswith("did you mean") else "choose one"
         raise InputError(label, f"be one of {', '.join(known)}", shown(value), advice)

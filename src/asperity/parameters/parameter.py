@@ -1,14 +1,13 @@
 """A parameter or an output without its value: kind, unit, rule, meaning, and how it is displayed.
 
-A value that breaks a rule is an error in one sentence. Objects are displayed on consoles and in
-notebooks as short texts and tables, arrays by what they hold.
+Objects are displayed on consoles and in notebooks as short texts and tables, arrays by what they
+hold.
 """
 
 from __future__ import annotations
 
 import html
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
@@ -16,7 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, require_known
+from asperity.parameters.arguments import typed
+from asperity.parameters.rules import RULES, obeying
 from asperity.units import KINDS, format_si, to_radians, to_si
 from asperity.units.convert import is_traced
 
@@ -24,97 +24,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Rule:
-    """A rule that a number obeys.
-
-    Attributes
-    ----------
-    words : str
-        Text after "must" in a message.
-    holds : callable
-        Whether each element of an array obeys the rule.
-    advice : str
-        Advice for a value that breaks the rule.
-    """
-
-    words: str
-    holds: Callable[[Any], Any]
-    advice: str
-
-
-#: Every rule, by name. NaN and infinities are refused by `asperity.units.to_si` already.
-RULES: Mapping[str, Rule] = MappingProxyType(
-    {
-        "positive": Rule("be positive", lambda x: x > 0, "give a value above zero"),
-        "not negative": Rule("not be negative", lambda x: x >= 0, "give a value of at least zero"),
-        "finite": Rule("be finite", np.isfinite, "give a finite value"),
-        "amplitude": Rule(
-            "be at least 0 and below 1, so that contact is never lost",
-            lambda x: (x >= 0) & (x < 1),
-            "give the relative amplitude of the load, such as 0.24 or '24 %'",
-        ),
-        "below a right angle": Rule(
-            "be less than a right angle, pi/2, on either side",
-            lambda x: np.abs(x) < np.pi / 2,
-            "give the angle from the normal in rad, such as 0.03, or as a text like '2 deg'",
-        ),
-        "switch": Rule(
-            "be 1 or 0",
-            lambda x: np.isin(x, (0.0, 1.0)),
-            "write 1 to include it, 0 to leave it out",
-        ),
-    }
-)
-
-
-def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
-    """Convert a value to SI and check its rule.
-
-    Parameters
-    ----------
-    value : str, number, array or sequence of these
-        A text carries its unit, a number is SI.
-    label : str
-        What messages call the value, as ``slider.spring``.
-    kind : str
-        A key of `asperity.units.KINDS`.
-    rule : str
-        A key of `RULES`.
-
-    Returns
-    -------
-    array of float
-        Of the shape of `value`. A value that JAX traces is returned as it is, unchecked.
-
-    Raises
-    ------
-    InputError
-        Naming the value, the rule, the first offending element and its unit.
-    """
-    require_known(rule, RULES, "rule", "be a known rule")
-    if is_traced(value):
-        return value
-    array = np.asarray(to_si(value, kind, label), dtype=float)
-    # As in texts: a number below the smallest normal double has few digits, and its reciprocal may
-    # be infinite.
-    small = (array != 0) & (np.abs(array) < sys.float_info.min)
-    within = "lie within the range of double precision", "give 0 or a larger number"
-    for wrong, words, advice in (
-        (~RULES[rule].holds(array), RULES[rule].words, RULES[rule].advice),
-        (small, *within),
-    ):
-        if np.any(wrong):
-            got = f"{array[wrong].flat[0]:g} {KINDS[kind].si}".rstrip()
-            raise InputError(label, words, got, advice)
-    return array
-
-
 #: What a parameter belongs to: the friction law, the machine, the equation of motion, the drive,
 #: or the normal load.
 Place = Literal["law", "slider", "motion", "drive", "load"]
 
 
+@typed
 @dataclass(frozen=True)
 class Parameter:
     """A number that a calculation depends on.
@@ -225,6 +140,7 @@ class Parameter:
             value = np.asarray(value, dtype=float)
         return obeying(value, label or self.label or self.name, self.kind, self.rule)
 
+    @typed
     def unit_in_si(self, unit: str, label: str) -> float:
         """The SI value of a unit, such as that in the heading of a column.
 
@@ -317,6 +233,7 @@ class Drawn(Displayed):
     #: round.
     _drawn_by: ClassVar[str]
 
+    @typed
     def plot(self, names: Names = "friction") -> Figure:
         """The object as a Matplotlib figure, to be changed, shown, or written by its ``savefig``.
 
@@ -330,7 +247,6 @@ class Drawn(Displayed):
         InputError
             If `names` is none of the two, or an object of this shape has no picture.
         """
-        import_module("asperity.parameters.arguments").one_of(names, NAMES, "names")
         module, name = self._drawn_by.split(":")
         with import_module("asperity.figures.style").style():
             figure: Figure = getattr(import_module(module), name)(self)

@@ -15,7 +15,8 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.outputs import output_file, written_file
-from asperity.parameters.arguments import typed
+from asperity.parameters.arguments import FilePath, typed
+from asperity.parameters.columns import readable
 
 if TYPE_CHECKING:
     import xarray
@@ -166,7 +167,7 @@ def write_csv(run: str | Path, out: str | Path) -> Path:
 
 
 @typed
-def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
+def outline(run: FilePath, stretches: int = 2000) -> RunOutline:
     """Extremes of load, force, velocity and age over stretches of equal length.
 
     Parameters
@@ -178,7 +179,7 @@ def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     """
     import h5netcdf
 
-    with h5netcdf.File(run, "r") as file:
+    with readable(Path(run), "run", "NetCDF file of a run"), h5netcdf.File(run, "r") as file:
         time = file.variables["time"]
         first, last, rows = float(time[0]), float(time[-1]), time.shape[0]
         kinds = [k.decode() if isinstance(k, bytes) else k for k in file.variables["event_kind"][:]]

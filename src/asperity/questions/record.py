@@ -25,7 +25,7 @@ from pydantic import (
 )
 
 from asperity.errors import InputError, Key, MistakesError, closest, require
-from asperity.parameters.arguments import number, rising, shown as shown_value
+from asperity.parameters.arguments import number, rising, shown as shown_value, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.units import KINDS
 
@@ -56,27 +56,24 @@ _units_required: ContextVar[bool] = ContextVar("units_required", default=False)
 
 
 class Record(BaseModel):
-    """A part of a question: frozen, and without fields of other names."""
+    """A part of a question: frozen, and without fields of other names.
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True
-    )
-
-
-class Question(Record):
-    """A question; all mistakes in one `MistakesError`.
+    All mistakes of a record are in one `MistakesError`.
 
     Attributes
     ----------
     subject : str
-        Name of the record in messages without a field.
-    prefix : str
-        What they put before the name of a field.
+        Name of the record in messages without a field; that of its class by default.
+    prefix : str, optional
+        What they put before the name of a field; the name of the class and a point by default.
     mistakes_error : type of MistakesError
     """
 
-    subject: ClassVar[str] = "question"
-    prefix: ClassVar[str] = ""
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True
+    )
+    subject: ClassVar[str] = ""
+    prefix: ClassVar[str | None] = None
     mistakes_error: ClassVar[type[MistakesError]] = MistakesError
 
     def __init__(self, /, **fields: Any) -> None:
@@ -84,6 +81,21 @@ class Question(Record):
             super().__init__(**fields)
         except ValidationError as error:
             raise self.mistakes_error(mistakes_in(error, type(self))) from None
+
+    # Mistakes of a record within another one have their place there.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A record with some fields replaced, checked as any other."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **(update or {})})
+
+
+class Question(Record):
+    """A question, which a file may ask."""
+
+    subject: ClassVar[str] = "question"
+    prefix: ClassVar[str | None] = ""
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
@@ -110,6 +122,7 @@ class Question(Record):
         return cls.of_content({**fields, **content}, str(path))
 
     @classmethod
+    @typed
     def of_content(cls, content: Mapping[str, Any], source: str = "") -> Self:
         """The question that the content of a file asks, with the rules of a file."""
         with units_required():
@@ -120,11 +133,6 @@ class Question(Record):
                     mistake.about(Key(*mistake.field)).shortened() for mistake in error.errors
                 ]
                 raise cls.mistakes_error(mistakes, source) from None
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A question with some fields replaced, checked as any other."""
-        fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self)(**{**fields, **(update or {})})
 
 
 @contextmanager
@@ -244,8 +252,8 @@ def shown(value: Any) -> str:
     return shown_value(value)
 
 
-def mistakes_in(error: ValidationError, model: type[Question]) -> list[InputError]:
-    """The mistakes that pydantic reports in a question, each once."""
+def mistakes_in(error: ValidationError, model: type[Record]) -> list[InputError]:
+    """The mistakes that pydantic reports in a record, each once."""
     mistakes: dict[tuple[str, ...], InputError] = {}
     for reported in error.errors(include_url=False):
         for mistake in _mistakes(reported, model):
@@ -259,7 +267,7 @@ def mistakes_in(error: ValidationError, model: type[Question]) -> list[InputErro
     return list(mistakes.values())
 
 
-def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[InputError, ...]:
+def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputError, ...]:
     raised = reported.get("ctx", {}).get("error")
     if isinstance(raised, MistakesError):
         return raised.errors
@@ -269,12 +277,15 @@ def _mistakes(reported: Mapping[str, Any], model: type[Question]) -> tuple[Input
         for i, part in enumerate(reported["loc"])
         if not (i and isinstance(part, str) and ("[" in part or part in _TYPES | records))
     ]
-    field = model.prefix + ".".join(place) if place else model.subject
+    prefix = f"{model.__name__}." if model.prefix is None else model.prefix
+    field = prefix + ".".join(place) if place else model.subject or model.__name__
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)
     if reported["type"] == "missing":
-        inside = _types_at(model, reported["loc"])
+        *around, name = reported["loc"]
+        kind: Any = _types_at(model, tuple(around)).get(name)
+        inside = _types_at(kind, ()) if _is_model(kind) else ()
         advice = f"add it, a table of {', '.join(inside)}" if inside else "add it"
         return (InputError(field, "be given", "nothing", advice),)
     value = shown(reported["input"])

@@ -1,10 +1,9 @@
 """Recordings of a laboratory: a `Trace` of channels over time, its readers, checks and writers."""
 
-from asperity.recording.defects.check import check
 from asperity.recording.derived import derive, stiffness_from_friction, stress_to_force
 from asperity.recording.finding import Finding
 from asperity.recording.readers import read
-from asperity.recording.trace import Channel, Trace
+from asperity.recording.trace import Channel, Trace, check
 
 __all__ = [
     "Channel",

@@ -10,11 +10,10 @@ import numpy as np
 
 from asperity.errors import Argument, InputError, require
 from asperity.parameters.arguments import number, typed
-from asperity.recording.defects.check import check
 from asperity.recording.expressions import Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import free_name, kinds_of, nouns, role_of
-from asperity.recording.trace import Channel, Trace, checked
+from asperity.recording.trace import Channel, Trace, check, checked
 from asperity.units import KINDS, to_si
 from asperity.units.scale import kind_of_dimension, unit_text
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 from asperity.arrays import Float
 from asperity.errors import InputError, printable
+from asperity.parameters.arguments import typed
 
 Severity = Literal["note", "warning", "error"]
 
@@ -17,6 +18,7 @@ _COLUMNS = frozenset(
 )
 
 
+@typed
 @dataclass(frozen=True)
 class Finding:
     """A defect of a recording, or an assumption of its reader.

@@ -12,9 +12,9 @@ import numpy as np
 
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, InputTypeError, listed, require, require_known
-from asperity.parameters.arguments import of_type, shown
+from asperity.parameters.arguments import of_type, shown, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
-from asperity.recording.defects.check import CHECKED, check
+from asperity.recording.defects.check import CHECKED, defects
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel
@@ -113,6 +113,7 @@ class Trace(Displayed):
         lines += [SummaryLine("finding", str(finding)) for finding in self.findings]
         return f"Trace, {count_text(len(self), 'sample')}", lines
 
+    @typed
     def channel(self, name: str) -> Channel:
         """Channel by its name, the heading it was recorded under, or a role.
 
@@ -132,6 +133,7 @@ class Trace(Displayed):
         except InputError as error:
             raise with_cause(error, self.findings) from None
 
+    @typed
     def has(self, name: str) -> bool:
         """Whether `channel` finds a channel of this name, heading or role."""
         try:
@@ -140,15 +142,19 @@ class Trace(Displayed):
             return False
         return True
 
+    @typed
     def name_of(self, channel: Channel) -> str:
         """The name of one of the channels."""
-        return next(name for name, c in self.channels.items() if c is channel)
+        name = next((name for name, c in self.channels.items() if c is channel), "")
+        require(name, "channel", "be one of the trace", "another", "take one of its channels")
+        return name
 
     @property
     def sample_rate(self) -> float | None:
         """Samples per second, Hz; None where the sampling is uneven."""
         return even_rate(self.time)
 
+    @typed
     def slice(self, start: float | str | None = None, end: float | str | None = None) -> Trace:
         """Samples with ``start <= time < end``, checked again.
 
@@ -197,6 +203,36 @@ class Trace(Displayed):
                 "provenance": json.dumps(self.provenance, default=str),
             },
         )
+
+
+@typed
+def check(trace: Trace) -> tuple[Finding, ...]:
+    """Check a recording for defects that can make a measurement wrong.
+
+    Parameters
+    ----------
+    trace : Trace
+        Any recording; it is not changed.
+
+    Returns
+    -------
+    tuple of Finding
+        ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
+        ``"uneven sampling"``, ``"missing values"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
+        ``"saturation"``; at most one of each name for time and for each channel. Empty without a
+        defect.
+
+    Notes
+    -----
+    A gap is a step of time longer than 1.5 times the median of the 24 steps before it and of the
+    24 steps after it, and outside the scatter of these steps. A change of the sampling rate is
+    "uneven sampling" and no gap. Saturation is an excess of samples at exactly the largest or
+    smallest value, or several such samples in a row where no two samples are equal by chance. A
+    spike of at most three samples differs from the samples on both sides by more than ten times
+    the usual difference.
+    """
+    columns = {name: channel.values for name, channel in trace.channels.items()}
+    return tuple(defects(trace.time, columns))
 
 
 def checked(trace: Trace) -> Trace:

@@ -9,14 +9,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import jax
 import numpy as np
+from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
-from asperity.parameters.arguments import broadcast_shape
+from asperity.parameters.arguments import broadcast_shape, typed
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
@@ -35,13 +37,14 @@ def motion_type(*, inertia: bool, damped: bool, elastic: bool) -> type[Motion]:
     return QuasiStatic
 
 
+@typed
 def equation_of_motion(
     slider: Slider,
     V: ArrayLike,
     omega: ArrayLike,
     *,
     inertia: bool = False,
-    eta: ArrayLike | None = None,
+    eta: Array | Float | float | None = None,
 ) -> Motion:
     """The equation of motion with or without inertia and radiation damping.
 

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Float, Index
+from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads.modulation import no_contact
 from asperity.orbit.outcome import Outcome, sentence
 from asperity.parameters import Parameter, point_parameters
+from asperity.parameters.arguments import shown
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
 #: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).
@@ -216,7 +218,10 @@ def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
     outcome, detail : array
         Variables of a store, or parts of them.
     """
-    outcome, detail = np.broadcast_arrays(np.asarray(outcome), np.asarray(detail))
+    outcome, detail = np.broadcast_arrays(outcome, detail)
+    for name, values, kinds in (("outcome", outcome, "iu"), ("detail", detail, "iuf")):
+        numbers = values.dtype.kind in kinds
+        require(numbers, name, "be the variable of a store", shown(values), f"take store.{name}")
     texts = np.full(outcome.shape, "converged", dtype=object)
     for i in map(tuple, np.argwhere(outcome != SweepOutcome.CONVERGED)):
         texts[i] = _reason(int(outcome[i]), float(detail[i]))

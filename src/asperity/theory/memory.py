@@ -113,6 +113,7 @@ def _growth(law: Law, V: float, k: Float) -> Float:
     return np.asarray(steady_growth(QuasiStatic(slider, np.full(k.shape, V), 1.0)))
 
 
+@typed
 @jax.jit
 def steady_growth(motion: Motion) -> Array:
     """Growth rate of a small disturbance of steady sliding.

@@ -31,6 +31,7 @@ from jax.typing import ArrayLike
 
 from asperity.algebra.small_systems import solve_points, value_and_jacobian
 from asperity.loads import Excitation
+from asperity.parameters import DRIVE
 from asperity.parameters.arguments import broadcast_shape, typed
 from asperity.slider import Motion, Slider
 from asperity.slider.problem import checked_problem
@@ -101,7 +102,7 @@ class PerturbationResponse(eqx.Module):
     def at(self, epsilon: ArrayLike) -> PerturbedHarmonics:
         """Leading-order response at the amplitude `epsilon` (broadcasts with the points)."""
         arrays = self.omega.__array_namespace__()
-        first = arrays.asarray(epsilon)
+        first = arrays.asarray(DRIVE["epsilon"].check(epsilon, "epsilon"))
         second = first**2
         c1, c2 = first * self.transfer, second * self.second_harmonic
         return PerturbedHarmonics(

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.arrays import Float
-from asperity.parameters.parameter import obeying
+from asperity.parameters.rules import obeying
 
 #: Newton's steps; they converge from above in five.
 _STEPS = 40

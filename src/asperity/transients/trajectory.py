@@ -15,7 +15,7 @@ from asperity.arrays import Float
 from asperity.errors import InputError, require
 from asperity.laws import LinkerDieterich, RiceRuina
 from asperity.loads.programme.programme import BREAK
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
 from asperity.slider.named import equation_values, equations_as_text
@@ -248,11 +248,13 @@ class Trajectory(Drawn):
         """Names of the columns of `states`."""
         return (*self.motion.mechanical, *self.motion.slider.law.state_names)
 
+    @typed
     def event_times(self, kind: str) -> Float:
         """Times (s) of the events of one kind."""
         return np.array([e.time for e in self.events if e.kind == kind])
 
     @classmethod
+    @typed
     def joined(cls, blocks: Sequence[Trajectory]) -> Trajectory:
         """One trajectory from blocks that follow each other."""
         columns = {

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError, require, require_known
 from asperity.parameters.arguments import at_least, number, one_of, typed
-from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
-from asperity.recording.trace import Channel, Trace
+from asperity.recording.trace import Channel, Trace, check
 from asperity.tribometer.sensors import (
     Accelerometer,
     Given,
@@ -88,6 +87,7 @@ class Recorder:
             advice = f"give one such as {high // 2}"
             require(low <= value <= high, f"Recorder.{name}", rule, value, advice)
 
+    @typed
     def step(self, channel: str, kind: str) -> tuple[float, float, float] | None:
         """Lowest value, highest value and step of the converter for a channel, in SI."""
         if channel not in self.ranges or not self.bits:

@@ -11,6 +11,7 @@ import pandas as pd
 
 from asperity import periodic_response
 from asperity.ledger import FigureNumbers, figure_words
+from asperity.parameters import typed
 from asperity_papers.bureau2000.machine import (
     EXT,
     FAST,
@@ -30,6 +31,7 @@ _SOLVED = (
 APPLIED, BORNE = "epsilon_applied", "epsilon_eff"
 
 
+@typed
 @dataclass(frozen=True)
 class FigureCurve:
     """One line of a figure.

@@ -26,6 +26,7 @@ from asperity.air import (
 from asperity.ledger import Paper
 from asperity.materials import Material
 from asperity.orbit import PeriodicResponse
+from asperity.parameters import typed
 from asperity.theory import SmallModulation, ageing_response
 from asperity_papers.bureau2000.integration import (
     IntegratedOrbit,
@@ -72,6 +73,7 @@ STRONGEST = 0.5
 APPLIED = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.625)
 
 
+@typed
 class Machine:
     """Predictions of the laws and the air layer at one set of the paper's numbers.
 

@@ -26,6 +26,7 @@ from asperity.experiment import (
     amplitude_motion,
     channel_gain,
 )
+from asperity.parameters import typed
 from asperity.tribometer import LoadCell, Recorder, SpringGauge, Tribometer
 from asperity_papers.bureau2000.machine import EXT, Float, Machine
 
@@ -59,6 +60,7 @@ def slider() -> Slider:
     return PRINTED.slider(EXT, B=state_coefficient())
 
 
+@typed
 def exciter(frequency: float, *, vacuum: bool = False) -> Exciter:
     """The exciter at a frequency (Hz), on the air under a patch as the appendix proposes.
 
@@ -78,6 +80,7 @@ def radius() -> float:
     return R
 
 
+@typed
 def tribometer(frequency: float, seed: int | None = None) -> Tribometer:
     """Gauge, load cell and recorder for a modulation at a frequency (Hz).
 
@@ -101,6 +104,7 @@ def tribometer(frequency: float, seed: int | None = None) -> Tribometer:
     return Tribometer(sensors=sensors, recorder=recorder)
 
 
+@typed
 def description(frequency: float) -> list[str]:
     """Lines that say what is simulated."""
     p, machine = PRINTED.numbers, tribometer(frequency)

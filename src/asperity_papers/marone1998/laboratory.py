@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from asperity.experiment import Holds, hold_response
 from asperity.laws import RiceRuina
 from asperity.materials import Material
+from asperity.parameters import typed
 
 Float = NDArray[np.float64]
 Numbers = dict[str, float]
@@ -48,6 +49,7 @@ def scan(figure: str, name: str, *index: float) -> Any:
     return reading
 
 
+@typed
 class Laboratory:
     """The interfaces of Figures 2, 3 and 5 with the paper's numbers.
 

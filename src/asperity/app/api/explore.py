@@ -212,7 +212,7 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
 
     Each message has ``point``, or ``curve`` with the law, the indices and the values there.
     """
-    question = Explored.model_validate(argument)
+    question = Explored(**argument)
     values = question.values()
     epsilon = epsilon_on_contacts(question, values)
     on_progress = lambda done, points: report()  # noqa: E731

@@ -93,7 +93,7 @@ def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
     failed, and the boundary with its bifurcations; or ``progress``, a share of all work. The first
     of several grids has None for the boundary: searching for it takes longer than its points.
     """
-    question = MapQuestion.model_validate(argument)
+    question = MapQuestion(**argument)
     counts = [question.count]
     while counts[0] // 2 >= _COARSE:
         counts.insert(0, counts[0] // 2)

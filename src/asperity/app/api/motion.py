@@ -82,7 +82,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     InputError
         If the law follows the load without dynamics.
     """
-    question = Motion.model_validate(argument)
+    question = Motion(**argument)
     law, values = get_law(question.law), question.values()
     rule = "have dynamics"
     require(law.rate_dependent, "law", rule, f"'{question.law}'", "its force follows the load")

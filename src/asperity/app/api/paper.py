@@ -203,7 +203,7 @@ _slow_as_printed: dict[tuple[str, str, str], dict[str, Any]] = {}
 
 def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Lines that take seconds, a message each: ``curve``, and ``printed`` with printed numbers."""
-    question = MovedFigure.model_validate(argument)
+    question = MovedFigure(**argument)
     paper, numbers = _paper(question.paper), _moved_numbers(question)
     chosen = paper.tab[question.figure]
     for done, name in enumerate(chosen.slow):
@@ -227,7 +227,7 @@ _judged: dict[str, list[dict[str, Any]]] = {}
 
 def ledger(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Verdicts by claim, which a worker computes once; the number of finished ones is reported."""
-    paper = _paper(ChosenPaper.model_validate(argument).paper)
+    paper = _paper(ChosenPaper(**argument).paper)
     if paper.name not in _judged:
 
         def on_progress(done: int, total: int) -> None:

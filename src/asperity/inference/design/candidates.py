@@ -23,7 +23,7 @@ from asperity.inference.tables.residuals import Prediction, residuals_of, weight
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm, on_contacts
 from asperity.orbit import Outcome, periodic_response
-from asperity.parameters.parameter import RULES
+from asperity.parameters.rules import RULES
 from asperity.slider.named import slider_from
 
 Progress = Callable[[int, int, str], None]

@@ -153,6 +153,7 @@ class RecordedRun:
         """Times (n,) of the samples, or edges (n, 2) of the blocks, in seconds."""
         return self.time if self.blocks is None else self.blocks.edges
 
+    @typed
     def rows_at(self, times: Sequence[float]) -> Index:
         """Indices of the samples, or of the blocks, at given times (s) of samples."""
         begin = self.time if self.blocks is None else self.blocks.edges[:, 0]

@@ -54,6 +54,7 @@ _LARGEST_FRICTION = 10.0
 _SAME_NOISE = 1e-4
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class LockInTable:
     """Observables with standard uncertainties, one operating point in each row.
@@ -90,6 +91,9 @@ class LockInTable:
     row_names: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=str))
 
     def __post_init__(self) -> None:
+        for name in _OPERATING:
+            rule, got = f"have {name} of each row", "none"
+            require(name in self.points, "points", rule, got, "give it in SI")
         if self.run.size == 0:
             object.__setattr__(self, "run", np.full(self.rows, self.name))
         if self.row_names.size == 0:
@@ -120,6 +124,7 @@ class LockInTable:
             result[:, i, j] = result[:, j, i] = value
         return result
 
+    @typed
     def without(self, rows: Bool) -> LockInTable:
         """The table without some of its rows."""
         keep = ~rows
@@ -137,6 +142,7 @@ class LockInTable:
             row_names=self.row_names[keep],
         )
 
+    @typed
     def disturbed(self, exact: Mapping[str, Float], normal: Float) -> LockInTable:
         """The table with simulated readings: exact readings plus errors.
 

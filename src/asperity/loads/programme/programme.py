@@ -14,6 +14,7 @@ from asperity.errors import require
 from asperity.loads.programme.segment import ProgrammeSegment, load_of, pull_of
 from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
 from asperity.parameters.arguments import number, typed
+from asperity.parameters.rules import obeying
 
 #: Relative distance to a break point within which a time counts as the break point itself: sums of
 #: durations and multiples of a sampling interval are not the same doubles.
@@ -126,7 +127,7 @@ class Programme:
         read: Callable[[ProgrammeSegment, Any], Any],
         before: np.ndarray | None = None,
     ) -> np.ndarray:
-        times = np.asarray(t, float)
+        times = obeying(t, "t", "time", "finite")
         values = np.empty(times.shape)
         index = np.searchsorted(self.starts[1:-1] * (1 - BREAK), times, side="right")
         for k, segment in enumerate(self.segments):

@@ -14,11 +14,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.parameters import RULES, Parameter, law_parameters, point_parameters
+from asperity.parameters.arguments import typed
 from asperity.slider import Motion, QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.named import equation_parameters, slider_from, slider_values, with_value
@@ -204,7 +206,10 @@ class ResponseValues(NamedTuple):
     outcome: Array
 
     @classmethod
-    def of_columns(cls, columns: Any, outcome: Any, harmonics: int) -> ResponseValues:
+    @typed
+    def of_columns(
+        cls, columns: NDArray[Any] | Array, outcome: Any, harmonics: int
+    ) -> ResponseValues:
         """The inverse of `columns`, of shape (..., columns), for a number of harmonics."""
         states = (columns.shape[-1] - 1) // 2 - harmonics
         ends = np.cumsum([1, harmonics, harmonics, states])

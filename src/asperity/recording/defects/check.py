@@ -5,8 +5,7 @@ A check never changes a value.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,11 +15,7 @@ from asperity.recording.defects.sampling import check_sampling, gap_rows
 from asperity.recording.defects.spikes import spikes
 from asperity.recording.finding import Finding, Severity, at_row
 
-if TYPE_CHECKING:
-    from asperity.recording.trace import Trace
-
-
-#: Names of the findings of `check`; a reader has further ones.
+#: Names of the findings of `defects`; a reader has further ones.
 CHECKED = frozenset(
     {
         "backward time",
@@ -37,40 +32,17 @@ CHECKED = frozenset(
 )
 
 
-def check(trace: Trace) -> tuple[Finding, ...]:
-    """Check a recording for defects that can make a measurement wrong.
-
-    Parameters
-    ----------
-    trace : Trace
-        Any recording; it is not changed.
-
-    Returns
-    -------
-    tuple of Finding
-        ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
-        ``"uneven sampling"``, ``"missing values"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
-        ``"saturation"``; at most one of each name for time and for each channel. Empty without a
-        defect.
-
-    Notes
-    -----
-    A gap is a step of time longer than 1.5 times the median of the 24 steps before it and of the
-    24 steps after it, and outside the scatter of these steps. A change of the sampling rate is
-    "uneven sampling" and no gap. Saturation is an excess of samples at exactly the largest or
-    smallest value, or several such samples in a row where no two samples are equal by chance. A
-    spike of at most three samples differs from the samples on both sides by more than ten times
-    the usual difference.
-    """
+def defects(time: Float, columns: Mapping[str, Float]) -> list[Finding]:
+    """Findings of `asperity.recording.check`, in the time and in channels by name."""
     # Sums and differences of a damaged file may overflow; another check reports such values.
     with np.errstate(over="ignore", invalid="ignore"):
-        findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
-        for name, channel in trace.channels.items():
-            findings += _missing(channel.values, trace.time, name)
-            at = spikes(channel.values)
-            findings += saturation(channel.values, trace.time, name, at=at)
-            findings += _spikes(channel.values, trace.time, name, at)
-    return tuple(findings)
+        findings = [*_missing(time, time, "time"), *check_sampling(time)]
+        for name, values in columns.items():
+            at = spikes(values)
+            findings += _missing(values, time, name)
+            findings += saturation(values, time, name, at=at)
+            findings += _spikes(values, time, name, at)
+    return findings
 
 
 def _missing(values: Float, time: Float, name: str) -> list[Finding]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from asperity.errors import Argument, InputError, closest, known_as, listed, printable
 from asperity.parameters.arguments import shown
-from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
 from asperity.recording.readers.missing import without_codes
@@ -33,7 +32,7 @@ from asperity.recording.roles import (
     recorded_as,
     role_of,
 )
-from asperity.recording.trace import Channel, Trace
+from asperity.recording.trace import Channel, Trace, check
 
 if TYPE_CHECKING:
     from asperity.recording.readers.raw import RawRecording
