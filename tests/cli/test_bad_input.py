@@ -259,7 +259,7 @@ AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
             ("air", "--material", "bureau2000"),
             ['--frequency must be given, got nothing; add it, like --frequency "120 Hz"'],
         ),
-        (("air", "-f", "120 Hz"), ["got none for R, h0, P0, eta, W0, M, lambda_z;"]),
+        (("air", "-f", "120 Hz"), ["got none for P0, h0, R, eta, W0, M, lambda_z;"]),
         (("air", "-f", "120 Hz", "--vacuum"), ["got none for W0, M, lambda_z;"]),
         ((*AIR, "-f", "10 rad/s"), ["--frequency must be a frequency (Hz)"]),
         ((*AIR, "--set", "h0=-1 um"), ["--set h0 must be positive"]),

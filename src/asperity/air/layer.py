@@ -10,6 +10,7 @@ gamma R = (1 - i)/sqrt(2) s: s << 1 is a viscous leak, s >> 1 an elastic cushion
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import factorial
@@ -21,14 +22,22 @@ from numpy.typing import ArrayLike
 from asperity.air.normal_contact import Real, as_real
 from asperity.arrays import Complex, Float
 from asperity.errors import InputError
+from asperity.parameters import Parameter
 from asperity.parameters.arguments import broadcast_shape, one_of, typed
 
 GasFlow = Literal["continuum", "slip", "free-molecular"]
+#: Numbers of a layer, by their names in materials; `argument` is the field of `AirLayer`.
+LAYER: Mapping[str, Parameter] = {
+    name: Parameter(name, kind, "positive", meaning, symbol, argument=field)
+    for name, field, kind, symbol, meaning in (
+        ("P0", "P0", "pressure", "P_0", "pressure of the air"),
+        ("h0", "h0", "length", "h_0", "gap between the surfaces"),
+        ("R", "R", "length", "R", "radius of the air layer"),
+        ("eta_air", "eta", "viscosity", r"\eta", "viscosity of the air"),
+    )
+}
 #: Kind of quantity of the fields of a layer.
-_KINDS = {
-    "P0": "pressure", "h0": "length", "eta": "viscosity", "R": "length",
-    "temperature": "temperature",
-}  # fmt: skip
+_KINDS = {p.argument: p.kind for p in LAYER.values()} | {"temperature": "temperature"}
 #: sqrt(pi R_gas T/(2 m_air)) is the molecular speed in mfp = eta/P times it: R_gas of CODATA, in
 #: J/(mol K), the molar mass of dry air of the US Standard Atmosphere 1976, in kg/mol.
 _GAS_CONSTANT, _MOLAR_MASS_AIR = 8.314462618, 28.9644e-3

@@ -17,12 +17,17 @@ from numpy.typing import ArrayLike
 
 from asperity.arrays import Float
 from asperity.errors import InputError
-from asperity.parameters import obeying
+from asperity.parameters import Parameter, obeying
 from asperity.parameters.arguments import at_least, broadcast_shape, typed
 
 #: A number or an array of numbers, in SI.
 Real: TypeAlias = float | Float
 
+#: The number of the contacts, as in materials.
+LAMBDA_Z = Parameter(
+    "lambda_z", "length", "positive", "normal elastic length of the contacts", r"\lambda_z",
+    argument="lambda_z",
+)  # fmt: skip
 #: Powers of (beta/2)^2 kept in I0(beta) - 1 for beta <= 1; the first one dropped is below 1e-17.
 _I0_SERIES = (*(1.0 / factorial(k) ** 2 for k in range(10, 0, -1)), 0.0)
 

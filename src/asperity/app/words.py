@@ -22,7 +22,7 @@ LABELS: Mapping[str, str] = {
     "exact_frequency": "Take it as exact",
     "harmonics": "Harmonics",
     "trace": "The recording",
-    "recording.path": "The recording",
+    "recording": "The recording",
     "rate": "Sampling rate",
     "group": "Group",
     "format": "File format",

@@ -23,12 +23,6 @@ if TYPE_CHECKING:
     from asperity.air import AirLayer
     from asperity.materials import Material
 
-#: Kind of each number.
-_LAYER = {"R": "length", "h0": "length", "P0": "pressure", "eta": "viscosity"}
-_CONTACT = {"W0": "force", "M": "mass", "lambda_z": "length"}
-#: Names in materials, where they are others.
-_PUBLISHED = {"eta": "eta_air"}
-
 _EPILOG = """\b
 Examples:
   asperity air --material bureau2000 -f "120 Hz" -f "200 Hz"
@@ -90,7 +84,7 @@ def air(
     layer = None
     if not vacuum:
         # The layer must be complete, though the value of what is sought is not used.
-        R, h0, P0, eta = (numbers.get(name, 1.0) for name in _LAYER)
+        P0, h0, R, eta = (numbers.get(name, 1.0) for name in ("P0", "h0", "R", "eta"))
         layer = AirLayer(P0=P0, h0=h0, eta=eta, R=R)
     if inverse is None or layer is None:
         return _forward(hertz, layer, numbers, output)
@@ -102,32 +96,40 @@ def _numbers(
     given: dict[str, str], material: Material | None, vacuum: bool, unknown: str
 ) -> dict[str, float]:
     """SI values of the parameters; the one that is sought need not be known."""
-    from asperity.units import KINDS
+    from asperity.air import LAMBDA_Z, LAYER
+    from asperity.parameters import MACHINE
 
-    kinds = _CONTACT if vacuum else _LAYER | _CONTACT
+    layer = {p.argument: p for p in LAYER.values()}
+    contact = {n: MACHINE[n] for n in ("W0", "M")} | {"lambda_z": LAMBDA_Z}
+    known = contact if vacuum else layer | contact
     for name, text in given.items():
         rule = "not be given with --vacuum"
         require(
-            not (vacuum and name in _LAYER),
+            not (vacuum and name in layer),
             f"--set {symbol(name)}",
             rule,
             f"'{text}'",
             "leave one out",
         )
-        one_of(symbol(name), map(symbol, kinds), "--set")
+        one_of(symbol(name), map(symbol, known), "--set")
     numbers = {
-        n: number(text, f"--set {symbol(n)}", kinds[n], "positive") for n, text in given.items()
+        name: number(text, f"--set {symbol(name)}", known[name].kind, "positive")
+        for name, text in given.items()
     }
-    for name in kinds:
-        published = _PUBLISHED.get(name, name)
+    for name, parameter in known.items():
+        published = parameter.name
         if name not in (*numbers, unknown) and material is not None and published in material:
             numbers[name] = material[published].si
-    missing = [name for name in kinds if name not in (*numbers, unknown)]
+    missing = [name for name in known if name not in (*numbers, unknown)]
     if missing:
-        example = f"{symbol(missing[0])}={KINDS[kinds[missing[0]]].example}"
+        example = f"{symbol(missing[0])}={known[missing[0]].example}"
         advice = f'name a material that has them or give each one, like --set "{example}"'
         require(False, "air", "have all its numbers", f"none for {symbols(missing)}", advice)
     return numbers
+
+
+def _contact(numbers: dict[str, float]) -> dict[str, float]:
+    return {name: numbers[name] for name in ("W0", "M", "lambda_z")}
 
 
 def _forward(
@@ -139,7 +141,7 @@ def _forward(
     from asperity.outputs.tables import Section
     from asperity.units import format_si
 
-    contact = {name: numbers[name] for name in _CONTACT}
+    contact = _contact(numbers)
     head = ["frequency", "eps_eff/eps", "phase (rad)"]
     columns = {
         "ratio": effective_modulation(hertz, layer=layer, **contact),
@@ -184,7 +186,7 @@ def _invert(
 
     solve: Any
     sought, solve = {"R": ("radius", patch_radius), "h0": ("gap", gap)}[unknown]
-    result = solve(ratio, hertz, layer=layer, **{name: numbers[name] for name in _CONTACT})
+    result = solve(ratio, hertz, layer=layer, **_contact(numbers))
     lengths = tuple(f"{symbol(unknown)} = {format_si(v, 'length', 6)}" for v in result.solutions)
     if output.as_json or lengths:
         output.answer(

@@ -24,7 +24,7 @@ _OPTIONS: Mapping[str, str] = {
     "lock_in.load": "the load",
     "lock_in.time": "the time column",
     "stress_to_force.area": "--area",
-    "recording.path": "the recording",
+    "recording": "the recording",
     "write.path": "--out",
     "slice.start and slice.end": "--window",
     "seed": "--seed",

@@ -247,7 +247,7 @@ def test_empty_bytes_behind_the_last_row_are_named(written, planted):
     ],
 )
 def test_files_without_numbers_are_refused(written, text, rule):
-    with pytest.raises(InputError, match=rf"recording.path {rule}"):
+    with pytest.raises(InputError, match=rf"recording {rule}"):
         read(written(text))
 
 

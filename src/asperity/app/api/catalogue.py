@@ -13,6 +13,7 @@ from latex2mathml.converter import convert
 
 from asperity import materials
 from asperity._version import __version__
+from asperity.air import LAMBDA_Z, LAYER
 from asperity.app.words import LABELS
 from asperity.errors import require_known
 from asperity.laws import registered
@@ -35,15 +36,8 @@ from asperity.units import KINDS, to_si
 #: The documentation of a clone, once ``make docs`` has built it.
 DOCS = Path(__file__).parents[4] / "docs" / "_build" / "html"
 
-#: Numbers of the air layer and of the contacts, by their names in materials: symbol and meaning;
-#: see `asperity.air`.
-AIR = {
-    "P0": ("P_0", "pressure of the air"),
-    "h0": ("h_0", "gap between the surfaces"),
-    "R": ("R", "radius of the air layer"),
-    "eta_air": (r"\eta", "viscosity of the air"),
-    "lambda_z": (r"\lambda_z", "normal elastic length of the contacts"),
-}
+#: Numbers of the air layer and of the contacts, by their names in materials.
+AIR = {**LAYER, "lambda_z": LAMBDA_Z}
 
 #: A slider without a range of its material covers the first factor on both sides of a pure number,
 #: the second on both sides of a quantity with a unit; a slider from zero ends at the third.
@@ -136,10 +130,10 @@ def _material(material: Material) -> dict[str, Any]:
             if name not in MODULATION
         },
         "air": [
-            {"name": name, "kind": material[name].dimension, "rule": "positive",
-             "symbol": mathml(symbol), "meaning": meaning, "value": material[name].si,
+            {"name": name, "kind": number.kind, "rule": number.rule,
+             "symbol": mathml(number.symbol), "meaning": number.meaning, "value": material[name].si,
              "slider": around(material[name].si)}
-            for name, (symbol, meaning) in AIR.items()
+            for name, number in AIR.items()
             if name in numbers
         ],
     }  # fmt: skip

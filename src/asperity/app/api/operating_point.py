@@ -23,7 +23,7 @@ from asperity.operating_point import (
     sourced_numbers,
 )
 from asperity.orbit import PeriodicResponse
-from asperity.parameters import MODULATION, obeying, point_parameters
+from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import one_of
 from asperity.units import KINDS
 
@@ -101,10 +101,7 @@ class OperatingPoint(Question):
         numbers = dict(self.air or {})
         for name in numbers:
             one_of(name, AIR, "air")
-        result = {
-            n: float(obeying(numbers.get(n, material[n].si), n, material[n].dimension, "positive"))
-            for n in AIR
-        }
+        result = {n: float(p.check(numbers.get(n, material[n].si), n)) for n, p in AIR.items()}
         for name in numbers:
             number = material[name]
             _check_reach(name, result[name], around(number.si), number.dimension)

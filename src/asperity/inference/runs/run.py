@@ -260,8 +260,8 @@ def recorded_run(
         load_varies=varies,
         stretches=rate_stretches(times),
         doubts=tuple(doubts),
-        spikes=_named_times(spikes, origin, times, "spikes"),
-        jumps=_named_times(jumps, origin, times, "jumps"),
+        spikes=_sample_times(spikes, origin, times, "spikes"),
+        jumps=_sample_times(jumps, origin, times, "jumps"),
         wrong=None if spikes is None else (),
         level_rates=level_rates(times, friction, drive.load_at(times), cut_times, speeds),
     )
@@ -272,14 +272,14 @@ def run_name(trace: Trace) -> str:
     return Path(str(trace.provenance.get("file") or "run")).stem
 
 
-def _named_times(
-    named: Sequence[float] | None, origin: float, times: Float, name: str
+def _sample_times(
+    chosen: Sequence[float] | None, origin: float, times: Float, name: str
 ) -> tuple[float, ...] | None:
-    """Times, from the first sample on, of samples that the user has named; None by default."""
-    if named is None:
+    """Times, from the first sample on, of samples that the user has chosen; None by default."""
+    if chosen is None:
         return None
     result = []
-    for at in named:
+    for at in chosen:
         k = int(np.argmin(np.abs(times - (at - origin))))
         if not 0 < k < times.size - 1:
             advice = f"it runs from {origin:.10g} s to {origin + times[-1]:.10g} s"

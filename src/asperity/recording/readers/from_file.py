@@ -109,7 +109,7 @@ def format_of(path: Path) -> str:
     rule = "be CSV or other text, HDF5, MATLAB, TDMS or LOOK"
     got = f"'{known_as(path).name}', which looks like none of them"
     advice = f"give {Argument('format', value='...')} if it is one of them"
-    raise InputError("recording.path", rule, got, advice)
+    raise InputError("recording", rule, got, advice)
 
 
 def raw_recording(
@@ -149,7 +149,7 @@ def raw_recording(
         raise
     except MemoryError:
         got = f"'{known_as(path).name}', which holds more"
-        raise InputError("recording.path", "fit into memory", got, "cut it") from None
+        raise InputError("recording", "fit into memory", got, "cut it") from None
     # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
         # The text of an OSError has the path, which the user may know by another name.
@@ -283,12 +283,12 @@ def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
 
 
 def _with_content(file: Path) -> Path:
-    require(file.is_file(), "recording.path", "be a file", f"'{known_as(file)}'", "check the name")
+    require(file.is_file(), "recording", "be a file", f"'{known_as(file)}'", "check the name")
     got, advice = (
         f"'{known_as(file).name}', which is empty",
         "copy it again from where it was recorded",
     )
-    require(file.stat().st_size != 0, "recording.path", "hold data", got, advice)
+    require(file.stat().st_size != 0, "recording", "hold data", got, advice)
     return file
 
 

@@ -85,7 +85,7 @@ def _groups(file: Any, path: Path) -> dict[str, Any]:
 
 def _elsewhere(path: Path, name: str) -> InputError:
     got = f"'{known_as(path).name}', whose '{name.strip('/')}' lies in another file"
-    return InputError("recording.path", "hold its data itself", got, "copy the data into one file")
+    return InputError("recording", "hold its data itself", got, "copy the data into one file")
 
 
 def _group(node: Any, path: Path, matlab: bool) -> tuple[list[RawColumn], list[float | None]]:

@@ -425,7 +425,7 @@ def layout_of(
         named = [Argument(name, value="...") for name in ("delimiter", "decimal")]
         got = f"'{known_as(path).name}' without one that is understood"
         advice = f"give {named[0]} and {named[1]}, or another file"
-        raise InputError("recording.path", "hold a table of numbers", got, advice)
+        raise InputError("recording", "hold a table of numbers", got, advice)
     rows = [cells_of(text, separators[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]
     closed = width > 1 and separators[0] is not None and not any(row[-1] for row in rows)

@@ -116,7 +116,7 @@ def truncated(number: float, where: str, sentence: str, sure: bool = True) -> Fi
 def refuse_truncated(path: Path, why: str, rule: str = "be a whole file") -> InputError:
     """The error for a file of which nothing can be used."""
     advice = "copy it again from where it was recorded"
-    return InputError("recording.path", rule, f"'{known_as(path).name}', {why}", advice)
+    return InputError("recording", rule, f"'{known_as(path).name}', {why}", advice)
 
 
 def plain(name: str) -> str:
@@ -263,7 +263,7 @@ def one_table(
             raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
     rule, got = "hold columns of numbers", f"'{known_as(path).name}' with none"
-    require(filled, "recording.path", rule, got, "give a recording")
+    require(filled, "recording", rule, got, "give a recording")
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:
         listed = ", ".join(f"{name!r} ({rows} rows)" for name, rows in longest.items())

@@ -40,7 +40,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     group : str or None
         The group to read, where they differ in length.
     """
-    nptdms = library("recording.path", "be in a format that can be read here", path)
+    nptdms = library("recording", "be in a format that can be read here", path)
     with _quiet(nptdms):
         file = nptdms.TdmsFile.read(path)
         channels = {g.name: g.channels() for g in file.groups()}

@@ -63,7 +63,7 @@ def is_format(path: Path) -> bool:
         rule, advice = "be the recording itself", "unpack it, or save the sheet as CSV"
         require(
             not head.startswith(mark),
-            "recording.path",
+            "recording",
             rule,
             f"'{known_as(path).name}', {kind}",
             advice,
@@ -71,7 +71,7 @@ def is_format(path: Path) -> bool:
     if kind := _document(head):
         # A table would be looked for in it at length.
         rule, got = "hold a table of numbers", f"'{known_as(path).name}', which is {kind}"
-        raise InputError("recording.path", rule, got, "save it as CSV, or add a reader for it")
+        raise InputError("recording", rule, got, "save it as CSV, or add a reader for it")
     return head.startswith(_GZIP) or _is_text(head)
 
 
@@ -126,9 +126,9 @@ def _unpacked(path: Path) -> bytes:
         f"unpack to at most {LARGEST // 1024**2} MB",
         f"'{known_as(path).name}', which goes on",
     )
-    require(len(text) <= LARGEST, "recording.path", rule, got, "unpack it, and see what it holds")
+    require(len(text) <= LARGEST, "recording", rule, got, "unpack it, and see what it holds")
     rule, got = "hold a text if it is packed", f"'{known_as(path).name}' with something else"
-    require(_is_text(text[: 1 << 12]), "recording.path", rule, got, "unpack it")
+    require(_is_text(text[: 1 << 12]), "recording", rule, got, "unpack it")
     return text
 
 
@@ -155,7 +155,7 @@ def _load(
     ending = _ending_of(file, size, layout)
     frame, findings = _parse(file, layout, ending.stop)
     got = f"'{known_as(path).name}' with a heading only"
-    require(len(frame), "recording.path", "hold rows of numbers", got, "give a recording")
+    require(len(frame), "recording", "hold rows of numbers", got, "give a recording")
     frame, left_out = _without_text_rows(frame, layout.width)
     findings += left_out
     columns = []
