@@ -104,11 +104,9 @@ def run(
     """Run a plan; "asperity sweep PLAN" is the same."""
     if dry_run:
         for name in ("extend_store", "retry_failed"):
-            option, rule = (
-                f"--{name.replace('_store', '').replace('_', '-')}",
-                "go without --dry-run",
-            )
-            require(not options[name], option, rule, "both", "a dry run is that of the whole plan")
+            written = f"--{name.removesuffix('_store').replace('_', '-')}"
+            rule, advice = "go without --dry-run", "a dry run is that of the whole plan"
+            require(not options[name], written, rule, "both", advice)
         workers, cluster = options["workers"], options["cluster"]
         return _estimate(plan, cluster if workers is None else workers, output)
     if out is None:

@@ -44,7 +44,11 @@ LARGEST_UNLOADING = 0.999
 
 #: Outcomes of a branch from steady sliding without an orbit; another branch may have one.
 WITHOUT_ORBIT = (
-    *(Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE, Outcome.RESTS),
+    Outcome.NO_ORBIT,
+    Outcome.FOLDED,
+    Outcome.RUNAWAY,
+    Outcome.SENSITIVE,
+    Outcome.RESTS,
 )
 
 _SENTENCES = {

@@ -227,9 +227,9 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     A gap is a step of time longer than 1.5 times the median of the 24 steps before it and of the
     24 steps after it, and outside the scatter of these steps. A change of the sampling rate is
     "uneven sampling" and no gap. Saturation is an excess of samples at exactly the largest or
-    smallest value, or several such samples in a row where no two samples are equal by chance. A
-    spike of at most three samples differs from the samples on both sides by more than ten times
-    the usual difference.
+    smallest value, or several such samples in a row, where no two samples are equal by chance or
+    the signal falls from them more abruptly than a rounded smooth top. A spike of at most three
+    samples differs from the samples on both sides by more than ten times the usual difference.
     """
     columns = {name: channel.values for name, channel in trace.channels.items()}
     return tuple(defects(trace.time, columns))
