@@ -234,8 +234,10 @@ def require_known(name: str, known: Iterable[str], field: str | Argument, rule: 
     field, rule : str
         As in `InputError`.
     """
-    name = str(name)
-    require(name in known, field, rule, f"'{printable(name, 80)}'", closest(name, known))
+    # Numbers are converted in every evaluation of a fit: the nearest name only where it is needed.
+    if name not in known:
+        got = printable(str(name), 80)
+        raise InputError(field, rule, f"'{got}'", closest(str(name), known))
 
 
 class InputTypeError(InputError, TypeError):
