@@ -200,7 +200,7 @@ def compressive(load: Float, shear: Float) -> tuple[Float, Float, list[Finding]]
 
 def _mean(values: Float) -> float:
     finite = values[np.isfinite(values)]
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         return float(finite.mean()) if finite.size else 0.0
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+import asperity as asp
 from asperity.errors import InputError
 from asperity.recording import read
 
@@ -169,3 +170,62 @@ def test_a_mismatched_heading_is_named_where_a_column_is_not_found(tmp_path):
         read(path).channel("W")
     with pytest.raises(InputError, match="heading has 3 names for 4 columns"):
         read(path, columns={"W": "Fn"})
+
+
+def hdf5_of(path, **arrays):
+    with h5py.File(path, "w") as output:
+        for name, values in arrays.items():
+            output[name] = values
+    return path
+
+
+def test_complex_numbers_are_left_out_by_name(tmp_path):
+    """A load that is missing for no stated reason sends the user astray."""
+    arrays = {"time": TIME, "W": LOAD + 0j, "F": SHEAR, "on": SHEAR > 2.85}
+    scipy.io.savemat(tmp_path / "a.mat", arrays)
+    for path in (hdf5_of(tmp_path / "a.h5", **arrays), tmp_path / "a.mat"):
+        trace = read(path)
+        assert set(trace.channels) == {"F", "on"}
+        (left_out,) = [f for f in trace.findings if f.name == "text column"]
+        assert left_out.sentence == "'W' holds text or complex numbers, and was left out."
+        np.testing.assert_array_equal(trace.channel("on").values, SHEAR > 2.85)
+
+
+def test_values_that_were_never_written_are_not_created(tmp_path):
+    """80 TB of fill values in a file of some kilobytes."""
+    path = hdf5_of(tmp_path / "a.h5", time=TIME, F=SHEAR)
+    with h5py.File(path, "a") as output:
+        output.create_dataset("W", (10**13,), "f8", chunks=(1000,))
+    with pytest.raises(InputError, match="whose 'W' has 10000000000000 values; remove"):
+        read(path)
+
+
+@pytest.mark.parametrize("interval", [-0.01, float("nan"), float("inf"), "x"])
+def test_an_interval_that_is_none_is_the_users_to_give(tmp_path, interval):
+    path = tmp_path / "a.tdms"
+    wave = {"wf_increment": interval}
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(
+            [nptdms.ChannelObject("g", n, v, wave) for n, v in (("W", LOAD), ("F", SHEAR))]
+        )
+    with pytest.raises(InputError, match="give the sampling rate"):
+        read(path)
+    assert read(path, rate="100 Hz").time[-1] == pytest.approx((ROWS - 1) / 100)
+
+
+@pytest.mark.parametrize("rate", [1e-320, 0.0, -1.0])
+def test_a_rate_without_an_interval_is_none(tmp_path, rate):
+    path = hdf5_of(tmp_path / "a.h5", W=LOAD, F=SHEAR, fs=rate)
+    with pytest.raises(InputError, match="give the sampling rate"):
+        read(path)
+
+
+def test_infinite_times_and_loads_of_both_signs_are_refused_without_a_warning(tmp_path):
+    """Differences and sums of infinities are no numbers; warnings fail the suite."""
+    path = hdf5_of(tmp_path / "a.h5", W=LOAD, F=SHEAR, dt=1e308)
+    with pytest.raises(InputError, match="'time' holds a number in 2 rows"):
+        asp.measure(read(path))
+    huge = np.where(np.arange(ROWS) % 2, 1e308, -1e308)
+    path = hdf5_of(tmp_path / "b.h5", time=TIME, W=huge, F=SHEAR)
+    with pytest.raises(InputError, match=r"1e\+308 as the largest of 'W'"):
+        asp.measure(read(path), modulated=True)

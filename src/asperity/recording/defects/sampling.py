@@ -290,9 +290,10 @@ def rounded_grid(time: Float) -> RoundedGrid | None:
     """
     if time.size < _FEWEST:
         return None
-    steps = np.diff(time)
+    # Times may be infinite; NaN fails the next test, too.
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(time)
     low, high = float(steps.min()), float(steps.max())
-    # NaN fails this test, too.
     if not (low >= 0 and np.isfinite(high)):
         return None
     exact = 8 * float(np.spacing(np.abs(time[[0, -1]]).max()))

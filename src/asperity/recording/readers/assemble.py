@@ -195,7 +195,7 @@ def _known_units(
 def _left_out(names: list[str]) -> Finding:
     named = listed(map(repr, names), most=12)
     holds = "holds" if len(names) == 1 else "hold"
-    text = f"{named} {holds} text and no numbers, and was left out."
+    text = f"{named} {holds} text or complex numbers, and was left out."
     return Finding("text column", "note", len(names), named, text)
 
 

@@ -23,6 +23,9 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _ROLE = "recording_role"
 #: Most values of a text that can be the unit of an array.
 _SHORT = 1000
+#: Bytes of an array that are always read, and bytes that a byte of a file can hold: DEFLATE packs
+#: by 1,032 at most.
+_MUCH, _PACKED = 1 << 30, 1032
 
 
 def is_format(path: Path) -> bool:
@@ -124,6 +127,10 @@ def _value(item: Any, path: Path, matlab: bool) -> Any:
 
     if item.external or item.is_virtual:
         raise _elsewhere(path, item.name)
+    if item.nbytes > max(_MUCH, _PACKED * path.stat().st_size):
+        # Declared values that were never written are fill values, and would be created here.
+        got = f"'{known_as(path).name}', whose '{item.name.strip('/')}' has {item.size} values"
+        raise InputError("recording.path", "hold what it declares", got, "remove that dataset")
     if matlab and item.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
     if h5py.check_ref_dtype(item.dtype) is not None:

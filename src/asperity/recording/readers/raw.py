@@ -134,8 +134,9 @@ def interval_of(attributes: Mapping[str, Any]) -> float | None:
             number = float(np.squeeze(value))
         except (TypeError, ValueError):
             continue
-        if number > 0 and np.isfinite(number):
-            return 1 / number if key in _RATES else number
+        interval = 1 / number if number and key in _RATES else number
+        if 0 < interval < np.inf:
+            return interval
     return None
 
 
@@ -201,7 +202,8 @@ def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawCol
             for field, unit in zip(array.dtype.names, units or [""] * flat.size, strict=False)
             if flat[field].dtype.kind in "iuf" and flat[field].ndim == 1
         ]
-    if array.dtype.kind not in "iuf":
+    # What holds complex numbers is left out with a finding; a switch is 0 and 1.
+    if array.dtype.kind not in "iufbc":
         return []
     array = np.squeeze(array)
     if array.ndim == 1 and array.size > 1:

@@ -16,6 +16,7 @@ from asperity.recording.readers.raw import (
     RawColumn,
     RawRecording,
     beginning,
+    interval_of,
     one_table,
     refuse_truncated,
     truncated,
@@ -112,7 +113,8 @@ def _whole_rows(
 
 def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
     """Start and interval of the waveforms, which must be one clock."""
-    steps = {float(p["wf_increment"]) for p in properties if p.get("wf_increment")}
+    stated = (interval_of({"dt": p["wf_increment"]}) for p in properties if "wf_increment" in p)
+    steps = {step for step in stated if step is not None}
     if not steps:
         return 0.0, None
     if len(steps) > 1:
