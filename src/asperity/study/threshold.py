@@ -40,8 +40,10 @@ class StiffnessThreshold:
     K : array, shape (...)
         The stiffness (N/m); NaN without a threshold.
     ratio : array, shape (...)
-        K/K_c, with K_c = (B - A) W0/D0 of unmodulated sliding on rigid asperities; NaN also for a
-        law without A, B and D0.
+        K/K_c, with K_c = (B - A) W0/D0 of unmodulated Rice-Ruina sliding on rigid asperities; NaN
+        also for a law without A, B and D0. Of `nagata`, `two-state`, `cut-off` and
+        `strength-area` unmodulated sliding is unstable below another stiffness:
+        `asperity.theory.memory.critical_stiffness` has it over W0.
     kind : str array, shape (...)
         "fold", "period doubling" or "Neimark-Sacker".
     mode_frequency : array, shape (...)
@@ -59,7 +61,7 @@ class StiffnessThreshold:
 
 @typed
 def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, float]:
-    """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of rigid asperities.
+    """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of Rice-Ruina sliding.
 
     K_c = (B - A) W0/D0 and f_c = sqrt((B - A)/A) V/(2 pi D0), Eqs. (18) and (19) of
     Bureau et al. (2000).

@@ -122,7 +122,7 @@ def averaged_limit(
     Returns
     -------
     AveragedLimit
-        Not finite where Newton's method failed.
+        The last iterate, finite or not, where Newton's method did not converge.
     """
     points = at.w.shape[1]
     n = system.size
