@@ -55,7 +55,8 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.NO_ORBIT: (
         "no periodic orbit found: followed from steady sliding the branch stops at "
-        "{detail:.4g} of the requested amplitude; lower epsilon or stiffen the spring"
+        "{detail:.4g} of the requested amplitude; see with asperity.transient whether the motion "
+        "becomes periodic, lower epsilon, or stiffen the spring"
     ),
     Outcome.NOT_RESOLVED: (
         "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
