@@ -100,6 +100,24 @@ def two_minima(x):
     return r, slope
 
 
+def test_an_interval_up_to_the_bound_of_the_search_is_open():
+    """Chi-squared rises to 3.7, below the limit of 3.84, and the bound lowers the limit near it."""
+
+    def plateau(x):
+        r, slope = np.ones(100), np.zeros(100)
+        height, rate = math.sqrt(3.7), 1.0
+        r[0] = height * -math.expm1(-rate * (x - FIRST))
+        slope[0] = height * rate * math.exp(-rate * (x - FIRST))
+        return r, slope
+
+    objective = objective_of(plateau, 1e-6)
+    result = described_fit(objective, minima_of(objective, 0), profile=False)
+    low, high = result.parameters["D0"].interval_95
+    assert high == math.inf
+    # There the residual is -1.96.
+    assert math.log(low) - FIRST == pytest.approx(-math.log1p(1.96 / math.sqrt(3.7)), abs=0.01)
+
+
 def test_both_minima_are_found_and_intervals_span_them():
     objective = objective_of(two_minima, 5e-7)
     result = described_fit(objective, minima_of(objective, 0), profile=False)

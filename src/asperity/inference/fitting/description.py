@@ -199,7 +199,9 @@ def _ends(
         wider = float(stdtrit(at.freedom[i], (1 + level) / 2) / ndtri((1 + level) / 2))
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
-            ends.append(along.interval(level, wider))
+            ends.append(
+                _open_beyond_range(objective.unknowns[i], at, i, along.interval(level, wider))
+            )
             if along.lowest[1] < at.chi2 - _LOWER:
                 break
         elif at.missing[i] or at.stopped:
@@ -211,18 +213,24 @@ def _ends(
 
 
 def _normal(unknown: Unknown, at: Parabola, i: int, sd: float, level: float) -> Interval:
-    """An interval of the normal approximation, which contains the estimate.
-
-    If an end lies outside the search range of the parameter, the data do not bound this side.
-    """
-    low, high = unknown.bounds
+    """An interval of the normal approximation, which contains the estimate."""
     u = float(at.u[i])
-    begin, end = bounded_interval(float(at.unbounded[i]), sd, level, low, high)
-    begin, end = min(begin, u), max(end, u)
+    begin, end = bounded_interval(float(at.unbounded[i]), sd, level, *unknown.bounds)
+    return _open_beyond_range(unknown, at, i, (min(begin, u), max(end, u)))
+
+
+def _open_beyond_range(unknown: Unknown, at: Parabola, i: int, interval: Interval) -> Interval:
+    """The interval, whose ends outside the search range of the parameter are open.
+
+    The data do not bound such a side: chi-squared hardly rises there, and the bound of the search
+    decides where the interval ends.
+    """
+    begin, end = interval
     if unknown.nuisance:
         return begin, end
-    first, last = unknown.range_about(u, float(at.sd[i]))
-    return low if begin < first else begin, high if end > last else end
+    low, high = unknown.bounds
+    first, last = unknown.range_about(float(at.u[i]), float(at.sd[i]))
+    return low if -math.inf < begin < first else begin, high if math.inf > end > last else end
 
 
 def _estimate(
