@@ -80,6 +80,16 @@ def test_a_wrong_row_is_named_and_does_not_decide(exact, noise):
     assert result.best == "rice-ruina"
 
 
+def test_a_copy_of_a_row_is_named(exact, noise, fitted):
+    twice = [*range(10), 3]
+    copied = table(exact[:, twice], (exact[1] + noise)[twice], healing_err=ERROR)
+    done = fit(copied, "rice-ruina", start=fitted.values, starts=1)
+    assert [w for w in done.warnings if "is equal to" in w] == [
+        "row 11 of holds is equal to row 4 of holds: remove it if it is a copy, which counts twice"
+    ]
+    assert not any("is equal to" in w for w in fitted.warnings)
+
+
 def test_derivatives_are_those_of_differences(exact):
     term = HoldTerm(table(exact, exact[1], healing_err=1.0), RiceRuina, {"mu0": 0.6, "V0": 1e-6})
     at = {"A": A, "B": B, "D0": D0}

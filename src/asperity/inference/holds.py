@@ -173,6 +173,8 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
     return HealingTable(", ".join(t.name for t in tables), **{"errors": None, **columns})
 
 
+#: Largest number of equal rows that are named.
+_NAMED = 5
 #: Tables are padded to a multiple of this many holds.
 _ROWS = 32
 
@@ -271,13 +273,25 @@ class HoldTerm(DataTerm):
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
     ) -> Sequence[str]:
-        """A sentence on outliers, or on an estimated error."""
+        """Sentences on equal rows, and on outliers or an estimated error."""
+        table = self.table
+        columns = np.column_stack([table.hold_time, table.healing, table.V, table.K])
+        _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
+        copies = np.flatnonzero(first[which.ravel()] != np.arange(table.rows))
+        sentences = [
+            f"{table.row_names[row]} is equal to {table.row_names[first[which.ravel()[row]]]}: "
+            "remove it if it is a copy, which counts twice"
+            for row in copies[:_NAMED]
+        ]
+        if len(copies) > _NAMED:
+            sentences.append(f"{len(copies) - _NAMED} more rows are equal to earlier ones")
         if not self.profiled:
-            return outlier_sentence(self.table.row_names[list(outliers)])
-        return (
+            return [*sentences, *outlier_sentence(table.row_names[list(outliers)])]
+        return [
+            *sentences,
             f"{self.name} has no healing_err: one standard uncertainty for all holds, "
             f"{self.error:.3g}, is estimated from the residuals, and chi-squared judges nothing",
-        )
+        ]
 
 
 @partial(jax.jit, static_argnums=(0, 1))

@@ -285,12 +285,11 @@ class LockInTerm(DataTerm):
         for n in (1, 2):
             name = f"mu{n}"
             if name in self.table.values and f"phase{n}" not in self.table.values:
-                weak = self.table.values[name] < 3 * self.table.errors[name]
-                if weak.any():
+                weak = int(np.sum(self.table.values[name] < 3 * self.table.errors[name]))
+                if weak:
                     sentences.append(
-                        f"{int(weak.sum())} readings of {name} are below three standard "
-                        f"uncertainties and have no phase{n}: an amplitude so small is biased "
-                        "upwards"
+                        f"{weak} reading{'s' * (weak > 1)} of {name} below three standard "
+                        f"uncertainties without phase{n}: an amplitude so small is biased upwards"
                     )
         return sentences
 
