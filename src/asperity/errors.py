@@ -206,7 +206,8 @@ class InputError(ValueError):
         """The same mistake with an addition at its end."""
         if not self.rule:
             return type(self)(f"{self}{addition}")
-        return type(self)(self.field, self.rule, self.got, self.advice + addition)
+        parts = [self.got, self.advice + addition] if self.advice else [self.got + addition, ""]
+        return type(self)(self.field, self.rule, *parts)
 
 
 def require(

@@ -181,7 +181,7 @@ MEASURED = {
     "harmonics": ("--harmonics", "Harmonics", [0, 65, -1, "some"]),
     "detrend": ("--detrend", "Drift", ["cubic", ""]),
     "frequency": ("--frequency", "Frequency", ["-1 Hz", "0 Hz", "2 kg", "fast", "120 rad/s"]),
-    "window": ("--window", "Window", ["5", "a:9", "1:2 kg"]),
+    "window": ("--window", "Window", ["5", "a:9", "1:2 kg", "9:1"]),
 }
 
 

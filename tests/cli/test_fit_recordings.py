@@ -51,8 +51,14 @@ KNOWN = ["--fix", "B=0.01", "--fix", "D0=1 um"]
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--trend", "cubic"], "--trend must be none, linear or quadratic"),
-        (["--initial", "any"], "--initial must be steady or free"),
+        (["--posterior", "--draws", "0"], "--draws must be at least 100, got 0; give a larger one"),
+        (["--posterior", "--seed", "-1"], "--seed must be at least 0, got -1; give a larger one"),
+        (
+            ["--window", "1e5:2e5"],
+            "--window must lie inside the recording, got 100000 s",
+        ),
+        (["--trend", "cubic"], "--trend must be one of none, linear, quadratic"),
+        (["--initial", "any"], "--initial must be one of steady, free"),
         (["--prior", "K=3"], "--prior K must be VALUE+-DEVIATION UNIT"),
         (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
         (["--velocities", "1 um/s"], "must be one more than the steps"),

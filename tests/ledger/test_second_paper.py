@@ -93,7 +93,7 @@ def test_the_page_of_the_browser_has_the_second_paper_by_its_name(installed):
         ('claims = ["frequency"]', 'claims = ["mass"]', "must name claims of the file, got 'mass'"),
         ('result = "{frequency}."', 'result = "{mass}."', "result must name claims .*got 'mass'"),
         ('depends_on = ["K"]', 'depends_on = ["M"]', "must name an uncertainty of the file"),
-        ('kind = "test"', 'kind = "guess"', "kind must be test, fit, arithmetic or identity"),
+        ('kind = "test"', 'kind = "guess"', "kind must be one of test, fit, arithmetic, identity"),
         ("[[claim]]", "[[claim]", "must be valid TOML"),
     ],
 )

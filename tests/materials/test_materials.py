@@ -238,7 +238,7 @@ def test_own_file(tmp_path: Path) -> None:
         ("uncertainty = 0.5", "uncertainty = -1", "numbers.K.uncertainty must be at least 0"),
         ('"kN/m"', '"kN"', "numbers.K must have a unit of the dimension stiffness, got 'kN'"),
         ('"stiffness"', '"stifness"', "got 'stifness'; did you mean 'stiffness'?"),
-        ('"assumed"', '"guessed"', "numbers.K.kind must be published, fitted or assumed"),
+        ('"assumed"', '"guessed"', "numbers.K.kind must be one of published, fitted, assumed"),
         ("numbers.K", "numbers.'K c'", "Python attributes and not in use, got 'K c'"),
         ("numbers.K", "numbers.law", "names that are Python attributes and not in use, got 'law'"),
         ("numbers.K", "number.K", "mistakes"),

@@ -310,7 +310,7 @@ def test_lock_in_refuses_values_that_are_not_finite(truth, samples, which, refin
     [
         ({"window": (5, 4)}, "window must end after it begins"),
         ({"window": (90, 99)}, "window must enclose"),
-        ({"detrend": "cubic"}, "detrend must be none, linear or quadratic"),
+        ({"detrend": "cubic"}, "detrend must be one of none, linear, quadratic"),
         ({"frequency": 900.0}, "frequency must lie within what the recording resolves"),
         ({"harmonics": 9}, "harmonics must lie below half the sampling rate"),
         ({"harmonics": 0}, "harmonics must be at least 1"),

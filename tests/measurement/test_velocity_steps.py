@@ -89,7 +89,7 @@ def test_a_trend_is_removed_unless_detrend_is_none(pulled, sliding_trace) -> Non
     # The middles of the windows are 0.3 mm apart: a slope of 40 /m adds 0.012 and turns the sign.
     assert level.rate_dependence > 0.003
     assert only_step(measure_sliding(trace, detrend="quadratic")).rate_uncertainty > 0
-    with pytest.raises(InputError, match="detrend must be none, linear or quadratic"):
+    with pytest.raises(InputError, match="detrend must be one of none, linear, quadratic"):
         measure_sliding(trace, detrend="cubic")
 
 

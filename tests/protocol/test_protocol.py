@@ -173,7 +173,7 @@ def test_steps_of_every_kind_are_taken_as_they_are(write) -> None:
 
 
 def test_a_repetition_in_python_needs_a_number_above_zero() -> None:
-    with pytest.raises(ValueError, match="greater than 0"):
+    with pytest.raises(ValueError, match=r"Repeat\.repeat must be above 0, got 0"):
         Repeat(repeat=0, steps=("hold 1 s",))
 
 

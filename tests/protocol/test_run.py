@@ -327,7 +327,7 @@ def test_the_tribometer_does_not_change_the_motion(write) -> None:
         ('stiffness = "0.5 N/um"', "", "sensors.shear force.stiffness must be given"),
         ('rate = "1 kHz"', "", "tribometer.rate must be given"),
         ("5 nm", "5 mN", "sensors.shear force.noise must be a length"),
-        ("seed = 3", "seed = -3", "tribometer.seed must be a whole number"),
+        ("seed = 3", "seed = -3", "tribometer.seed must be at least 0"),
         ('noise = "5 nm"', "noise = [1, 2]", "sensors.shear force.noise must be one number"),
         ("seed = 3", "order = true", "tribometer.order must be a whole number, got True"),
         ('bandwidth = "500 Hz"', 'bandwidth = "2 kHz"', "solver.sampling must be at least 4000 Hz"),

@@ -42,7 +42,7 @@ def test_every_sample_is_a_protocol_with_an_instrument(name: str) -> None:
 def test_a_name_or_seed_that_is_none_is_named() -> None:
     with pytest.raises(InputError, match=r"name must be a sample, got 'velocity_step'"):
         asp.samples.record("velocity_step")
-    with pytest.raises(InputError, match="seed must be a whole number of at least 0"):
+    with pytest.raises(InputError, match="seed must be at least 0"):
         asp.samples.record("modulated", -1)
 
 

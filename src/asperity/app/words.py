@@ -75,10 +75,12 @@ def in_labels(argument: Argument) -> str:
         name = field
     elif head in _OF_DATA:
         name = field
+    elif head in ("fixed", "prior", "start") and field:
+        name, key = head, field
     if name in ("numbers", "start") and key:
         label = symbol(key)
-    elif name == "fixed" and key:
-        label = f"Fixed numbers, {symbol(key)}"
+    elif name in ("fixed", "prior") and key:
+        label = f"{LABELS[name]}, {symbol(key)}"
     elif name in ("columns", "Trace.channel") and key == "time":
         label = LABELS["time"]
     elif name in ("columns", "Trace.channel") and key:

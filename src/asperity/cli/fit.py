@@ -181,7 +181,7 @@ def _question_options(*further: Decorator) -> Decorator:
     _field("windows"),
     switch("--posterior", "Sample the posterior (extra 'bayes')."),
     *(
-        option(f"--{name}", "N", text, Count(), default=_SAMPLING[name], show_default=True)
+        option(f"--{name}", "N", text, Count(0), default=_SAMPLING[name], show_default=True)
         for name, text in (
             ("chains", "Chains."),
             ("draws", "Draws of each chain."),

@@ -15,7 +15,7 @@ from asperity.cli.report import CHOSEN_NAMES, Output
 from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError, name_by, require, symbol
 from asperity.parameters import DRIVE, MACHINE, NAMES, Names, Parameter
-from asperity.parameters.arguments import one_of
+from asperity.parameters.arguments import at_least, one_of
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -46,14 +46,12 @@ class Count(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: Any) -> int:
         """The number that a text is."""
-        option, advice = "" if param is None else param.opts[0], "correct the value"
+        option = "" if param is None else param.opts[0]
         try:
             count = int(value)
         except ValueError:
-            raise InputError(option, "be a whole number", f"'{value}'", advice) from None
-        within = self.least is None or count >= self.least
-        require(within, option, f"be at least {self.least}", value, advice)
-        return count
+            raise InputError(option, "be a whole number", f"'{value}'") from None
+        return count if self.least is None else at_least(self.least)(count, option)
 
 
 class OnceOption(click.Option):

@@ -24,21 +24,21 @@ def listed_times(text: str, option: str) -> list[str]:
     InputError
         If the file cannot be read, or there is no part.
     """
-    path = Path(text)
+    path, like = Path(text), "100:110,200:300" if option == "--holds" else "12.5,60"
     # Times begin with a digit, a sign, a point, or the colon of an open span.
     if (text.strip() and not re.fullmatch(r"\s*[-+.:]*\d[-+.\s,:;\w]*", text)) or path.is_file():
         try:
             lines = path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError):
             rule = "be times or a file that can be read"
-            advice = f"check the name, or write them like {option} 12.5,60"
+            advice = f"check the name, or write them like {option} {like}"
             raise InputError(option, rule, f"'{text}'", advice) from None
         # Two columns are a span.
         parts = [re.sub(r"[\s,;]+", ":", line.split("#")[0].strip()) for line in lines]
     else:
         parts = re.split(r"[,;]", text)
     result = [part.strip() for part in parts if part.strip()]
-    require(result, option, "hold times", f"'{text}'", f"write them like {option} 12.5,60")
+    require(result, option, "hold times", f"'{text}'", f"write them like {option} {like}")
     return result
 
 

@@ -28,9 +28,8 @@ _OPTIONS: Mapping[str, str] = {
     "write.path": "--out",
     "slice.start and slice.end": "--window",
     "seed": "--seed",
-    "initial": "start.states",
     "span": "--stiffness-from",
-    **{name: f"--{name}" for name in _SAME},
+    **{name: f"--{name}" for name in (*_SAME, "chains", "draws", "table")},
 }
 
 

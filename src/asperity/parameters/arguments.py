@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args,
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.errors import InputError, InputTypeError, closest
+from asperity.errors import InputError, InputTypeError, closest, require
 from asperity.parameters.rules import obeying
 from asperity.units.kinds import shown as shown, with_article
 
@@ -217,10 +217,9 @@ def at_least(least: int) -> Callable[[int, str], int]:
     most = 100_000_000
 
     def within(value: int, name: str) -> int:
-        if least <= value <= most:
-            return value
-        rule = f"be a whole number of at least {least} and at most {most:,}"
-        raise InputError(name, rule, shown(value), f"give one such as {max(least, 8)}")
+        require(value >= least, name, f"be at least {least}", shown(value), "give a larger one")
+        require(value <= most, name, f"be at most {most:,}", shown(value), "give a smaller one")
+        return value
 
     return within
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import PrivateAttr, model_validator
 
-from asperity.errors import InputError, require
+from asperity.errors import InputError, in_files, naming, require
 from asperity.laws import get_law, registered
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme
@@ -49,10 +49,13 @@ _FIELDS = {
 @contextmanager
 def fields_of_protocol() -> Iterator[None]:
     """Let mistakes in the arguments of a transient name the fields of a protocol."""
-    try:
-        yield
-    except InputError as error:
-        raise error.about(_FIELDS.get(error.field.name, error.field)) from None
+    with naming(
+        lambda argument: in_files(argument._replace(name=_FIELDS.get(argument.name, argument.name)))
+    ):
+        try:
+            yield
+        except InputError as error:
+            raise error.about(_FIELDS.get(error.field.name, error.field)) from None
 
 
 class Protocol(Experiment):

@@ -25,7 +25,7 @@ from pydantic import (
 )
 
 from asperity.errors import InputError, Key, MistakesError, closest, require
-from asperity.parameters.arguments import number, rising, shown as shown_value, typed
+from asperity.parameters.arguments import number, one_of, rising, shown as shown_value, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.units import KINDS
 
@@ -50,6 +50,14 @@ _WORDS = {
     "dict_": "a table",
     "mapping_": "a table",
     "model_": "a table",
+}
+
+#: Words for a limit, and for numbers within it.
+_LIMITS = {
+    "greater_than_equal": ("at least", "larger"),
+    "greater_than": ("above", "larger"),
+    "less_than_equal": ("at most", "smaller"),
+    "less_than": ("below", "smaller"),
 }
 
 _units_required: ContextVar[bool] = ContextVar("units_required", default=False)
@@ -82,7 +90,7 @@ class Record(BaseModel):
         except ValidationError as error:
             raise self.mistakes_error(mistakes_in(error, type(self))) from None
 
-    # Mistakes of a record within another one have their place there.
+    # As pydantic's own: the mistakes of a record within another one have their place there.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -92,10 +100,13 @@ class Record(BaseModel):
 
 
 class Question(Record):
-    """A question, which a file may ask."""
+    """A question, which a file may ask; its mistakes are the same within another question."""
 
     subject: ClassVar[str] = "question"
     prefix: ClassVar[str | None] = ""
+
+    def __init__(self, /, **fields: Any) -> None:
+        super().__init__(**fields)
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
@@ -298,24 +309,25 @@ def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputEr
         advice = near if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)
     if reported["type"] == "literal_error":
-        expected = reported["ctx"]["expected"].replace("'", "")
-        return (InputError(field, f"be {expected}", value, "choose one"),)
+        try:
+            one_of(reported["input"], re.findall("'([^']*)'", reported["ctx"]["expected"]), field)
+        except InputError as mistake:
+            return (mistake,)
     if reported["type"].endswith(("too_short", "too_long")):
         edge, what = reported["ctx"], "character" if "string" in reported["type"] else "part"
         rule = f"have {'at least' if 'min_length' in edge else 'at most'} "
         limit = edge.get("min_length", edge.get("max_length"))
         rule += f"{limit} {what}{'s' * (limit != 1)}"
         return (InputError(field, rule, edge.get("actual_length", value), "correct it"),)
-    limits = {"greater_than_equal": "at least", "less_than_equal": "at most"}
-    if reported["type"] in limits:
+    if reported["type"] in _LIMITS:
         (limit,) = reported["ctx"].values()
-        rule = f"be {limits[reported['type']]} {limit:g}"
-        return (InputError(field, rule, value, "correct the value"),)
+        words, other = _LIMITS[reported["type"]]
+        return (InputError(field, f"be {words} {limit:,}", value, f"give a {other} one"),)
     text = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
         (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), text
     )
-    return (InputError(field, f"be {rule}", value, "correct the value"),)
+    return (InputError(field, f"be {rule}", value),)
 
 
 def _choices(model: type[BaseModel], place: tuple[Any, ...], name: str) -> list[Any]:

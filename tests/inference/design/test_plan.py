@@ -167,7 +167,7 @@ def test_a_mistake_is_one_sentence(changes, message):
 
 
 def test_a_number_of_synthetic_sets_below_zero_is_refused():
-    with pytest.raises(InputError, match="simulate must be a whole number of at least 0"):
+    with pytest.raises(InputError, match="simulate must be at least 0"):
         design(PLAN, simulate=-1)
 
 

@@ -129,15 +129,16 @@ def sample_posterior(
     return posterior_of(fit, whitened, kept, seed=seed)
 
 
-def require_sizes(chains: int, draws: int) -> None:
+@typed
+def require_sizes(
+    chains: Annotated[int, at_least(2)], draws: Annotated[int, at_least(100)]
+) -> None:
     """Refuse too few chains and draws, and more draws than fit into memory.
 
     Raises
     ------
     InputError
     """
-    for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
-        require(not value < least, name, f"be at least {least}", value, "ask for more")
     each = WARM_UP + -(-draws // BLOCK) * BLOCK
     rule = f"be {_MOST_DRAWS} at most, those of the warm-up included"
     got = f"{chains} chains of {each}"

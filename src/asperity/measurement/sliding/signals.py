@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.arrays import Float
-from asperity.errors import Argument, InputError
+from asperity.errors import Argument, InputError, require
 from asperity.measurement.samples import (
     compressive,
     load_channel,
@@ -115,6 +115,9 @@ def sliding_signals(
     if window is not None:
         outside = (time < window[0]) | (time > window[1])
         use &= ~outside
+        extent = f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+        rule, got = "lie inside the recording", f"{window[0]:g} s to {window[1]:g} s"
+        require(not outside.all(), "measure.window", rule, got, extent)
     left_out = int((~use & ~outside).sum())
     if use.sum() < _FEWEST:
         used = {name: trace.channels[name].values[~outside] for name in names}
