@@ -11,13 +11,11 @@ from asperity.air.inverse import (
     patch_radius as patch_radius,
 )
 from asperity.air.layer import (
-    LAYER as LAYER,
     AirLayer as AirLayer,
     bessel_ratio as bessel_ratio,
     shear_viscosity_ratio as shear_viscosity_ratio,
 )
 from asperity.air.normal_contact import (
-    LAMBDA_Z as LAMBDA_Z,
     NormalContact as NormalContact,
     mindlin_length_ratio as mindlin_length_ratio,
     normal_length as normal_length,

@@ -38,6 +38,7 @@ LABELS: Mapping[str, str] = {
     "gauge": "Low-pass of the force gauge",
     "drift": "Friction also drifts over time",
     "profile": "Intervals by profile likelihood",
+    "inertia": "With the inertia of the slider",
     "fit_rate": "Mean values per second for long recordings",
     "velocities": "Velocities between steps",
     "whole_periods": "Whole periods only",

@@ -96,7 +96,8 @@ def _numbers(
     given: dict[str, str], material: Material | None, vacuum: bool, unknown: str
 ) -> dict[str, float]:
     """SI values of the parameters; the one that is sought need not be known."""
-    from asperity.air import LAMBDA_Z, LAYER
+    from asperity.air.layer import LAYER
+    from asperity.air.normal_contact import LAMBDA_Z
     from asperity.parameters import MACHINE
 
     layer = {p.argument: p for p in LAYER.values()}

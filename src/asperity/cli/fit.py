@@ -92,8 +92,8 @@ def _field(name: str) -> Any:
 _FIRST = (
     option("--window", "START:END", "Seconds of a recording to fit."),
     _field("free"),
-    option("--fix fixed", "NAME=VALUE", "Fix a parameter.", multiple=True),
-    option("--start", "NAME=VALUE", "Start value.", multiple=True),
+    option("--fix fixed", "NAME=VALUE", 'Fix a number, like "D0=5 um"; repeatable.', multiple=True),
+    option("--start", "NAME=VALUE", "Start value of a free one; repeatable.", multiple=True),
     _field("material"),
     option(
         "--prior",

@@ -75,6 +75,7 @@ def map(
     from asperity.outputs import output_files, require_netcdf
     from asperity.outputs.tables import Section
     from asperity.parameters import point_parameters
+    from asperity.parameters.parameter import count_text
     from asperity.study.map import SHOWN, write_map
 
     one_of(show or _SHOWN, SHOWN, "--show")
@@ -115,8 +116,8 @@ def map(
     unresolved, failed = record["boundary_unresolved_chords"], record["failed"]
     say(
         unresolved
-        and f"the boundary bends too much for the grid at {unresolved} places, where it is not "
-        "known to 1e-4; refine the grid",
+        and f"the boundary bends too much for the grid at {count_text(unresolved, 'place')}, where "
+        "it is not known to 1e-4; refine the grid",
         failed
         and f"{failed} of {record['points']} points have no response; the variable 'result' of "
         f"{out} says why",

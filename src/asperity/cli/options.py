@@ -250,7 +250,7 @@ def law_options(command: Command) -> Command:
         "--law --laws laws",
         "NAME",
         "Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
-        "of a comparison, repeatable, also as a,b,c, or all, the default.",
+        "compare takes several, each with --law or as a,b,c, or all, which is its default.",
         multiple=True,
         callback=names,
     )(command)

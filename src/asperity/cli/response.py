@@ -36,7 +36,8 @@ F/W0 = mean_friction + sum of mu_n cos(n w t + phase_n).
 Table: columns law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon,
 frequency, inertia (1 or 0), eta (N s/m), in SI or with the unit in the heading,
 as "V (um/s)". What a row leaves open is taken from --law, --set, -V, -e, -f and
---material; other columns are kept. A row that cannot be solved says why in the column 'result'.
+--material; other columns are kept. A row that cannot be solved says why in the
+column 'result'.
 
 \b
 Other modulations, as columns or by --set: epsilon2, epsilon2_phase, epsilon3,

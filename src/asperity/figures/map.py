@@ -72,9 +72,9 @@ def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
     bar.ax.minorticks_off()
     handles = keys(dataset)
     if handles:
-        figure.legend(
-            handles=handles, loc="outside lower center", ncols=2 if len(handles) != 3 else 3
-        )
+        columns = 2 if len(handles) != 3 else 3
+        close = {"handlelength": 2.4, "columnspacing": 1.2}
+        figure.legend(handles=handles, loc="outside lower center", ncols=columns, **close)
     return figure
 
 

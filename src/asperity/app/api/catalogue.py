@@ -13,7 +13,8 @@ from latex2mathml.converter import convert
 
 from asperity import materials
 from asperity._version import __version__
-from asperity.air import LAMBDA_Z, LAYER
+from asperity.air.layer import LAYER
+from asperity.air.normal_contact import LAMBDA_Z
 from asperity.app.words import LABELS
 from asperity.errors import require_known
 from asperity.laws import registered
