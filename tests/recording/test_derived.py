@@ -183,7 +183,7 @@ def test_a_recipe_gives_layout_units_channels_and_columns(tmp_path):
     ("text", "rule"),
     [
         ("[chanels]\nx = '1'", "recipe.chanels must be a known field.*did you mean 'channels'"),
-        ("[channels]\nx = 3", "recipe.channels.x must be a text, got 3; .* .in '.*lab.toml'."),
+        ("[channels]\nx = 3", "recipe.channels.x must be a text, got 3 .in '.*lab.toml'."),
         ("x = [", "recipe must be valid TOML"),
     ],
 )
