@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
 import asperity as asp
 from asperity.lock_in import rounding
-from asperity.lock_in.rounding import rounding_variance, step_of
+from asperity.lock_in.rounding import common_phases, rounding_variance, step_of
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 0.3, 1.7, 6.2])
@@ -33,6 +34,35 @@ def test_noise_smooths_the_steps() -> None:
         variance = rounding_variance(step, np.hypot(noise, step / np.sqrt(12)))[0]
         assert variance == pytest.approx(np.mean(np.square(errors)), rel=0.1)
     assert rounding_variance(step, 1.0)[0] < 1e-7
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+@pytest.mark.parametrize(("phases", "amplitude"), [(7, 20.2), (32, 61.7), (60, 300.3)])
+def test_samples_at_the_same_phases_have_few_errors(phases, amplitude, noise) -> None:
+    """Against means over all noise of cosines of a random level and phase, rounded to 1."""
+    rng, quantiles = np.random.default_rng(phases), (np.arange(200) + 0.5) / 200
+    moved = noise * ndtri(quantiles)
+    errors = []
+    for _ in range(400):
+        cycles = (np.arange(phases) + rng.random()) / phases
+        exact = rng.random() + amplitude * np.cos(2 * np.pi * cycles)
+        off = (np.round(exact[:, None] + moved) - exact[:, None]).mean(1)
+        turns = 2 * np.pi * np.arange(4)[:, None] * cycles
+        errors.append((np.array([1, 2, 2, 2])[:, None] * off * np.cos(turns)).mean(1))
+    everywhere = np.tile(cycles, 50) + np.repeat(np.arange(50), phases)
+    assert common_phases(everywhere, amplitude) == phases
+    assert common_phases(np.pi * np.arange(5000) / phases, amplitude) == np.inf
+    recorded = np.hypot(noise, np.sqrt(1 / 12))
+    variance = rounding_variance(1.0, recorded, amplitude, 3, phases)
+    ratio = np.mean(np.square(errors), axis=0) / variance
+    # Phases that are symmetric about the top have the same error, which doubles a variance.
+    assert ratio.max() < 2.2
+    assert np.median(ratio) > 0.6
+
+
+def test_noise_of_many_steps_leaves_no_error() -> None:
+    """A wrong value of 1e-300 in a damaged file makes such steps."""
+    assert not rounding_variance(1e-300, 1.0, 0.2, 2).any()
 
 
 def test_a_constant_has_no_step() -> None:
