@@ -100,6 +100,16 @@ def two_minima(x):
     return r, slope
 
 
+def test_a_minimum_that_is_not_reached_again_still_widens_intervals():
+    objective = objective_of(two_minima, 1e-6, edge=(FIRST + SECOND) / 2)
+    minima = [(np.array([x]), 99.0) for x in (FIRST, SECOND)]
+    assert not np.isfinite(objective.residuals(minima[1][0])[1]).all()
+    result = described_fit(objective, minima, profile=False)
+    low, high = result.parameters["D0"].interval_95
+    assert low < 1e-6
+    assert high == pytest.approx(4e-6)
+
+
 def test_an_interval_up_to_the_bound_of_the_search_is_open():
     """Chi-squared rises to 3.7, below the limit of 3.84, and the bound lowers the limit near it."""
 

@@ -452,8 +452,11 @@ def _widened_by_minima(
         if rise >= threshold:
             continue
         J = objective.residuals(v)[1]
-        sd = math.sqrt(inverse_information(J.T @ J)[0][i, i])
-        reach = sd * math.sqrt(threshold - rise)
+        reach = 0.0
+        # At the edge of the region with orbits a minimum may not be reached again.
+        if np.isfinite(J).all():
+            sd = math.sqrt(inverse_information(J.T @ J)[0][i, i])
+            reach = sd * math.sqrt(threshold - rise)
         low, high = min(low, v[i] - reach), max(high, v[i] + reach)
     return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
