@@ -41,6 +41,19 @@ def test_a_table_of_a_spreadsheet(tmp_path, encoding, delimiter, decimal, below)
     assert read_headed_columns(path, ["V"])["V"] == ["1.0 µm/s", "2.5 µm/s"]
 
 
+def test_an_underscore_in_a_number_is_refused(tmp_path):
+    """Python reads a damaged "2.5" as 25."""
+    path = written(tmp_path / "t.csv", [NAMES[1:], ("2_5", *ROWS[0][2:])])
+    with pytest.raises(InputError, match="in column V, got '2_5'"):
+        read_table(path)
+    points = tmp_path / "p.csv"
+    points.write_text("law,V,epsilon,frequency\nrice-ruina,2_5e-6,0.2,120\n")
+    with pytest.raises(InputError, match="in column 'V', got '2_5e-6' in row 1"):
+        run_table(points, tmp_path / "out.csv")
+    with pytest.raises(InputError, match="a number in column x, got '2_5'"):
+        read_headed_columns(written(tmp_path / "h.csv", [("x",), ("2_5",)]), ["x"])
+
+
 def test_commas_next_to_points_are_no_decimal_marks(tmp_path):
     # 1,234 may be a thousand.
     rows = [("V", "W0"), ("0.5", "1,234"), ("0.6", "1,5")]

@@ -299,9 +299,22 @@ def readable(path: Path, label: str, what: str = "CSV") -> Iterator[None]:
         raise InputError(Argument(label), rule, got, "correct the path or the file") from None
 
 
+def cell_number(cell: str) -> float:
+    """The number in a cell.
+
+    Raises
+    ------
+    ValueError
+        If it holds none; Python would read "1_5", a damaged "1.5", as 15.
+    """
+    if "_" in cell:
+        raise ValueError(cell)
+    return float(cell)
+
+
 def _number(cell: str, name: str, unit: str, where: str) -> float | str:
     try:
-        number = float(cell)
+        number = cell_number(cell)
     except ValueError:
         advice = "correct the cell, and write the unit into the heading"
         raise InputError(where, f"have a number in column {name}", shown(cell), advice) from None

@@ -30,7 +30,7 @@ from asperity.outputs import UnfinishedText, output_file
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import RESULT_COLUMNS, Parameter, point_parameters, required
 from asperity.parameters.arguments import counted, shown
-from asperity.parameters.columns import headings, sheet
+from asperity.parameters.columns import cell_number, headings, sheet
 from asperity.study.points import Answers, Points
 from asperity.study.responses import answers_of_law
 
@@ -325,7 +325,7 @@ def _points(table: TableSource, rows: Sequence[Row]) -> Points:
             continue
         cells, parameter = [row[place] for row in rows], known_parameters()[name]
         try:
-            numbers = np.fromiter(map(float, cells), float, len(cells))
+            numbers = np.fromiter(map(cell_number, cells), float, len(cells))
             usual = bool(np.isfinite(numbers).all())
         except ValueError:
             usual = False
@@ -340,7 +340,8 @@ def _number(cell: str, parameter: Parameter) -> float:
     if not cell:
         return math.nan
     try:
-        number = parameter.words[cell.lower()] if cell.lower() in parameter.words else float(cell)
+        word = cell.lower()
+        number = parameter.words[word] if word in parameter.words else cell_number(cell)
     except ValueError:
         return math.inf
     return number if math.isfinite(number) else math.inf

@@ -24,7 +24,7 @@ from asperity.outputs.json import parsed_json
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
 from asperity.parameters.arguments import shown as shown_value, typed
-from asperity.parameters.columns import headings, readable, sheet
+from asperity.parameters.columns import cell_number, headings, readable, sheet
 from asperity.parameters.toml_file import file_content
 from asperity.units import to_radians, to_si
 
@@ -332,7 +332,7 @@ def _numbers(shown: str, name: str, cells: NDArray[np.str_]) -> Float:
     values = np.full(cells.size, math.nan)
     for row, cell in enumerate(cells.tolist()):
         try:
-            values[row] = float(cell or math.nan)
+            values[row] = cell_number(cell) if cell else math.nan
         except ValueError:
             rule = f"have numbers without unit in column {name}"
             got = f"{shown_value(cell)} in row {row + 1}"
