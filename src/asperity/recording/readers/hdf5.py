@@ -130,7 +130,7 @@ def _value(item: Any, path: Path, matlab: bool) -> Any:
     if item.nbytes > max(_MUCH, _PACKED * path.stat().st_size):
         # Declared values that were never written are fill values, and would be created here.
         got = f"'{known_as(path).name}', whose '{item.name.strip('/')}' has {item.size} values"
-        raise InputError("recording.path", "hold what it declares", got, "remove that dataset")
+        raise InputError("recording", "hold what it declares", got, "remove that dataset")
     if matlab and item.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
     if h5py.check_ref_dtype(item.dtype) is not None:
