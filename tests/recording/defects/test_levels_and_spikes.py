@@ -144,3 +144,11 @@ def test_the_step_of_a_recorder_is_read_from_slow_samples(slow) -> None:
     assert recorder_step(0.37 * np.round(moved)) == pytest.approx(0.37, rel=1e-9)
     assert recorder_step(moved + rng.standard_normal(moved.size)) == 0.0
     assert recorder_step(np.ones(40)) == 0.0
+
+
+def test_a_signal_that_begins_at_its_extreme_for_long():
+    """Levels other than the extreme occur late only."""
+    phase = 2 * np.pi * (np.arange(4000) % 40) / 40
+    values = np.concatenate([np.full(20_000, 0.75), np.minimum(np.cos(phase), 0.75)])
+    (top,) = saturated(values)
+    np.testing.assert_array_equal(top.rows, np.flatnonzero(values == 0.75))

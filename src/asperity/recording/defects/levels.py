@@ -16,8 +16,8 @@ CROWDED = 8
 _FEWEST = 5
 #: Samples on both sides of a run at the extreme that show whether it ends abruptly.
 _BEYOND = 2
-#: Samples, and differences of values, from which the step of a converter is computed.
-_SEARCHED, _SEARCHED_STEPS = 1 << 14, 64
+#: Differences of values from which the step of a converter is computed.
+_SEARCHED_STEPS = 64
 #: Values that differ by less than this share of the range are equal: a signal without noise that is
 #: sampled at the same phases in each period repeats its values to within their last digits.
 _SAME = 1e-9
@@ -150,7 +150,7 @@ def _common_step(values: Float, same: float) -> float:
     A signal that is sampled at the same phases in each period has few values, which may all be many
     steps apart.
     """
-    steps = np.diff(np.unique(values[:_SEARCHED]))
+    steps = np.diff(np.unique(values))
     steps = steps[steps > same]
     _, different = np.unique(np.round(steps / same), return_index=True)
     step = float(steps.min())
