@@ -109,6 +109,8 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
         above.set_ylabel("friction $F/W$")
         above.legend(fontsize=8)
         below.set_ylabel("data - law")
+        # Times late in a recording as they stand in its file, not as multiples of a power of ten.
+        below.ticklabel_format(axis="x", style="plain", useOffset=False)
         below.set_xlabel("time (s)")
         return figure
 
