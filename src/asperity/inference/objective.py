@@ -201,6 +201,10 @@ class DataTerm(ABC):
         """The same data with a coarser model, for the approach to a minimum; itself without one."""
         return self
 
+    def partial(self) -> DataTerm:
+        """The same data, of which half without a solution may be left out; itself without these."""
+        return self
+
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
@@ -466,9 +470,15 @@ class Objective:
 
     def coarser(self) -> Objective:
         """The objective of `DataTerm.coarser` data; itself without a coarser model."""
-        terms = tuple(term.coarser() for term in self.terms)
+        return self._of([term.coarser() for term in self.terms])
+
+    def partial(self) -> Objective:
+        """The objective of `DataTerm.partial` data; itself without these."""
+        return self._of([term.partial() for term in self.terms])
+
+    def _of(self, terms: Sequence[DataTerm]) -> Objective:
         same = all(a is b for a, b in zip(terms, self.terms, strict=True))
-        return self if same else replace(self, terms=terms)
+        return self if same else replace(self, terms=tuple(terms))
 
     def expected_decrease(self, u: Float) -> float:
         """Possible decrease of chi-squared, by residuals that are linear in the coordinates.

@@ -21,6 +21,8 @@ from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 
+#: Called with the number of finished minimisations and of all minimisations.
+Progress = Callable[[int, int], None]
 #: Sort key of minima.
 _CHI2 = attrgetter("chi2")
 #: Random starts from which chi-squared is minimised, in addition to the given start.
@@ -32,6 +34,8 @@ _SAME, _SAME_COARSE = 1e-3, 0.02
 #: once, with so many starts: the fast method fails if the modulation is slower than sliding over
 #: the memory length, and would lead to wrong minima only.
 _RARE, _WITH_SEARCH = 1 / 16, 32
+#: Largest number of further starts for a table that no minimum describes.
+_FURTHER = 32
 #: Rows with which starts are compared.
 _SCREENED_ROWS = 8
 #: Rows of the coarse objective (one chunk of the search for orbits), and the smallest number of
@@ -65,7 +69,7 @@ _NEARLY_ZERO = 1e-4
 def minima_of(
     objective: Objective,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     drawn: int = 64,
     simpler: Sequence[Mapping[str, float]] = (),
@@ -90,21 +94,72 @@ def minima_of(
     special = _of_special_cases(objective, simpler)
     drawn_starts = _latin_hypercube(objective, seed, drawn)
     chi2 = objective.chi2_of_many(np.array(drawn_starts))
-    if np.isfinite(chi2).sum() < (chi2.size * _RARE if objective.has_table else 1):
+    minima: list[Minimum] = []
+    if not objective.has_table:
+        starts = [*special, *_best(objective, drawn_starts, chi2)]
+        minima = _minimised_from(objective, starts, progress)
+    elif np.isfinite(chi2).sum() >= chi2.size * _RARE:
+        minima = _by_solved_rows(objective, drawn_starts, special, progress)
+    if not minima:
         objective.use_search(True)
         minima = _by_few_rows(objective, drawn_starts, special, progress)
-        return _with_other_lengths(objective, minima)
-    starts = [*special, *_best(objective, drawn_starts, chi2)]
-    minima = _minimised_from(objective, starts, progress)
-    if minima and _blocked(objective, minima[0]):
-        ends = [end.u for end in distinct(minima)[: _MINIMISED + 1]]
-        objective.use_search(True)
-        beyond = _by_few_rows(objective, drawn_starts, ends, None)
-        if beyond and beyond[0].chi2 < minima[0].chi2 - GAIN:
-            minima = beyond
-        else:
-            objective.use_search(False)
     return _with_other_lengths(objective, minima)
+
+
+def _by_solved_rows(
+    objective: Objective, drawn: list[Float], known: list[Float], progress: Progress | None
+) -> list[Minimum]:
+    """Minima of all rows, started at minima of the rows that the fast method solves, best first.
+
+    While no minimum describes the table, further starts are tried: chi-squared at a start says
+    little about the minimum that is reached from there.
+    """
+    partial = objective.partial()
+    chi2 = partial.chi2_of_many(np.array(drawn))
+
+    def ends_of(starts: Sequence[Float], progress: Progress | None = None) -> list[Minimum]:
+        return _minimised_from(
+            partial, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
+        )
+
+    starts = [*known, *_best(partial, drawn, chi2)]
+    taken = {u.tobytes() for u in starts}
+    order = (drawn[i] for i in np.argsort(chi2) if math.isfinite(chi2[i]))
+    further = [u for u in order if u.tobytes() not in taken][:_FURTHER]
+    ends, before = ends_of(starts, progress), list[Minimum]()
+    lowest, searched = list[Minimum](), False
+    while True:
+        while further and not _describes(partial, ends):
+            new = [end for end in ends_of([further.pop(0)]) if _is_new(end, before)]
+            ends = sorted([*ends, *new], key=_CHI2)
+        minima = _of_all_rows(objective, ends)
+        if minima and (not lowest or minima[0].chi2 < lowest[0].chi2):
+            searched = objective.searches
+        lowest = distinct(sorted([*lowest, *minima], key=_CHI2))
+        if not further or _describes(objective, lowest):
+            objective.use_search(searched)
+            return lowest
+        # Rows without a solution have been left out of the ends; all rows contradict these ends.
+        ends, before = [], [*before, *ends]
+
+
+def _of_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
+    """Minima of all rows from those of some rows, with searched orbits where these are needed."""
+    objective.use_search(False)
+    minima = _on_all_rows(objective, ends)
+    lower = bool(minima) and ends[0].chi2 < minima[0].chi2 - _decisive(objective, minima[0])
+    if ends and (not minima or lower or _blocked(objective, minima[0])):
+        objective.use_search(True)
+        beyond = _on_all_rows(objective, ends)
+        if beyond and (not minima or beyond[0].chi2 < minima[0].chi2 - GAIN):
+            return beyond
+        objective.use_search(False)
+    return minima
+
+
+def _describes(objective: Objective, minima: Sequence[Minimum]) -> bool:
+    """Whether the law describes the data at the first minimum."""
+    return bool(minima) and _p_value(objective, minima[0]) > DOUBTFUL
 
 
 def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]:
@@ -150,7 +205,7 @@ def _best(objective: Objective, starts: list[Float], chi2: Float) -> list[Float]
 def _minimised_from(
     objective: Objective,
     starts: Sequence[Float],
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
     *,
     tolerance: float | None = None,
     evaluations: int = 100,
@@ -169,7 +224,7 @@ def _by_few_rows(
     objective: Objective,
     drawn: list[Float],
     known: list[Float],
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> list[Minimum]:
     """Minima of all rows, started at minima of the coarse objective, best first.
 
@@ -200,15 +255,14 @@ def _by_few_rows(
 
 
 def _roughly_minimised(
-    objective: Objective, starts: Sequence[Float], progress: Callable[[int, int], None] | None
+    objective: Objective, starts: Sequence[Float], progress: Progress | None
 ) -> list[Minimum]:
     """Minima to a coarse tolerance, best first: few evaluations choose those that are continued."""
     ends = _minimised_from(
         objective, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
     )
     # In 83 fits, none of 50 minimisations so far above one that describes the data ended lower.
-    described = bool(ends) and _p_value(objective, ends[0]) > DOUBTFUL
-    highest = ends[0].chi2 + _CONTINUED if described else math.inf
+    highest = ends[0].chi2 + _CONTINUED if _describes(objective, ends) else math.inf
     apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED] if end.chi2 < highest]
     return _minimised_from(
         objective, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
@@ -234,7 +288,7 @@ def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
             continue  # the minimum of an earlier end
         before.append(near)
         far_off = _far_off(coarser, near)
-        if not far_off and not math.isfinite(objective.chi2(near.u)):
+        if objective.searches and not far_off and not math.isfinite(objective.chi2(near.u)):
             # Transients do not reach orbits that are hardly stable; continuation does, in up to
             # seconds a row.
             objective.search_wholly(near.u)
@@ -319,9 +373,14 @@ def distinct(minima: list[Minimum], same: float = _SAME) -> list[Minimum]:
     """Minima without those that repeat an earlier one."""
     kept: list[Minimum] = []
     for minimum in minima:
-        if all(_apart(minimum, other) > same for other in kept):
+        if _is_new(minimum, kept, same):
             kept.append(minimum)
     return kept
+
+
+def _is_new(minimum: Minimum, kept: Sequence[Minimum], same: float = _SAME_COARSE) -> bool:
+    """Whether a minimum repeats none of others."""
+    return all(_apart(minimum, other) > same for other in kept)
 
 
 def _apart(one: Minimum, other: Minimum) -> float:
@@ -336,8 +395,12 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
     """
     if not objective.has_table or not math.isfinite(end.chi2):
         return False
-    least = _LARGE_GAIN * end.chi2 if _far_off(objective, end) else GAIN
-    return objective.expected_decrease(end.u) > least
+    return objective.expected_decrease(end.u) > _decisive(objective, end)
+
+
+def _decisive(objective: Objective, minimum: Minimum) -> float:
+    """Decrease of chi-squared for which the slower method is used."""
+    return _LARGE_GAIN * minimum.chi2 if _far_off(objective, minimum) else GAIN
 
 
 def _far_off(objective: Objective, minimum: Minimum) -> bool:

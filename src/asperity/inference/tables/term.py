@@ -239,8 +239,14 @@ class LockInTerm(DataTerm):
         """As in `DataTerm`; both terms share their orbits."""
         if not self.searches or self.coarse:
             return self
+        result = self.partial()
+        result.coarse = True
+        return result
+
+    def partial(self) -> LockInTerm:
+        """As in `DataTerm`; both terms share their orbits."""
         result = copy(self)
-        result.coarse, result.least = True, _LEAST_SHARE
+        result.least = _LEAST_SHARE
         return result
 
     @property
