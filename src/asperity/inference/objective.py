@@ -266,7 +266,7 @@ class Objective:
     curved : bool
         Whether chi-squared has narrow valleys that bend (`asperity.inference.levenberg_marquardt`).
     unsolved : int
-        Number of evaluations so far at which a term had no solution.
+        Number of evaluations so far at which a term had no solution by the slower method.
     """
 
     terms: tuple[DataTerm, ...]
@@ -355,7 +355,7 @@ class Objective:
     def _evaluate(self, u: Float) -> tuple[Float, Float]:
         data = self.data_residuals(u)
         if data is None:
-            self.unsolved += 1
+            self.unsolved += self.searches
             return np.array([np.nan]), np.full((1, len(self.unknowns)), np.nan)
         priors, slopes = self.prior_residuals(u)
         return (

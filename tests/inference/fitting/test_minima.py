@@ -309,11 +309,58 @@ def test_a_narrow_minimum_next_to_a_wide_excluded_one_is_found():
         return r, slope
 
     objective = objective_of(values, 1e-6)
-    (u, chi2), *others = minima_of(objective, 0)
+    (u, chi2), *_ = minima_of(objective, 0)
     assert u[0] == pytest.approx(deep, abs=1e-5)
     assert chi2 == pytest.approx(99, abs=1e-6)
-    # The other minimisations end in the wide minimum.
-    assert min(u[0] for u, _ in others) == pytest.approx(FIRST, abs=1e-3)
+    # From the given start the wide minimum is reached.
+    (begin,) = objective.coordinates({"D0": 1e-6})
+    assert objective.minimise(np.array([begin])).u[0] == pytest.approx(FIRST, abs=1e-3)
+
+
+class PartlySolved(Formula):
+    """Below `border` the fast method solves half of the rows, which are described at `wrong`."""
+
+    least = 1.0
+
+    def __init__(self, values, border, wrong):
+        super().__init__(values)
+        self.border, self.wrong = border, wrong
+
+    def residuals(self, values, *, search=None):
+        result, x = super().residuals(values), math.log(values["D0"])
+        if x > self.border:
+            return result
+        if self.least == 1 and not self.searching:
+            return None
+        r, slope = np.ones(100), np.zeros(100)
+        r[0], slope[0] = 5 * (x - self.wrong), 5 / values["D0"]
+        if self.least == 1:
+            # The other half of the rows contradicts the law.
+            r[50:] = 30.0
+        return result._replace(values=r, jacobian=slope[:, None])
+
+
+def test_a_minimum_that_unsolved_rows_contradict_does_not_end_the_search():
+    wrong, border, deep = FIRST, FIRST + 0.5, FIRST + 2.0
+
+    def values(x):
+        r, slope = np.full(100, 3.0), np.zeros(100)
+        if abs(x - deep) < 0.3:
+            r[1:], r[0], slope[0] = 1.0, 100 * (x - deep), 100.0
+        else:
+            r[0], slope[0] = 5 * (x - FIRST), 5.0
+        return r, slope
+
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
+    objective = Objective((PartlySolved(values, border, wrong),), LAW, unknowns, {})
+    partial = objective.partial()
+    end = partial.minimise(objective.coordinates({"D0": 1e-6}))
+    assert end.u[0] == pytest.approx(wrong, abs=1e-3)
+    assert end.chi2 == pytest.approx(99, abs=1e-6)
+    u, chi2 = minima_of(objective, 0)[0]
+    assert u[0] == pytest.approx(deep, abs=1e-5)
+    assert chi2 == pytest.approx(99, abs=1e-6)
+    assert not objective.searches
 
 
 class Edge(Formula):

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from asperity.arrays import Float
+from asperity.inference.fitting.result import MISFIT
 from asperity.inference.objective import Minimum, Objective
 from asperity.laws import Law
 from asperity.parameters import law_parameters
@@ -159,7 +160,7 @@ def _of_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
 
 def _describes(objective: Objective, minima: Sequence[Minimum]) -> bool:
     """Whether the law describes the data at the first minimum."""
-    return bool(minima) and _p_value(objective, minima[0]) > DOUBTFUL
+    return bool(minima) and _p_value(objective, minima[0]) >= MISFIT
 
 
 def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]:
