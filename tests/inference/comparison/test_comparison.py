@@ -333,8 +333,11 @@ def test_a_row_at_the_edge_of_periodic_sliding_is_no_outlier():
 @pytest.mark.parametrize(
     "drawn",
     population(
-        [("elasto-plastic", 111), ("linker-dieterich", 12), ("linker-dieterich", 23)]
-        + [("linker-dieterich", 27), ("linker-dieterich", 51), ("elasto-plastic", 161)]
+        [
+            ("elasto-plastic", 111),
+            *(("linker-dieterich", seed) for seed in (12, 23, 27, 51)),
+            ("elasto-plastic", 161),
+        ]
     ),
 )
 def test_the_minimum_next_to_the_truth_is_found(drawn):

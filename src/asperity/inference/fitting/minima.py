@@ -1,8 +1,10 @@
 """Search for the minima of an objective: evaluate random starts, minimise from the best ones.
 
-The starts are a Latin hypercube over the ranges of the unknowns. Least squares begins at the best
-of them. If orbits are searched for, which takes milliseconds a row, both steps use few rows of the
-table on a coarse mesh; the minima that may be the best are then continued with all rows.
+The starts are a Latin hypercube over the ranges of the unknowns. For tables, least squares first
+uses the rows that the fast method solves, at least half of them; these minima are continued with
+all rows, and with searched orbits where the fast method has none. If the fast method solves hardly
+any start, as under slow modulation, orbits are searched for from the beginning, which takes
+milliseconds a row: the first minimisations then use few rows of the table on a coarse mesh.
 """
 
 from __future__ import annotations
@@ -126,7 +128,9 @@ def _by_solved_rows(
     starts = [*known, *_best(partial, drawn, chi2)]
     taken = {u.tobytes() for u in starts}
     order = (drawn[i] for i in np.argsort(chi2) if math.isfinite(chi2[i]))
-    further = [u for u in order if u.tobytes() not in taken][:_FURTHER]
+    # Estimated noise says nothing about the law.
+    most = _FURTHER if objective.noise_is_known else 0
+    further = [u for u in order if u.tobytes() not in taken][:most]
     ends, before = ends_of(starts, progress), list[Minimum]()
     lowest, searched = list[Minimum](), False
     while True:
