@@ -137,7 +137,7 @@ def _by_solved_rows(
         while further and not _describes(partial, ends):
             new = [end for end in ends_of([further.pop(0)]) if _is_new(end, before)]
             ends = sorted([*ends, *new], key=_CHI2)
-        minima = _of_all_rows(objective, ends)
+        minima = _of_all_rows(objective, ends, bool(ends) and _far_off(partial, ends[0]))
         if minima and (not lowest or minima[0].chi2 < lowest[0].chi2):
             searched = objective.searches
         lowest = distinct(sorted([*lowest, *minima], key=_CHI2))
@@ -148,14 +148,14 @@ def _by_solved_rows(
         ends, before = [], [*before, *ends]
 
 
-def _of_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
+def _of_all_rows(objective: Objective, ends: list[Minimum], far_off: bool) -> list[Minimum]:
     """Minima of all rows from those of some rows, with searched orbits where these are needed."""
     objective.use_search(False)
-    minima = _on_all_rows(objective, ends)
-    lower = bool(minima) and ends[0].chi2 < minima[0].chi2 - _decisive(objective, minima[0])
+    minima = _on_all_rows(objective, ends, far_off)
+    lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
     if ends and (not minima or lower or _blocked(objective, minima[0])):
         objective.use_search(True)
-        beyond = _on_all_rows(objective, ends)
+        beyond = _on_all_rows(objective, ends, far_off)
         if beyond and (not minima or beyond[0].chi2 < minima[0].chi2 - GAIN):
             return beyond
         objective.use_search(False)
@@ -241,11 +241,11 @@ def _by_few_rows(
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
     roughly = _roughly_minimised(coarse, starts, progress)
-    minima = _on_all_rows(objective, roughly)
-    lowest = minima[0].chi2 if minima else math.inf
-    again = [u for u in known if objective.chi2(u) < lowest]
     # A law that is far off for few rows does not describe all of them.
     far_off = bool(roughly) and _far_off(coarse, roughly[0])
+    minima = _on_all_rows(objective, roughly, far_off)
+    lowest = minima[0].chi2 if minima else math.inf
+    again = [u for u in known if objective.chi2(u) < lowest]
     if minima or (again and far_off):
         return sorted([*minima, *map(objective.minimise, again)], key=_CHI2)
     # Another row may have no orbit at a coarse minimum, or no orbit that the coarse search reaches.
@@ -279,25 +279,29 @@ def _coarse(objective: Objective) -> Objective | None:
     return objective.thinned(_ROWS, _DATA_EACH * len(objective.unknowns))
 
 
-def _on_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
-    """Minima of all rows from those of the coarse objective that may be as good as the best."""
+def _on_all_rows(objective: Objective, ends: list[Minimum], far_off: bool) -> list[Minimum]:
+    """Minima of all rows from those of some rows that may be as good as the best.
+
+    Of a law that is far off for some rows, one minimum is enough.
+    """
     ends = distinct(ends, _SAME_COARSE)
+    highest = ends[0].chi2 + (0.0 if far_off else _CONTINUED) if ends else 0.0
     minima: list[Minimum] = []
     before: list[Minimum] = []
     coarser = objective.coarser()
     for end in ends:
-        if minima and end.chi2 > ends[0].chi2 + _CONTINUED:
+        if minima and end.chi2 > highest:
             break
         near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
         if len(distinct([*before, near], _SAME_COARSE)) == len(before):
             continue  # the minimum of an earlier end
         before.append(near)
-        far_off = _far_off(coarser, near)
-        if objective.searches and not far_off and not math.isfinite(objective.chi2(near.u)):
+        far = _far_off(coarser, near)
+        if objective.searches and not far and not math.isfinite(objective.chi2(near.u)):
             # Transients do not reach orbits that are hardly stable; continuation does, in up to
             # seconds a row.
             objective.search_wholly(near.u)
-        minima.append(_minimised_near(objective, near.u, minima, far_off=far_off))
+        minima.append(_minimised_near(objective, near.u, minima, far_off=far))
     return distinct(sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2))
 
 
@@ -400,12 +404,8 @@ def _blocked(objective: Objective, end: Minimum) -> bool:
     """
     if not objective.has_table or not math.isfinite(end.chi2):
         return False
-    return objective.expected_decrease(end.u) > _decisive(objective, end)
-
-
-def _decisive(objective: Objective, minimum: Minimum) -> float:
-    """Decrease of chi-squared for which the slower method is used."""
-    return _LARGE_GAIN * minimum.chi2 if _far_off(objective, minimum) else GAIN
+    least = _LARGE_GAIN * end.chi2 if _far_off(objective, end) else GAIN
+    return objective.expected_decrease(end.u) > least
 
 
 def _far_off(objective: Objective, minimum: Minimum) -> bool:
