@@ -11,11 +11,13 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 from asperity import Slider, materials, periodic_response
 from asperity.errors import InputError
 from asperity.fit_report import bands, write_comparison, write_report
+from asperity.fit_report.folder import document
 from asperity.fit_report.pictures import run_figure
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
 from asperity.orbit import response_function
+from asperity.outputs.tables import Section, as_html
 
 
 @pytest.fixture(scope="module")
@@ -156,3 +158,22 @@ def test_a_comparison_without_a_fit_is_refused(fitted, tmp_path):
     none = judge({n: replace(fitted, converged=False, message="no orbit") for n in ("a", "b")})
     with pytest.raises(InputError, match="must have a converged fit"):
         write_comparison(tmp_path / "report", none)
+
+
+def test_a_column_of_notes_wraps_and_one_of_numbers_is_as_wide_as_they_are(chromium, tmp_path):
+    names = tuple("abcdefgh")
+    numbers = Section("", head=("", *names), rows=(("a", *("+0.10" for _ in names)),))
+    notes = Section("", head=("law", "AICc", ""), rows=(("a", "1.0", "a sentence " * 20),))
+    (tmp_path / "report.html").write_text(
+        document("title", "kicker", "heading", {"Fit": as_html([numbers, notes])}), "utf-8"
+    )
+    page = chromium.new_page(viewport={"width": 1280, "height": 900})
+    page.goto((tmp_path / "report.html").as_uri())
+    boxes = [
+        [c.bounding_box() for c in row.locator("td").all()] for row in page.locator("tr").all()
+    ]
+    page.close()
+    assert boxes[1][-1]["width"] == pytest.approx(boxes[1][1]["width"], abs=1)
+    # Two lines or more, within the page.
+    assert boxes[3][-1]["height"] > 1.5 * boxes[1][-1]["height"]
+    assert boxes[3][-1]["x"] + boxes[3][-1]["width"] <= 1280
