@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import Argument, InputError, closest, require, symbol, symbols
+from asperity.errors import Argument, InputError, require, symbol, symbols
 from asperity.laws import Law
 from asperity.materials import Material
-from asperity.parameters import Parameter, point_parameters
+from asperity.parameters import Parameter, point_parameters, suggestion
 from asperity.parameters.arguments import number, typed
 
 #: Share of the applied modulation that the contacts carry; only fits have this parameter.
@@ -188,8 +188,8 @@ def require_fittable(law: type[Law], free: Sequence[str]) -> None:
         If a name is not allowed; the message lists the names that can be free.
     """
     known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
-    fittable = [n for n, p in known.items() if p.place != "drive" and n not in REFERENCES]
-    fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
+    others = (*REFERENCES, "epsilon", "inertia")
+    fittable = {n: p for n, p in known.items() if p.place != "drive" and n not in others}
     for name in free:
         if name in REFERENCES:
             rule, got = (
@@ -198,11 +198,8 @@ def require_fittable(law: type[Law], free: Sequence[str]) -> None:
             )
             raise InputError("free", rule, f"{got} one of mu0", "free mu0 instead")
         if name not in fittable:
-            rule, advice = (
-                f"be parameters of {law.name}",
-                closest(symbol(name), map(symbol, fittable)),
-            )
-            raise InputError("free", rule, f"'{symbol(name)}'", advice)
+            rule = f"be parameters of {law.name}"
+            raise InputError("free", rule, f"'{symbol(name)}'", suggestion(name, fittable))
         if list(free).count(name) > 1:
             raise InputError(
                 "free", "name each parameter once", f"'{symbol(name)}' twice", "drop one"
@@ -309,13 +306,15 @@ def require_free_names(
     interest = [unknown for unknown in unknowns if not unknown.nuisance]
     with_prior = [unknown for unknown in unknowns if unknown.logarithmic or not unknown.nuisance]
     for label, names, some in (("start", start or {}, interest), ("prior", priors, with_prior)):
-        known = [unknown.name for unknown in some]
+        known = {unknown.name: unknown.parameter for unknown in some}
         # Names without a run stand for the parameter of each run.
         shared = {name.partition("[")[0] for name in known}
         for name in names:
             rule = f"be of free parameters ({symbols(known)})"
-            advice = f"free it, correct the name, or leave the {label} out"
-            require(name in known or name in shared, label, rule, f"'{symbol(name)}'", advice)
+            if name not in known and name not in shared:
+                advice = f"free it, correct the name, or leave the {label} out"
+                advice = suggestion(name, known, advice)
+                raise InputError(label, rule, f"'{symbol(name)}'", advice)
 
 
 def material_values(material: Material | None, names: Iterable[str]) -> dict[str, float]:

@@ -171,10 +171,12 @@ def known_name(
 
 
 @typed
-def suggestion(name: str, known: Mapping[str, Parameter]) -> str:
-    """``did you mean 'x'?``, or the names there are."""
-    meant = [p.name for p in known.values() if name.lower() in p.meant]
-    return f"did you mean '{symbol(meant[0])}'?" if meant else closest(name, map(symbol, known))
+def suggestion(name: str, known: Mapping[str, Parameter], otherwise: str = "") -> str:
+    """``did you mean 'x'?``, or other advice: by default the nearest of the names there are."""
+    meant = (parameter_named(name), *(n for n, p in known.items() if name.lower() in p.meant))
+    for parameter in filter(known.__contains__, meant):
+        return f"did you mean '{symbol(parameter)}'?"
+    return otherwise or closest(symbol(name), map(symbol, known))
 
 
 #: Decorations of a formula that a plain name goes without.

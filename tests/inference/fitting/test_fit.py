@@ -301,6 +301,15 @@ def test_readings_that_differ_are_joined(columns):
         ({"free": ("D0",), "prior": {"D0": Prior(0.5, 0.1, "", "um")}}, "must be in m, as all"),
         ({"free": ("A",), "fixed": {"A": 0.01}}, "free or fixed"),
         ({"free": ("A",), "fixed": {"alpha": 0.1}}, "fixed must be parameters"),
+        # Names of geophysics.
+        ({"free": ("A",), "fixed": {"Dc": 1e-6}}, "got 'Dc'; did you mean 'D0'?"),
+        ({"free": ("A", "D0"), "start": {"d_c": 1e-6}}, "got 'd_c'; did you mean 'D0'?"),
+        ({"free": ("a",)}, "got 'a'; did you mean 'A'?"),
+        (
+            {"free": ("A",), "prior": {"sigma_n": Prior(1.0, 0.1, "")}},
+            "got 'sigma_n'; free it, correct the name, or leave the prior out",
+        ),
+        ({"free": ("A",), "fixed": {"sigma_n": 1.0}}, "got 'sigma_n'; did you mean 'W0'?"),
         ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),
         ({"free": ("tilt",)}, "must be parameters of elasto-plastic, got 'tilt'"),
         ({"free": ("A",), "start": {"B": 0.1}}, "start must be of free parameters"),

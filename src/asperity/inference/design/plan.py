@@ -26,7 +26,7 @@ from asperity.inference.unknowns import EPS_RATIO, require_free_names, unknowns_
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material, load as load_material
-from asperity.parameters import MODULATION, Parameter, point_parameters
+from asperity.parameters import MODULATION, Parameter, point_parameters, suggestion
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.questions.design import MOST, Design, Range
@@ -235,7 +235,7 @@ def _numbers(question: Design, field: str, known: Mapping[str, Parameter]) -> di
     for name, value in getattr(question, field).items():
         if name not in known:
             rule = "have names of parameters"
-            raise InputError(field, rule, f"'{name}'", closest(name, known))
+            raise InputError(field, rule, f"'{name}'", suggestion(name, known))
         result[name] = _quantity(value, known[name], f"{field}.{name}")
     return result
 

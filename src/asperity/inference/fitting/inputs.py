@@ -34,6 +34,7 @@ from asperity.parameters import (
     all_parameters,
     law_parameters,
     point_parameters,
+    suggestion,
 )
 from asperity.questions.fit import NormalPrior
 from asperity.units import KINDS, format_si, to_si
@@ -144,8 +145,10 @@ def fixed_values(
         require(name not in free, symbol(name), "be free or fixed", "both", "leave one out")
         rule, advice = "be parameters of a harmonic load", "leave it out: fits take no other load"
         require(name not in MODULATION, "fixed", rule, f"'{symbol(name)}'", advice)
-        rule, advice = f"be parameters of {law.name}", "leave it out or choose another law"
-        require(name in known or name == "eps_ratio", "fixed", rule, f"'{symbol(name)}'", advice)
+        if name not in known and name != "eps_ratio":
+            rule = f"be parameters of {law.name}"
+            advice = suggestion(name, known, "leave it out or choose another law")
+            raise InputError("fixed", rule, f"'{symbol(name)}'", advice)
     result: dict[str, Any] = {}
     missing = []
     for name in known:
@@ -348,7 +351,7 @@ def priors_of(
             continue
         parameter = known.get(name.partition("[")[0])
         if parameter is None:
-            raise InputError("prior", "name a parameter", f"'{name}'", "correct the name")
+            raise InputError("prior", "name a parameter", f"'{name}'", suggestion(name, known))
         label = f"{Argument('prior', name)}"
         mean, unit = _of_some_kind(parameter, prior.mean, label)
         sd, other = _of_some_kind(parameter, prior.std, label)
