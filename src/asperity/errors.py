@@ -202,6 +202,10 @@ class InputError(ValueError):
         """The same mistake, its field in the words of the door in use, for every door."""
         return self.about(Key(str(self.field)))
 
+    def in_file(self, name: str) -> InputError:
+        """The same mistake with the name of the file that has it."""
+        return self.noting(f" (in '{name}')")
+
     def noting(self, addition: str) -> InputError:
         """The same mistake with an addition at its end."""
         if not self.rule:
@@ -281,6 +285,10 @@ class MistakesError(InputError):
     def worded(self) -> InputError:
         """As of `InputError`, for every mistake."""
         return type(self)([error.worded() for error in self.errors], self.source)
+
+    def in_file(self, name: str) -> InputError:
+        """As of `InputError`, for all mistakes."""
+        return type(self)(self.errors, name)
 
     def noting(self, addition: str) -> InputError:
         """As of `InputError`, to the last mistake."""

@@ -11,7 +11,7 @@ import click
 
 from asperity.cli.options import law_option, option, output_options, switch
 from asperity.cli.report import Output, save_figure, say
-from asperity.errors import MISTAKES_SHOWN, InputError, naming
+from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
     from asperity.protocol import Protocol, RunSummary
@@ -72,7 +72,6 @@ def run(
     from asperity.cli.progress import bar
     from asperity.outputs import output_files, require_netcdf
     from asperity.protocol import (
-        ProtocolError,
         load_protocol,
         outline,
         record_run,
@@ -88,15 +87,8 @@ def run(
         inputs={"protocol": protocol},
     )
     require_netcdf(out, "--out", "run.nc")
-    try:
-        with naming(symbols=str):  # a file has the names of friction
-            wanted = load_protocol(protocol)
-    except ProtocolError as error:
-        shown = [" ".join(mistake.split()) for mistake in error.mistakes[:MISTAKES_SHOWN]]
-        more = len(error.mistakes) - len(shown)
-        shown += [f"and {more:,} more mistakes"] if more else []
-        say(*(f"{protocol}: {mistake}" for mistake in shown))
-        return 2
+    with naming(symbols=str):  # a file has the names of friction
+        wanted = load_protocol(protocol)
     if law is not None and wanted.law != law:
         got = f"'{law}' and law = '{wanted.law}'"
         advice = "change one of them or leave the option out"

@@ -137,7 +137,7 @@ def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
         try:
             return plan_of(content, name=file.name, require_unit=True)
         except InputError as error:
-            raise error.worded().shortened().noting(f" (in '{file.name}')") from None
+            raise error.worded().shortened().in_file(str(path)) from None
 
 
 @typed
