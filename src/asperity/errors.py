@@ -372,9 +372,17 @@ def listed(names: Iterable[str], joint: str = ", ", most: int = 40) -> str:
     return joint.join(every[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
-def enumerated(names: Sequence[str]) -> str:
+def enumerated(names: Sequence[str], word: str = "and") -> str:
     """Names in a sentence: "a", "a and b", "a, b and c"."""
-    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f" {word} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def one_of_types(types: Iterable[str]) -> str:
+    """Types in a sentence, each once: "a text, a list or a number"; a whole number is a number."""
+    known = dict.fromkeys(types)
+    if "a number" in known:
+        known.pop("a whole number", None)
+    return enumerated(list(known), "or")
 
 
 def printable(text: str, most: int = 600) -> str:

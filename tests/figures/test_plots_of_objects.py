@@ -61,6 +61,17 @@ def test_a_notebook_shows_the_picture_without_pyplot() -> None:
     assert size["width"] == figure.get_size_inches()[0] * figure.dpi
 
 
+def test_titles_and_labels_of_figures_have_one_micro_sign() -> None:
+    one = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.1, frequency=120.0)
+    rows = asp.periodic_response(
+        SLIDER, velocity=np.array([1e-6, 1e-5])[:, None], epsilon=[0.1, 0.2], frequency=120.0
+    )
+    assert "V 1 µm/s" in one.plot().get_suptitle()
+    assert "V 1 µm/s" in one.plot("geophysics").get_suptitle()
+    legend = rows.plot().axes[0].get_legend().get_texts()
+    assert [text.get_text() for text in legend] == ["V 1 µm/s", "V 10 µm/s"]
+
+
 def test_a_file_in_place_of_the_set_of_names_is_refused() -> None:
     response = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.1, frequency=120.0)
     with pytest.raises(InputError, match="names must be one of friction, geophysics"):

@@ -21,6 +21,7 @@ from asperity.laws import Law
 from asperity.loads import CyclicLoading, Hold, Programme, Slide
 from asperity.outputs import UnfinishedText, output_file
 from asperity.parameters.arguments import FilePath, annotations_of, at_least, of_type, typed
+from asperity.questions.sweep import Sweep
 from asperity.study.map import Axis, write_map
 from asperity_papers.bureau2000.machine import Machine
 
@@ -278,6 +279,19 @@ def test_input_error_is_a_value_error() -> None:
 )
 def test_a_near_name_is_suggested(written: str, meant: str) -> None:
     assert closest(written, LAWS) == f"did you mean '{meant}'?"
+
+
+def test_several_types_are_a_list_and_a_whole_number_is_a_number() -> None:
+    @typed
+    def function(value: bool | str | float | int | None) -> None: ...
+
+    with pytest.raises(TypeError, match=r"value must be True or False, a text, a number or None,"):
+        function([])  # type: ignore[arg-type]
+    plan = {"law": "rice-ruina", "parameters": {"V": [1]}, "axes": {"K": "1:2:3 N/m"}}
+    with pytest.raises(
+        InputError, match=r"parameters\.V must be true or false, a number or a text,"
+    ):
+        Sweep.of_content(plan)
 
 
 def test_names_are_listed_when_none_is_near() -> None:

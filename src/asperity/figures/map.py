@@ -168,8 +168,7 @@ def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
     letters = "" if known is None else re.sub(r"\\[lr]vert ?", "|", known.symbol)
     symbol = f" ${letters}$" if letters else ""
     meaning = re.split(r": | \(|, ", side.attrs.get("long_name", str(side.name)))[0]
-    shown = unit[1].replace("um", "µm")
-    return f"{meaning}{symbol}" + (f" ({shown})" if shown not in ("", "1") else "")
+    return f"{meaning}{symbol}" + (f" ({unit[1]})" if unit[1] not in ("", "1") else "")
 
 
 def _write_numbers(axis: Axis, ratio: float) -> None:

@@ -188,7 +188,7 @@ def _recording(term: RunTerm) -> str:
         f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
         + (f" {noise['averaged']}." if noise["averaged"] else "")
     )
-    return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
+    return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (um/s)"), rows)
 
 
 def provenance(fit: Fit) -> str:

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args,
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.errors import InputError, InputTypeError, closest, require
+from asperity.errors import InputError, InputTypeError, closest, one_of_types, require
 from asperity.parameters.rules import obeying
 from asperity.units.kinds import shown as shown, with_article
 
@@ -206,7 +206,7 @@ _WORDS: Mapping[Any, str] = {
 def _words(kind: Any) -> str:
     origin, parts = _origin_and_parts(kind)
     if origin in (Union, UnionType):
-        return " or ".join(dict.fromkeys(map(_words, parts)))
+        return one_of_types(map(_words, parts))
     if origin is Annotated:
         return _words(parts[0])
     return _WORDS.get(origin) or with_article(origin.__name__)

@@ -7,6 +7,7 @@ hold.
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -254,12 +255,12 @@ class Drawn(Displayed):
 
 
 def labelled(figure: Figure, names: Names) -> Figure:
-    """The figure, its labels in a set of names."""
-    if names == "geophysics":
-        in_symbols: Any = import_module("asperity.parameters.table").in_symbols
-        labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
-        for text in labels:
-            text.set_text(in_symbols(text.get_text()))
+    """The figure, its labels in a set of names and with µm for um, as texts to type have it."""
+    in_symbols: Any = import_module("asperity.parameters.table").in_symbols
+    labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
+    for text in labels:
+        shown = re.sub(r"\bum\b", "µm", text.get_text())
+        text.set_text(in_symbols(shown) if names == "geophysics" else shown)
     return figure
 
 

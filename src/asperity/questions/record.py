@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
@@ -24,7 +24,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from asperity.errors import InputError, Key, MistakesError, closest, require
+from asperity.errors import InputError, Key, MistakesError, closest, one_of_types, require
 from asperity.parameters.arguments import number, one_of, rising, shown as shown_value, typed
 from asperity.parameters.toml_file import toml_content
 from asperity.units import KINDS
@@ -265,17 +265,20 @@ def shown(value: Any) -> str:
 
 def mistakes_in(error: ValidationError, model: type[Record]) -> list[InputError]:
     """The mistakes that pydantic reports in a record, each once."""
-    mistakes: dict[tuple[str, ...], InputError] = {}
+    # Of a field of several types, a value may fit none.
+    alike: dict[tuple[str, ...], list[InputError]] = {}
     for reported in error.errors(include_url=False):
         for mistake in _mistakes(reported, model):
-            key = (*mistake.field, mistake.got, mistake.advice)
-            other = mistakes.get(key)
-            if other is not None and mistake.rule not in other.rule:
-                # A field of several types, which the value fits none of.
-                rule = f"{other.rule} or {mistake.rule.removeprefix('be ')}"
-                mistake = InputError(mistake.field, rule, mistake.got, mistake.advice)
-            mistakes[key] = mistake if other is None or mistake.rule not in other.rule else other
-    return list(mistakes.values())
+            alike.setdefault((*mistake.field, mistake.got, mistake.advice), []).append(mistake)
+    return [_any_of(several) for several in alike.values()]
+
+
+def _any_of(alike: Sequence[InputError]) -> InputError:
+    """One mistake for those that differ only in their rules."""
+    first = alike[0]
+    be = "be " if first.rule.startswith("be ") else ""
+    rule = be + one_of_types(mistake.rule.removeprefix("be ") for mistake in alike)
+    return first if len(alike) == 1 else InputError(first.field, rule, first.got, first.advice)
 
 
 def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputError, ...]:
