@@ -6,11 +6,12 @@ no absolute path of a file, so that it is the same on another machine.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import itertools
 import sys
 from collections.abc import Iterator, Mapping, Sequence, Set
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -169,13 +170,28 @@ def law_places(plan: Sweep) -> tuple[str, ...]:
 
 
 def _law_files(plan: Sweep) -> dict[str, str]:
-    """SHA-256 of the file of each law that the plan names by module or file, by law name."""
+    """SHA-256 of the files of each law that the plan names by module or file, by law name."""
     digests = {}
     for place in law_places(plan):
         module = sys.modules[get_law(known_law(place)).__module__]
-        content = Path(str(module.__file__)).read_bytes()
+        content = b"".join(map(Path.read_bytes, _with_imports(Path(str(module.__file__)))))
         digests[known_law(place)] = hashlib.sha256(content).hexdigest()
     return digests
+
+
+def _with_imports(file: Path) -> list[Path]:
+    """A file of Python, and the files in its folder that it or one of them imports."""
+    files = [file]
+    for source in files:
+        code: ast.AST = ast.Pass()
+        with suppress(SyntaxError, ValueError):  # no source, or one that is never imported
+            code = ast.parse(source.read_bytes())
+        for node in ast.walk(code):
+            imported = node.names if isinstance(node, ast.Import | ast.ImportFrom) else []
+            names = [getattr(node, "module", None) or "", *(part.name for part in imported)]
+            near = [file.parent / f"{name.rpartition('.')[2]}.py" for name in names]
+            files += [path for path in near if path.is_file() and path not in files]
+    return files
 
 
 def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:

@@ -274,6 +274,14 @@ def _run(
     return counts
 
 
+#: What a failed write means and what to do.
+_CAUSES = {
+    errno.ENOSPC: ("the disk is full", "make room"),
+    errno.EDQUOT: ("the disk is full", "make room"),
+    errno.EFBIG: ("the limit on the size of a file is reached", "raise the limit (ulimit -f)"),
+}
+
+
 @contextmanager
 def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
     """Raise an `InputError` about the store in place of an error of the file system."""
@@ -281,11 +289,11 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
         yield
     except OSError as error:
         room = size_text(free_disk(path.parent))
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        why = "the disk is full" if full else (error.strerror or str(error)).lower()
+        reason = (error.strerror or str(error)).lower()
+        why, remedy = _CAUSES.get(error.errno or 0, (reason, "correct that"))
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
         rule = "be a folder that can be written"
-        advice = "make room and repeat the command, which continues from there"
+        advice = f"{remedy} and repeat the command, which continues from there"
         raise InputError("out", rule, f"'{path.name}' ({why}, {room} free){done}", advice) from None
 
 

@@ -204,6 +204,25 @@ def test_a_law_from_a_file_reaches_the_workers(tmp_path: Path, closed_form: Clos
         run_sweep(plan, out, workers=Elsewhere())
 
 
+def test_code_next_to_a_law_that_it_imports_is_part_of_the_law(
+    tmp_path: Path, closed_form: ClosedForm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    out, plan, far = tmp_path / "s.zarr", tmp_path / "plan.toml", tmp_path / "far_numbers.py"
+    plan.write_text(PLAN)
+    imports = "import os, near_numbers as numbers\n"
+    (tmp_path / "my_law.py").write_text(imports + LAW.format(name="mine"))
+    (tmp_path / "near_numbers.py").write_text("from far_numbers import SHARE\n")
+    far.write_text("SHARE = 0.5\n")
+    (tmp_path / "script.py").write_text("")
+    run_sweep(plan, out, workers=Elsewhere())
+    (tmp_path / "script.py").write_text("print('not part of the law')\n")
+    assert run_sweep(plan, out, workers=Elsewhere()).solved == 0
+    far.write_text("SHARE = 0.6\n")
+    with pytest.raises(InputError, match=r"same plan, got law_files\.mine = "):
+        run_sweep(plan, out, workers=Elsewhere())
+
+
 @pytest.mark.skipif(os.name != "posix", reason="no SIGKILL")
 def test_laws_from_a_file_and_a_module_reach_dask_workers_of_which_one_is_killed(
     tmp_path: Path, closed_form: ClosedForm, monkeypatch: pytest.MonkeyPatch

@@ -162,8 +162,16 @@ def test_what_is_done_is_never_solved_again(tmp_path: Path, closed_form: ClosedF
     assert not closed_form.solved & kept
 
 
-def test_a_full_disk_is_a_sentence_and_costs_nothing(
-    tmp_path: Path, closed_form: ClosedForm
+@pytest.mark.parametrize(
+    ("number", "sentence"),
+    [
+        (errno.ENOSPC, r"the disk is full.*make room and .*continues from there"),
+        (errno.EFBIG, r"the limit on the size of a file is reached.*raise .*continues from there"),
+        (errno.EIO, r"'s.zarr' \(input/output error.*correct that and .*continues from there"),
+    ],
+)
+def test_a_failed_write_is_a_sentence_and_costs_nothing(
+    tmp_path: Path, closed_form: ClosedForm, number: int, sentence: str
 ) -> None:
     out = tmp_path / "s.zarr"
     written = 0
@@ -172,12 +180,12 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
         nonlocal written
         written += 1
         if written > 60:
-            raise OSError(errno.ENOSPC, "No space left on device")
+            raise OSError(number, os.strerror(number))
 
     with pytest.MonkeyPatch.context() as patch:
         for module in (root, store):
             patch.setattr(module, "sync_folder", full)
-        with pytest.raises(InputError, match=r"the disk is full.*continues from there"):
+        with pytest.raises(InputError, match=sentence):
             run(out)
     assert store_status(out).done < POINTS
     run(out)
