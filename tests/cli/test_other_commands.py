@@ -237,4 +237,8 @@ def test_a_recipe_needs_its_measurements(asperity, tmp_path):
         asperity("recipe", "bureau2000", readings, "--thresholds", thresholds),
         "must have rows with epsilon = 0 and mean_friction",
     )
+    readings.write_text("V,epsilon,delta_mu,delta_mu_err\n1e-6,0.3,-0.05,0.002\n")
+    command = ("recipe", "bureau2000", readings, "--thresholds", thresholds)
+    refused(asperity(*command), "got none for frequency", "--fix frequency")
+    refused(asperity(*command, "--fix", "frequency=120 Hz"), "must have rows with epsilon = 0")
     refused(asperity("recipe", "bureau1999", readings, "--thresholds", thresholds), "bureau2000")

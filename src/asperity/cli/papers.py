@@ -9,6 +9,7 @@ import click
 
 from asperity.cli.options import option, output_options, settings_of
 from asperity.cli.report import Output
+from asperity.cli.words import fields_as_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,11 +33,20 @@ the first oscillations, frequency_err. They give A, B and D0.
 """
 
 
+#: Numbers of readings that all rows may share.
+_OF_ROWS = ("V", "epsilon", "frequency")
+
+
 @click.command(epilog=_EPILOG, short_help="Parameters by the steps of a paper.")
 @click.argument("paper")
 @click.argument("readings", nargs=-1, required=True, type=Path)
 @option("--thresholds", "CSV", "Table of bifurcations.", Path, required=True)
-@option("--fix fixes", "NAME=VALUE", "K, W0 or V0.", multiple=True)
+@option(
+    "--fix fixes",
+    "NAME=VALUE",
+    "K, W0, V0; V, epsilon, frequency of all rows.",
+    multiple=True,
+)
 @output_options()
 def recipe(
     paper: str,
@@ -61,9 +71,11 @@ def recipe(
         raise InputError("paper", "have a recipe", f"'{paper}', which has none", advice)
     steps: Any = find_paper(paper).module("recipe")
     bifurcations = steps.read_thresholds(thresholds)
-    tables = [inference.read_table(path) for path in readings]
-    table = tables[0] if len(tables) == 1 else joined(tables)[0]
     fixed = settings_of(fixes, "--fix")
+    of_rows = {name: text for name, text in fixed.items() if name in _OF_ROWS}
+    with fields_as_options({"fixed": "--fix"}):
+        tables = [inference.read_table(path, of_rows) for path in readings]
+    table = tables[0] if len(tables) == 1 else joined(tables)[0]
     with bar("step", "recipe") as update:
         result = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
     output.answer(result.record, lambda: [_section(result)], indent="")

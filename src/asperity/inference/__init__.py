@@ -28,6 +28,7 @@ from asperity.inference.fitting.windows import (
 )
 from asperity.inference.holds import (
     HealingTable as HealingTable,
+    equal_rows as equal_rows,
     healing_table as healing_table,
     read_healing as read_healing,
 )

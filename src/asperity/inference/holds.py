@@ -175,6 +175,31 @@ def joined_holds(tables: Iterable[HealingTable]) -> HealingTable:
 
 #: Largest number of equal rows that are named.
 _NAMED = 5
+
+
+@typed
+def equal_rows(columns: Sequence[Float], names: Sequence[str]) -> list[str]:
+    """Sentences on the rows of a table that are equal to earlier ones in all columns.
+
+    Parameters
+    ----------
+    columns : sequence of array, shape (rows,)
+    names : sequence of str, shape (rows,)
+        Names of the rows.
+    """
+    table = np.column_stack(columns)
+    _, first, which = np.unique(table, axis=0, return_index=True, return_inverse=True)
+    copies = np.flatnonzero(first[which.ravel()] != np.arange(len(table)))
+    sentences = [
+        f"{names[row]} is equal to {names[first[which.ravel()[row]]]}: "
+        "remove it if it is a copy, which counts twice"
+        for row in copies[:_NAMED]
+    ]
+    if len(copies) > _NAMED:
+        sentences.append(f"{len(copies) - _NAMED} more rows are equal to earlier ones")
+    return sentences
+
+
 #: Tables are padded to a multiple of this many holds.
 _ROWS = 32
 
@@ -275,16 +300,8 @@ class HoldTerm(DataTerm):
     ) -> Sequence[str]:
         """Sentences on equal rows, and on outliers or an estimated error."""
         table = self.table
-        columns = np.column_stack([table.hold_time, table.healing, table.V, table.K])
-        _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
-        copies = np.flatnonzero(first[which.ravel()] != np.arange(table.rows))
-        sentences = [
-            f"{table.row_names[row]} is equal to {table.row_names[first[which.ravel()[row]]]}: "
-            "remove it if it is a copy, which counts twice"
-            for row in copies[:_NAMED]
-        ]
-        if len(copies) > _NAMED:
-            sentences.append(f"{len(copies) - _NAMED} more rows are equal to earlier ones")
+        columns = (table.hold_time, table.healing, table.V, table.K)
+        sentences = equal_rows(columns, table.row_names.tolist())
         if not self.profiled:
             return [*sentences, *outlier_sentence(table.row_names[list(outliers)])]
         return [

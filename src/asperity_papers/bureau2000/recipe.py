@@ -26,7 +26,13 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2 as chi_squared
 
 from asperity import InputError
-from asperity.inference import LockInTable, bounded_interval, fit, shift_of_estimates
+from asperity.inference import (
+    LockInTable,
+    bounded_interval,
+    equal_rows,
+    fit,
+    shift_of_estimates,
+)
 from asperity.ledger import RecipeNumber, RecipeResult, read_columns
 from asperity.parameters import obeying
 from asperity_papers.bureau2000.machine import PAPER
@@ -137,7 +143,8 @@ def paper_procedure(
     """
     report = progress or (lambda done, total, label: None)
     steady, drop, first = _rows(readings)
-    warnings: list[str] = []
+    rows = [f"row {i + 1} of {thresholds.name}" for i in range(thresholds.V.size)]
+    warnings = equal_rows([getattr(thresholds, name) for name in THRESHOLD_COLUMNS], rows)
     report(0, 4, "steady sliding and bifurcation")
     constants = {"V0": PAPER.numbers["V0"].si, **dict(fixed or {})}
     V0 = float(obeying(constants["V0"], "V0", "velocity", "positive"))

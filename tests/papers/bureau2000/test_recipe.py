@@ -83,6 +83,14 @@ def test_measurements_without_noise_give_the_true_values(recovered):
     assert recovered.numbers["alpha"].value == pytest.approx(0, abs=1e-5)
 
 
+def test_a_bifurcation_that_occurs_twice_is_named(exact, recovered):
+    columns, bifurcations = exact
+    twice = {n: np.append(c, c[0]) for n, c in bifurcations.items()}
+    found = paper_procedure(table_of(columns), Thresholds("ends", **twice), fixed=MACHINE)
+    assert "row 3 of ends is equal to row 1 of ends: remove it" in found.warnings[0]
+    assert not any("is equal to" in warning for warning in recovered.warnings)
+
+
 def test_errors_of_the_first_steps_are_those_of_error_propagation(recovered):
     weakening = TRUTH["B"] - TRUTH["A"]
     log_v = np.log(np.geomspace(1e-7, 1e-4, 6))
