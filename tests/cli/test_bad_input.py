@@ -118,6 +118,11 @@ def test_a_command_passes_the_parts_of_an_error_on():
         ),
         (
             "measure",
+            "time (s),a,shear force (kN),cell (MPa),b,temp2300",
+            ["choose one of cell, a, b, temp2300, like --load cell,", '"friction=mu"'],
+        ),
+        (
+            "measure",
             "time (s),horiz. load (N),vert. load (N)",
             ['a shear force; choose one of horiz. load, vert. load, like --force "horiz'],
         ),
@@ -152,6 +157,7 @@ def test_what_a_recording_lacks_is_named_with_its_option(
     path = tmp_path / "recording.csv"
     draw = random.Random(1)
     rows = [f"{i / 50:g},{20 + i / 50:g},{0.6 + draw.gauss(0, 1e-3):.5f}" for i in range(600)]
+    rows = [row + ",1" * (header.count(",") - 2) for row in rows]
     path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     refused(asperity(command, path), *advice)
 

@@ -275,14 +275,17 @@ def _may_be(role: str | None, kind: str | None) -> bool:
 def _missing(role: str, kinds: Mapping[str, str | None]) -> str:
     """Advice if no column has a name of `role`."""
     others = {n for r in ROLES if r != role for n in candidates(r, kinds)}
-    free = sorted({*kinds} - others)
+    possible = (n for n in {*kinds} - others if _may_be(role, kinds[n]))
+    # Columns with a unit of the role first.
+    free = sorted(possible, key=lambda name: (kinds[name] not in ROLES[role].kinds, name))
     like = Argument("columns", role, *free[:1])
     ways = [f"choose one of {listed(free)}, like {like}"] if free else []
     if role == "W":
         ways.append(f"give a constant one, like {Argument('channels', 'load', '1200 N')}")
     if role in ("W", "F"):
-        # The last column without a unit; the first stands for the load or the force.
+        # Of two columns without a unit the first stands for the load or the force; more of them may
+        # be anything.
         plain = [name for name in free or kinds if _may_be("friction", kinds[name])]
-        of_column = Argument("columns", "friction", (plain or ["mu"])[-1])
+        of_column = Argument("columns", "friction", plain[-1] if 0 < len(plain) < 3 else "mu")
         ways.append(f"name the column of F/W, like {of_column}")
     return ", or ".join(ways) or closest(role, kinds)
