@@ -10,10 +10,13 @@ from asperity.loads import Harmonic
 from asperity.orbit import Outcome
 from asperity.orbit.methods.branch_following import (
     MESHES,
+    BranchFollowing,
+    BranchMesh,
     follow_from_steady_sliding,
 )
+from asperity.orbit.solution import SearchOptions
 from asperity.slider import equation_of_motion
-from asperity.slider.problem import Problem, flatten
+from asperity.slider.problem import Problem, checked_problem, flatten
 from references.populations import population
 
 pytestmark = pytest.mark.slow
@@ -72,6 +75,28 @@ def test_a_branch_that_does_not_arrive_has_a_reason(solve, name):
     assert np.isnan(response.mean_friction[0])
     assert 0 < response.detail[0] < epsilon
     assert f"{response.detail[0]:.3g}" in response.result[0]
+
+
+def test_slip_does_not_run_away_beyond_what_radiation_damping_permits(shooting):
+    """eta v is at most the spring force: ln(v/V) is at most 17.4 in one case and 8.2 in the other.
+
+    The coarse mesh loses both branches while their pulses grow.
+    """
+    base, V = shooting(K=1.0), 1e-4
+    q, stiffness, epsilon, outcome = CORNER["a runaway"]
+    given = checked_problem(
+        asp.Slider(base.slider.law, spring=stiffness * base.Kc, load=base.W0),
+        velocity=V,
+        epsilon=epsilon,
+        frequency=V / (2 * np.pi * q * base.D0),
+        modulation=None,
+        inertia=False,
+        radiation_damping=np.array([1e-6, 1e-2]) * base.slider.law.A * base.W0 / V,
+    )
+    problem, _ = flatten(given)
+    method = BranchFollowing((BranchMesh(72, 100),))
+    solution = method.solve(problem, SearchOptions(2, 0))
+    assert solution.outcome.tolist() == [outcome, Outcome.NO_ORBIT]
 
 
 def test_folds_of_the_amplitude_are_those_of_the_continuation(shooting):

@@ -72,8 +72,8 @@ _SENTENCES = {
     ),
     Outcome.RUNAWAY: (
         "on the branch from steady sliding the slip velocity grows without bound: before epsilon = "
-        "{detail:.3g} its pulses exceed e^13 V, which inertia alone would limit; lower epsilon or "
-        "include inertia or radiation damping"
+        "{detail:.3g} its pulses exceed e^13 V, which inertia or radiation damping would limit; "
+        "lower epsilon or include one of them"
     ),
     Outcome.SENSITIVE: (
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "

@@ -191,7 +191,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def stable(self) -> Bool:
-        """Whether a small perturbation dies out."""
+        """Whether a small perturbation dies out from period to period; it may grow within one."""
         with np.errstate(invalid="ignore"):
             return self.converged & np.asarray(self.floquet_max < 1)
 

@@ -271,6 +271,26 @@ def _least_direct_effect(problem: Problem, orbit: Orbit) -> Array:
     return (along / steady).min(0)
 
 
+@jax.jit
+def _largest_exponent(problem: Problem, orbit: Orbit) -> Array:
+    """Largest ln(v/V) that the forces of an orbit permit, with inertia or radiation damping.
+
+    Friction opposes sliding: eta v is at most the pulling force F, and the kinetic energy M v^2/2
+    at most the energy F^2/(2 K) of the spring. Slip on elastic asperities may be faster than the
+    slider: inf, shape (points,).
+    """
+    system, load = problem
+    if "friction" in system.mechanical:
+        return jnp.full_like(system.V, jnp.inf)
+    at = load.at(orbit.mesh[:-1])
+    pulling = (orbit.centre[0] + orbit.nodes[0] + at.shear).max(0)
+    limits = [pulling / system.damping]
+    if "log_velocity" in system.mechanical:
+        slider = system.slider
+        limits.append(pulling * slider.W0 / (system.V * jnp.sqrt(slider.K * slider.M)))
+    return jnp.log(jnp.stack(limits).min(0))
+
+
 def _extremum(pair: PointPair, step: BranchStep, rows: Index, chosen: Index) -> Float:
     """Largest or smallest t between two points, of the cubic through values and directions."""
     t, slope = pair.point.t[rows], pair.point.tangent.t[rows]
@@ -332,6 +352,10 @@ def solve_along_branches(
         Whether the outcome does not depend on the mesh.
     """
     branch = follow_from_steady_sliding(problem, mesh)
+    if problem.system.mechanical[0] == "force":
+        # Growth towards a velocity that cannot be reached ends on the way.
+        largest = _largest_exponent(branch.line.at(branch.share), branch.pair.point.orbit)
+        branch.limit[np.asarray(largest) < RUNAWAY] = np.inf
     arrived, folded = branch.arrived, branch.folded
     ran_away = ~arrived & ~folded & ~branch.rests & (branch.end < 1)
     # Of 19 branches with this below 1, none has an orbit on the finer mesh: the pulses of 15 run
