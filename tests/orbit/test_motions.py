@@ -296,6 +296,8 @@ def test_one_harmonic_is_the_harmonic_load():
     ("build", "said"),
     [
         (lambda: modulated(0.7, load={2: (0.4, np.pi)}), "load must stay positive over the period"),
+        # One sample, between two of 720 phases.
+        (lambda: sampled(np.where(np.arange(1440) == 721, -0.05, 1)), "load must stay positive"),
         (lambda: modulated(0.1, load={1: (0.1, 0.0)}), "load must have harmonics from 2 on, got 1"),
         (lambda: modulated(0.1, load={2: 0.4}), r"load\[2\] must be a pair of amplitude and phase"),
         (lambda: modulated(0.1, tilt="95 deg"), "tilt must be less than a right angle"),

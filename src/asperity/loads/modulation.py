@@ -171,8 +171,9 @@ def _written(mean: str, series: Series) -> str:
     return " + ".join(terms) or "0"
 
 
-#: Number of phases at which the load is checked to be positive.
-_PHASES = 2 * np.pi * np.arange(720) / 720
+#: Numbers of phases, over the period and over that of the highest harmonic, at which the load is
+#: checked to be positive: a dip has the width of the highest harmonic's period.
+_PHASES, _PHASES_OF_HARMONIC = 720, 16
 
 #: Fourier coefficients of a sampled period below this share of the largest are left out.
 _NEGLIGIBLE = 1e-13
@@ -346,10 +347,13 @@ def _lowest_load(series: Series) -> Float:
     flat = [[np.broadcast_to(part, shape).ravel() for part in pair] for pair in pairs]
     lowest = 1 - sum((np.hypot(a, b) for a, b in flat), np.zeros(int(np.prod(shape))))
     doubtful = np.flatnonzero(~(lowest > 0))
-    for start in range(0, len(doubtful), 4096):
-        part = doubtful[start : start + 4096]
+    count = max(_PHASES, _PHASES_OF_HARMONIC * len(flat))
+    phases = 2 * np.pi * np.arange(count)[:, None] / count
+    at_once = max(1, 4096 * _PHASES // count)
+    for start in range(0, len(doubtful), at_once):
+        part = doubtful[start : start + at_once]
         w = sum(
-            a[part] * np.cos(k * _PHASES[:, None]) + b[part] * np.sin(k * _PHASES[:, None])
+            a[part] * np.cos(k * phases) + b[part] * np.sin(k * phases)
             for k, (a, b) in enumerate(flat, start=1)
         )
         lowest[part] = 1 + np.min(w, axis=0)
