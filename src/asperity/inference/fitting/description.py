@@ -251,6 +251,8 @@ def _estimate(
     ]
     narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in whole)
     value = float(unknown.to_value(at.u[i]))
+    # The whole range lies within a standard error that the data do not determine.
+    width = min(max(float(at.sd[i]), 1e-12), UNDETERMINED)
     return Estimate(
         unknown.name,
         unknown.parameter.unit,
@@ -258,7 +260,7 @@ def _estimate(
         math.inf if at.missing[i] else abs(unknown.slope(value)) * float(at.se[i]),
         narrow,
         wide,
-        bool(min(at.u[i] - low, high - at.u[i]) < _AT_BOUND * max(at.sd[i], 1e-12)),
+        bool(min(at.u[i] - low, high - at.u[i]) < _AT_BOUND * width),
         unknown.prior,
     )
 

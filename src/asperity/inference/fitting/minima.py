@@ -128,7 +128,8 @@ def _by_solved_rows(
     )
     minima = _on_all_rows(objective, ends)
     for k, start in enumerate(_further(objective, drawn, chi2, starts)[:_FURTHER]):
-        if _describes(objective, minima):
+        # Rows without a solution have been left out of the ends; they may contradict these ends.
+        if _describes(objective, minima) and minima[0].chi2 <= ends[0].chi2 + RIVAL:
             break
         new = _roughly_minimum(partial, start, smoothly=k % 2 > 0)
         if math.isfinite(new.chi2) and _is_new(new, ends):
