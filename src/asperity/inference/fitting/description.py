@@ -23,7 +23,7 @@ from asperity.inference.fitting.intervals import (
     inverse_information,
     parabola_of,
 )
-from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF, RIVAL
+from asperity.inference.fitting.minima import FAR_OFF, RIVAL
 from asperity.inference.fitting.result import MISFIT, Estimate, Fit, Optimum
 from asperity.inference.holds import HoldTerm
 from asperity.inference.objective import Minimum, Objective, Residuals, log_density
@@ -53,6 +53,8 @@ _LOWER = 0.01
 _MOST_UNSOLVED = 40
 #: Minima closer than this, in standard errors of all parameters but nuisances, are the same answer.
 _NEAR = 0.5
+#: A fit with searched orbits is doubtful if the probability of chi-squared is lower.
+_DOUBTFUL = 0.05
 #: A warning is given if data and a prior differ by more standard deviations than this.
 _CONTRADICTED = 3.0
 #: Tolerance (relative change of the coordinates) of a fit with rows left out, and its evaluations.
@@ -476,7 +478,7 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
         )
     if (
         fit.dof > 0
-        and FAR_OFF < fit.p_value < DOUBTFUL
+        and FAR_OFF < fit.p_value < _DOUBTFUL
         and any(term.searches for term in fit.objective.terms)
     ):
         warnings.append(

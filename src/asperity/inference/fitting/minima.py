@@ -52,8 +52,6 @@ _COARSE_TOLERANCE, _EVALUATIONS, _FIRST_EVALUATIONS = 1e-3, 60, 12
 #: A law is far off if the probability of chi-squared is lower: its exact minimum and intervals
 #: change no verdict.
 FAR_OFF = 1e-12
-#: A fit with searched orbits is doubtful if the probability of chi-squared is lower.
-DOUBTFUL = 0.05
 #: The slower method is used if chi-squared can decrease by more: a tenth of a standard error, or
 #: this share of chi-squared for a law that is far off.
 GAIN, _LARGE_GAIN = 0.01, 0.1
@@ -131,7 +129,7 @@ def _by_solved_rows(
         # Rows without a solution have been left out of the ends; they may contradict these ends.
         if _describes(objective, minima) and minima[0].chi2 <= ends[0].chi2 + RIVAL:
             break
-        new = _roughly_minimum(partial, start, smoothly=k % 2 > 0)
+        new = _from_further_start(partial, start, smoothly=k % 2 > 0)
         if math.isfinite(new.chi2) and _is_new(new, ends):
             ends = sorted([*ends, new], key=_CHI2)
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
@@ -158,8 +156,8 @@ def _further(
     return [u for u in order if u.tobytes() not in taken]
 
 
-def _roughly_minimum(objective: Objective, start: Float, *, smoothly: bool) -> Minimum:
-    """The minimum from a start, optionally by way of that with larger uncertainties."""
+def _from_further_start(objective: Objective, start: Float, *, smoothly: bool) -> Minimum:
+    """The rough minimum from a start, optionally by way of that with larger uncertainties."""
     if smoothly:
         start = (
             objective.smoother()
@@ -251,7 +249,7 @@ def _by_few_rows(
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
         if _describes(coarse, roughly):
             break
-        new = _roughly_minimum(coarse, start, smoothly=True)
+        new = _from_further_start(coarse, start, smoothly=True)
         if math.isfinite(new.chi2):
             roughly = sorted([*roughly, new], key=_CHI2)
     # A law that is far off for few rows does not describe all of them.
