@@ -48,7 +48,7 @@ _PRECISE = 0.1
 #: A profile that falls by more than this below the minimum has reached another minimum.
 _LOWER = 0.01
 #: A profile that was not requested ends after this many searches without an orbit: an end of an
-#: interval at the edge takes ten such searches (22 at most in 38 profiles), a valley along the edge
+#: interval at the edge takes ten such searches (22 at most in 36 profiles), a valley along the edge
 #: takes hundreds.
 _MOST_UNSOLVED = 40
 #: Minima closer than this, in standard errors of all parameters but nuisances, are the same answer.
