@@ -30,6 +30,28 @@ _CORRECTIONS, _LONGEST, _SHARE = 3, 0.75, 0.25
 #: Smaller decreases of the sum of squares are negligible: the square of a hundredth of a standard
 #: error.
 _DECREASE = 1e-4
+#: A coordinate closer to its bound than this is at the bound.
+AT_BOUND = 1e-6
+
+
+def predicted_decrease(r: Float, J: Float, u: Float, low: Float, high: Float) -> float:
+    """Decrease of the sum of squares by an undamped step, for residuals that are linear.
+
+    The step may be of any length, but for coordinates that a bound stops.
+
+    Parameters
+    ----------
+    r : array, shape (m,)
+        Residuals.
+    J : array, shape (m, n)
+        Their Jacobian.
+    u : array, shape (n,)
+        Coordinates.
+    low, high : array, shape (n,)
+        Bounds of u.
+    """
+    free = np.where(J.T @ r > 0, u - low, high - u) > AT_BOUND
+    return float(np.sum((np.linalg.qr(J[:, free & J.any(axis=0)])[0].T @ r) ** 2))
 
 
 def minimised(
@@ -64,9 +86,7 @@ def minimised(
 
     while used < evaluations and damping < _LAST:
         scale = np.maximum(scale, np.linalg.norm(J, axis=0))
-        # The undamped change, without coordinates that a bound stops.
-        free = np.where(J.T @ r > 0, u > low, u < high)
-        if np.sum((np.linalg.qr(J[:, free])[0].T @ r) ** 2) < _DECREASE:
+        if predicted_decrease(r, J, u, low, high) < _DECREASE:
             break
         step = np.clip(u + damped(r, J), low, high) - u
         target = r + J @ step

@@ -29,8 +29,6 @@ T = TypeVar("T")
 #: Residuals of parameters by name, and of arrays.
 CompiledResiduals = Callable[[Mapping[str, Array], Any], Array]
 
-#: A coordinate closer to its bound than this is at the bound.
-_AT_BOUND = 1e-6
 #: Relative change of the coordinates at which a minimisation by the coarse model ends. The exact
 #: model continues from there: its minimum is farther away.
 _COARSE = 1e-3
@@ -410,6 +408,7 @@ class Objective:
         *,
         tolerance: float | None = None,
         evaluations: int = 100,
+        negligible: float = 0.0,
     ) -> Minimum:
         """Minimise chi-squared from u.
 
@@ -423,6 +422,9 @@ class Objective:
             objective.
         evaluations : int
             Largest number of evaluations of the residuals.
+        negligible : float
+            The minimisation ends at the first point from which chi-squared is expected to decrease
+            by no more.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
         kept = dict(kept or {})
@@ -437,7 +439,9 @@ class Objective:
         ahead = self.coarser()
         if ahead is not self:
             ending = max(tolerance, _COARSE)
-            near = ahead.minimise(point, kept, tolerance=ending, evaluations=evaluations)
+            near = ahead.minimise(
+                point, kept, tolerance=ending, evaluations=evaluations, negligible=negligible
+            )
             self.unsolved += ahead.unsolved
             if self.chi2(point) >= self.chi2(near.u):
                 point = near.u
@@ -450,11 +454,17 @@ class Objective:
             r, jacobian = self.residuals(whole)
             return r, jacobian[:, moving]
 
+        def at_end(part: Float) -> bool:
+            decrease = levenberg_marquardt.predicted_decrease
+            return negligible > 0 and decrease(*of_moving(part), part, low, high) <= negligible
+
         def triangle(part: Float) -> Float:
             r, jacobian = of_moving(part)
             return compressed(np.column_stack([jacobian, r]))
 
         begin = point[moving]
+        if at_end(begin):
+            return Minimum(point, self.chi2(point))
         if self.curved:
             end = levenberg_marquardt.minimised(of_moving, begin, low, high, evaluations)
         else:
@@ -468,6 +478,7 @@ class Objective:
                 ftol=max(1e-2 * tolerance, _NEGLIGIBLE),
                 gtol=tolerance,
                 max_nfev=evaluations,
+                callback=lambda intermediate_result: _stop_if(at_end(intermediate_result.x)),
             ).x
         point[moving] = end
         return Minimum(point, self.chi2(point))
@@ -503,7 +514,7 @@ class Objective:
     def held(self, u: Float, gradient: Float) -> Bool:
         """Mask of coordinates in which a bound prevents a decrease of chi-squared at u."""
         low, high = self.bounds
-        return np.asarray(np.where(gradient > 0, u - low, high - u) < _AT_BOUND)
+        return np.asarray(np.where(gradient > 0, u - low, high - u) < levenberg_marquardt.AT_BOUND)
 
     def terms_of(self, kind: type[T]) -> list[T]:
         """All terms of one kind, tables or recordings."""
@@ -539,6 +550,12 @@ class Objective:
         priors = np.array([np.sum(self.prior_residuals(x)[0] ** 2) for x in u])
         values = [self.named(x) for x in u]
         return sum((term.chi2_of_many(values) for term in self.terms), priors)
+
+
+def _stop_if(ended: bool) -> None:
+    """End an iteration of SciPy by the exception that it asks for."""
+    if ended:
+        raise StopIteration
 
 
 def compressed(columns: Float) -> Float:

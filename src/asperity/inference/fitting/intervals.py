@@ -7,7 +7,9 @@ from a two-sided interval to an upper limit without a decision by the user.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -293,12 +295,14 @@ def inverse_information(information: Float) -> tuple[Float, Bool]:
     return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
 
 
-#: Steps outwards, each twice as long as the last, after which a side counts as unbounded.
-_STEPS = 12
-#: Accuracy of an end, in standard deviations.
-_ACCURACY = 1e-2
-#: Relative change of the other coordinates that ends a minimisation: chi-squared is good to 1e-4.
-_TOLERANCE = 1e-5
+#: Steps outwards after which a side counts as unbounded. Each may be twice as long as the last, up
+#: to the second number, a factor of e^2: far beyond an end minimisations take seconds.
+_STEPS, _LONGEST = 24, 2.0
+#: Accuracy of an end, in standard deviations, or of the square root of chi-squared there.
+_ACCURACY, _CLOSE = 1e-2, 2e-3
+#: A minimisation ends at a relative change of the other coordinates, or if chi-squared is expected
+#: to decrease by no more than the second number: its square root is then good to a thousandth.
+_TOLERANCE, _NEGLIGIBLE = 1e-5, 1e-3
 #: A profile that ends further below the threshold (standard deviations) was stopped by the method.
 _JUMP = 0.1
 #: If chi-squared rises by more (ten standard deviations) from one point of the profile to the next,
@@ -354,6 +358,7 @@ class Profile:
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
+        self._unsolved: set[float] = set()
 
     @property
     def lowest(self) -> tuple[Float, float]:
@@ -384,17 +389,17 @@ class Profile:
         """The value at which the profile crosses the threshold on one side."""
 
         def excess(x: float) -> float:
-            return self._excess(x, level, wider)
+            value = self._excess(x, level, wider)
+            return 0.0 if abs(value) < _CLOSE else value
 
-        inner = float(self.u[self.i])
         width = 1.05 * wider * self.sd * math.sqrt(bounded_threshold(math.inf, level))
         for _ in range(_STEPS):
-            outer = inner + sign * width
+            inner, outer = self._bracket(excess, sign, width)
             if sign * (outer - bound) >= 0:
                 outer = bound - sign * 1e-9 * self.sd
                 if excess(outer) <= 0:
                     return bound
-            if excess(outer) > 0:
+            if excess(outer) >= 0:
                 end = float(brentq(excess, inner, outer, xtol=_ACCURACY * self.sd))
                 within = [x for x in self.path if sign * (end - x) >= 0]
                 last = max(within, key=lambda x: sign * x)
@@ -403,14 +408,37 @@ class Profile:
                     if not self.search:
                         return sign * math.inf
                     self.objective.use_search(True)
+                    self._unsolved.clear()
                     return self._end(level, wider, sign, bound)
                 return end
-            inner, width = outer, 2 * width
+            width = max(width, min(2 * width, _LONGEST))
         return sign * math.inf
+
+    def _bracket(
+        self, excess: Callable[[float], float], sign: int, width: float
+    ) -> tuple[float, float]:
+        """The last known point within the threshold on one side, and one farther out.
+
+        The second is the next known point. Without one it is where the line through the last points
+        crosses the threshold, and a quarter beyond, but at most `width` away.
+        """
+        begin = float(self.u[self.i])
+        known = sorted((x for x in self.path if sign * (x - begin) >= 0), key=lambda x: sign * x)
+        within = list(itertools.takewhile(lambda x: excess(x) < 0, known))
+        inner = within[-1]
+        if len(within) < len(known):
+            return inner, known[len(within)]
+        before = [x for x in within if abs(inner - x) > _ACCURACY * self.sd]
+        if before:
+            rate = (excess(inner) - excess(before[-1])) / abs(inner - before[-1])
+            if rate > 0:
+                width = min(width, -1.25 * excess(inner) / rate)
+        return inner, inner + sign * width
 
     def _excess(self, x: float, level: float, wider: float) -> float:
         """Square root of the rise of chi-squared less that of the threshold: nearly linear in x."""
-        if x not in self.path and not self._minimise_at(x, _HALVINGS):
+        if x not in self.path and (x in self._unsolved or not self._minimise_at(x, _HALVINGS)):
+            self._unsolved.add(x)
             return math.sqrt(_NO_ORBIT)
         low, high = self.objective.unknowns[self.i].bounds
         distance = min(x - low, high - x) / (wider * self.sd)
@@ -424,7 +452,9 @@ class Profile:
         for begin in (self._start(x), self.path[nearest][0]):
             if self.objective.searches and self.objective.unsolved > self.most:
                 raise ProfileAtEdgeError
-            result, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
+            result, value = self.objective.minimise(
+                begin, {self.i: x}, tolerance=_TOLERANCE, negligible=_NEGLIGIBLE
+            )
             if math.isfinite(value):
                 break
         far = not value < self.path[nearest][1] + _LEAP
@@ -438,10 +468,16 @@ class Profile:
         return math.isfinite(value)
 
     def _start(self, x: float) -> Float:
-        """Initial guess at x: on the line through the two nearest points, or by the covariance."""
+        """Initial guess at x: on the line through the two nearest points, or by the covariance.
+
+        A coordinate that would change by more than `_LONGEST` stays: the line says nothing about
+        what the data do not determine.
+        """
         first, *others = sorted(self.path, key=lambda known: abs(known - x))
         begin = self.path[first][0]
         second = next((other for other in others if abs(other - first) > _ACCURACY * self.sd), None)
-        if second is None:
-            return begin + self.along * (x - first)
-        return begin + (begin - self.path[second][0]) * ((x - first) / (first - second))
+        slope = self.along
+        if second is not None:
+            slope = (begin - self.path[second][0]) / (first - second)
+        change = slope * (x - first)
+        return begin + np.where(np.abs(change) > _LONGEST, 0.0, change)

@@ -115,8 +115,8 @@ def _by_solved_rows(
     """Minima of all rows, started at minima of the rows that the fast method solves, best first.
 
     While no minimum describes the table, further starts are tried: chi-squared at a start says
-    little about the minimum that is reached from there. Orbits are searched for in the end, if the
-    fast method has no solution for some row.
+    little about the minimum that is reached from there. Orbits are searched for if the fast method
+    has no solution for some row: as soon as a minimum describes the other rows, or in the end.
     """
     partial = objective.partial()
     chi2 = partial.chi2_of_many(np.array(drawn))
@@ -125,9 +125,13 @@ def _by_solved_rows(
         partial, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
     )
     minima = _on_all_rows(objective, ends)
+    if not _describes(objective, minima) and _describes(partial, ends):
+        beyond = _with_searched_orbits(objective, ends, minima)
+        if _describes(objective, beyond, ends):
+            return beyond
+        objective.use_search(False)
     for k, start in enumerate(_further(objective, drawn, chi2, starts)[:_FURTHER]):
-        # Rows without a solution have been left out of the ends; they may contradict these ends.
-        if _describes(objective, minima) and minima[0].chi2 <= ends[0].chi2 + RIVAL:
+        if _describes(objective, minima, ends):
             break
         new = _from_further_start(partial, start, smoothly=k % 2 > 0)
         if math.isfinite(new.chi2) and _is_new(new, ends):
@@ -137,11 +141,26 @@ def _by_solved_rows(
     far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
     if ends and (not minima or lower or _blocked(objective, minima[0])):
-        objective.use_search(True)
-        beyond = _on_all_rows(objective, ends, far_off=far_off)
-        if beyond and (not minima or beyond[0].chi2 < minima[0].chi2 - GAIN):
-            return beyond
-        objective.use_search(False)
+        return _with_searched_orbits(objective, ends, minima, far_off=far_off)
+    return minima
+
+
+def _with_searched_orbits(
+    objective: Objective,
+    ends: list[Minimum],
+    minima: list[Minimum],
+    *,
+    far_off: bool = False,
+) -> list[Minimum]:
+    """Minima of all rows with searched orbits from the ends; the given minima if none is lower.
+
+    The objective goes on searching for orbits if a minimum is lower.
+    """
+    objective.use_search(True)
+    beyond = _on_all_rows(objective, ends, far_off=far_off)
+    if beyond and (not minima or beyond[0].chi2 < minima[0].chi2 - GAIN):
+        return beyond
+    objective.use_search(False)
     return minima
 
 
@@ -167,9 +186,16 @@ def _from_further_start(objective: Objective, start: Float, *, smoothly: bool) -
     return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
 
 
-def _describes(objective: Objective, minima: Sequence[Minimum]) -> bool:
-    """Whether the law describes the data at the first minimum."""
-    return bool(minima) and _p_value(objective, minima[0]) >= MISFIT
+def _describes(
+    objective: Objective, minima: Sequence[Minimum], partly: Sequence[Minimum] = ()
+) -> bool:
+    """Whether the law describes the data at the first minimum.
+
+    Rows without a solution are left out of the minima in `partly`, and may contradict these. Then
+    chi-squared of all rows is higher.
+    """
+    highest = partly[0].chi2 + RIVAL if partly else math.inf
+    return bool(minima) and minima[0].chi2 <= highest and _p_value(objective, minima[0]) >= MISFIT
 
 
 def _latin_hypercube(objective: Objective, seed: int, drawn: int) -> list[Float]:
