@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from asperity.app import connection as app_connection, security
+from asperity.app import security
 from asperity.app.api import TABS
 from asperity.app.api.protocols import checked
 from asperity.app.endpoints import Upload
@@ -236,7 +236,7 @@ def is_ended(connection, again, times=600):
 
 @pytest.mark.parametrize("kind", beginnings(type("", (), {"port": 0})))
 def test_a_client_that_does_not_go_on_is_ended(server, ask, monkeypatch, kind):
-    monkeypatch.setattr(app_connection, "HEAD_PAUSE", 0.2)
+    monkeypatch.setattr(security, "HEAD_PAUSE", 0.2)
     monkeypatch.setattr(security, "BODY_PAUSE", 0.2)
     first, again = beginnings(server)[kind]
     with opened(server) as connection:
@@ -263,7 +263,7 @@ def test_a_body_that_comes_as_a_file_is_read_may_take_longer_than_a_pause(server
 
 @pytest.mark.parametrize("kind", ["nothing", "half a body"])
 def test_connections_that_are_held_leave_room(server, ask, monkeypatch, kind):
-    monkeypatch.setattr(app_connection, "MOST", 20)
+    monkeypatch.setattr(security, "MOST_CONNECTIONS", 20)
     first, _ = beginnings(server)[kind]
     held = []
     try:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from asperity.app.jobs.processes import Jobs
-from asperity.app.jobs.worker import limited
+from asperity.app.jobs import Jobs
+from asperity.app.worker import limited
 
 JOB = "asperity.app.api.recordings:"
 #: A law outside the package.

@@ -24,8 +24,8 @@ from starlette.types import Receive, Scope, Send
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, question_in
-from asperity.app.jobs import threads as compiling
-from asperity.app.jobs.processes import Jobs
+from asperity.app.jobs import Jobs
+from asperity.app.preparation import Preparation, use
 from asperity.app.security import BODY_LIMIT, Guard, body_too_slow, sentence
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
@@ -70,7 +70,7 @@ def build(
                 handler = _upload(endpoint, uploads)
                 limits[path] = endpoint.largest
             elif isinstance(endpoint, Job):
-                # A job with limits has a process for itself, which needs no solver of orbits.
+                # A process with limits runs a single job, which solves no orbits.
                 preload = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
                 jobs = lanes.setdefault(
                     endpoint.lane, Jobs(preload=preload, laws=laws, folder=uploads.folder)
@@ -81,8 +81,8 @@ def build(
             else:
                 handler = _answer(endpoint, threads)
             routes.append(Route(path, handler, methods=["POST"]))
-    preparation = compiling.Preparation(tasks)
-    compiling.use(preparation)
+    preparation = Preparation(tasks)
+    use(preparation)
 
     async def state(request: Request) -> Response:
         return _json(to_json(preparation.state()))

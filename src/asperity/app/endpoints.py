@@ -27,7 +27,7 @@ class Question(questions.Question):
 
 @dataclass(frozen=True)
 class Answer:
-    """A computation of some milliseconds, answered with JSON.
+    """A computation that takes milliseconds; its answer is JSON.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class Answer:
 
 @dataclass(frozen=True)
 class Job:
-    """A computation of any length in a worker process, answered with a line of JSON per message.
+    """A computation of any duration in a worker process; each message is a line of JSON.
 
-    It ends when the page closes the connection.
+    The job ends when the page closes the connection.
 
     Attributes
     ----------
@@ -56,23 +56,23 @@ class Job:
     question : type of Question
     job : str
         ``module:function``, called with the question's fields and a function that reports; see
-        `asperity.app.jobs.worker`.
+        `asperity.app.worker`.
     lane : str
-        Jobs of one lane share a worker process, so that long ones of one kind hold up no other.
+        Jobs of one lane share a worker process; a long job delays only the jobs of its lane.
     check : callable, optional
         Raises `InputError` for what cannot be computed, before a process is started.
     limits : mapping of str to int, optional
-        See `asperity.app.jobs.processes.Jobs.run`.
+        See `asperity.app.jobs.Jobs.run`.
     seconds : float
-        After which the job is ended.
+        Time after which the job is ended.
     argument : callable, optional
-        From the question and the server's files to what the job is called with; else the
-        question's fields.
+        From the question and the uploaded files to the argument of the job; by default the
+        argument is the question's fields.
     largest : int, optional
-        Bytes of the body, where they may be more than of other requests.
+        Largest body (bytes), if it may be larger than that of other requests.
     warm : str, optional
-        ``module:function`` that a worker runs when the server starts, so that the first question
-        need not wait for programs to be compiled.
+        ``module:function`` that a worker runs when the server starts, to compile the programs that
+        the first question needs.
     """
 
     path: str
@@ -91,17 +91,17 @@ class Job:
 class Upload:
     """A file that is stored for later requests; the body is the file itself.
 
-    The header ``X-File-Name`` says what people call it, percent-encoded. The answer is ``{"id",
-    "name", "size"}``.
+    The header ``X-File-Name`` is the user's name of the file, percent-encoded. The answer is
+    ``{"id", "name", "size"}``.
 
     Attributes
     ----------
     path : str
         Below ``/api/``.
     largest : int
-        Bytes.
+        Largest size of the file (bytes).
     seconds : float
-        After which the upload is refused.
+        Time after which the upload is refused.
     """
 
     path: str
@@ -110,7 +110,7 @@ class Upload:
 
 
 async def question_in(request: Request, kind: type[Question]) -> Any:
-    """The question that a request holds.
+    """The question in the body of a request.
 
     Raises
     ------
@@ -123,7 +123,7 @@ async def question_in(request: Request, kind: type[Question]) -> Any:
     try:
         value = parsed_json(body, "request.body", parse_constant=_no_constant)
         _require_short(value)
-        # Half a surrogate pair is JSON and no text: nothing can write it again.
+        # Half a surrogate pair is valid JSON, but it cannot be encoded again.
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         rule, got = "hold texts of whole characters", "half a surrogate pair"
@@ -147,7 +147,7 @@ _LONGEST_TEXT, _MOST_PARTS = 300, 1000
 
 
 def _require_short(value: Any, field: str = "request") -> None:
-    """Refuse what no form of the page holds, before anything looks at it."""
+    """Refuse texts, lists and tables that are longer than those of the page."""
     if isinstance(value, str) and field != "text":
         rule = f"have at most {_LONGEST_TEXT} characters"
         require(len(value) <= _LONGEST_TEXT, field, rule, len(value), "send fewer")

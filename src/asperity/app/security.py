@@ -1,9 +1,13 @@
-"""Who may ask the server, how much they may send, and what the page may load.
+"""Who may ask the server, how much and how slowly they may send, and what the page may load.
 
 The server answers this machine only. A page of another site that runs in the user's browser can
 still send requests here, by a name that resolves to this machine (DNS rebinding) or straight across
 origins. Both are refused: the `Host` must be one of this server's names, and an `Origin` must be
 that of this server.
+
+A client may hold a connection open without sending. uvicorn ends a connection that is silent after
+an answer, but it waits without limit for the first request and for the end of a request's head, and
+counts such connections towards its limit. `Connection` ends them.
 """
 
 from __future__ import annotations
@@ -16,12 +20,18 @@ from typing import Any
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 #: Largest body of a request (bytes) where its endpoint names no other limit.
 BODY_LIMIT = 64 * 1024
-#: Longest time (s) to wait for a piece of a body, and bytes a second that a body must come with on
-#: average: this machine sends to itself.
+#: Longest time (s) between two pieces of a body, and the smallest average rate of a body (bytes/s):
+#: this machine sends to itself.
 BODY_PAUSE, BODY_RATE = 10.0, 64 * 1024
+#: Longest time (s) from the opening of a connection, or from its last answer, to the end of the
+#: next request's head.
+HEAD_PAUSE = 30
+#: Above this number of connections a new one ends the idle connection that has waited longest.
+MOST_CONNECTIONS = 128
 
 #: Names of the address of this machine.
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
@@ -113,10 +123,10 @@ def _too_large(limit: int) -> HTTPException:
 
 
 class _LimitedBody:
-    """`receive` that counts the bytes of the body, and the time in which they come.
+    """`receive` with limits on the bytes of the body and on the time in which they arrive.
 
-    Senders need not say how many bytes follow. Each byte allows to wait for more, so that neither
-    a pause nor drops without end hold a connection.
+    A sender need not announce the length of a body. Each byte extends the time for the next
+    piece, so that neither a pause nor an endless trickle of bytes holds a connection.
     """
 
     def __init__(self, receive: Receive, limit: int) -> None:
@@ -126,7 +136,7 @@ class _LimitedBody:
         self.complete = False
 
     async def __call__(self) -> Message:
-        if self.complete:  # waiting for the end of the connection may take as long as it takes
+        if self.complete:  # the wait for the end of the connection has no limit
             return await self.receive()
         begin = time.monotonic()
         try:
@@ -144,8 +154,66 @@ class _LimitedBody:
         return message
 
 
+class Connection(H11Protocol):
+    """A connection that ends when its client is silent too long; uvicorn makes and calls it."""
+
+    _deadline: asyncio.TimerHandle | None = None
+    #: Time (s) since which the connection waits for its present or next request.
+    _since = 0.0
+
+    def connection_made(self, transport: Any) -> None:
+        """Wait for the first request; if there are too many connections, end an idle one."""
+        super().connection_made(transport)
+        self._wait()
+        others = [c for c in self.connections if isinstance(c, Connection) and c is not self]
+        idle = [other for other in others if other.idles]
+        if len(self.connections) > MOST_CONNECTIONS and idle:
+            # A connection without a request goes before one with an incomplete request.
+            longest = min(idle, key=lambda other: (other.asks, other._since))
+            longest.transport.abort()
+            # uvicorn removes it later, after further connections may have opened.
+            self.connections.discard(longest)
+
+    def handle_events(self) -> None:
+        """Stop waiting when the head of a request is complete."""
+        super().handle_events()
+        if self.asks:
+            self._stop_waiting()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        self._wait()
+        super().on_response_complete()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop waiting."""
+        self._stop_waiting()
+        super().connection_lost(exc)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a request has no complete answer yet."""
+        cycle: Any = self.cycle  # None before the first request
+        return cycle is not None and not cycle.response_complete
+
+    @property
+    def idles(self) -> bool:
+        """Whether the server waits for the client to send or to read."""
+        return not self.asks or bool(self.cycle.more_body or self.flow.write_paused)
+
+    def _wait(self) -> None:
+        self._stop_waiting()
+        self._since = self.loop.time()
+        self._deadline = self.loop.call_later(HEAD_PAUSE, self.transport.abort)
+
+    def _stop_waiting(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+
 def sentence(refusal: HTTPException) -> JSONResponse:
-    """An answer that says in one sentence why there is no other."""
+    """The answer to a refused request: one sentence with the reason."""
     return JSONResponse({"error": refusal.detail}, refusal.status_code, refusal.headers)
 
 

@@ -132,7 +132,7 @@ def server_on(
     import uvicorn
 
     from asperity.app.application import build
-    from asperity.app.connection import HEAD_PAUSE, Connection
+    from asperity.app.security import HEAD_PAUSE, Connection
 
     config = uvicorn.Config(
         build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare, laws=laws),

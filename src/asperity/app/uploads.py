@@ -27,7 +27,7 @@ from asperity.outputs.written import held_folder
 LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3
 #: Number of files that are kept; the least recently used file is deleted first.
 _MOST_FILES = 200
-#: Room (bytes) that is left on the disk.
+#: Smallest free space of the disk after an upload (bytes).
 _SPARE = 256 * 1024**2
 _PREFIX = "asperity-uploads-"
 _ENDINGS = ("csv", "txt", "dat", "tsv", "h5", "hdf5", "nc", "mat", "tdms", "json", "gz", "look")
@@ -52,23 +52,14 @@ class Upload:
 
 
 class Uploads:
-    """The files of a server, and what its workers write meanwhile.
-
-    The folder is removed with its content when the server ends; folders of servers that were killed
-    are removed first.
-
-    Parameters
-    ----------
-    together : int
-        Largest size of all files (bytes).
+    """The uploaded files of a server, and the temporary files of its workers.
 
     Attributes
     ----------
     folder : Path
     """
 
-    def __init__(self, together: int = TOGETHER) -> None:
-        self._together = together
+    def __init__(self) -> None:
         try:
             self.folder, lock = held_folder(Path(tempfile.gettempdir()), _PREFIX)
         except OSError as error:
@@ -124,9 +115,9 @@ class Uploads:
         self._end()
 
     def _make_room(self) -> None:
-        """Delete the files that were used longest ago where there are too many."""
+        """Delete the least recently used files if there are too many or they are too large."""
         while self._files and (
-            len(self._files) >= _MOST_FILES or self._size() > self._together - LARGEST
+            len(self._files) >= _MOST_FILES or self._size() > TOGETHER - LARGEST
         ):
             self.remove(next(iter(self._files)))
 

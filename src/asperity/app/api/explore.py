@@ -22,7 +22,7 @@ from asperity.app.api.operating_point import (
     solve,
 )
 from asperity.app.endpoints import Answer, Job
-from asperity.app.jobs.threads import is_ready
+from asperity.app.preparation import is_ready
 from asperity.laws import get_law, registered
 from asperity.orbit import (
     Outcome,

@@ -19,9 +19,9 @@ from pydantic import Field, StrictBool
 from asperity.app.api.catalogue import package_material
 from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source
 from asperity.app.endpoints import Question
-from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
+from asperity.app.worker import limited
 from asperity.arrays import Float
 from asperity.errors import naming, require
 from asperity.outputs.tables import Section

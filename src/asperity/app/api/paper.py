@@ -12,7 +12,7 @@ from pydantic import Field
 
 from asperity.app.api.operating_point import Name, Value
 from asperity.app.endpoints import Answer, Job, Question
-from asperity.app.jobs.threads import is_ready
+from asperity.app.preparation import is_ready
 from asperity.errors import InputError, require
 from asperity.ledger import Paper, altered, available, find_paper
 from asperity.materials import Material

@@ -1,6 +1,6 @@
 """The process that runs jobs: a request is one line of JSON, each message of a job another line.
 
-Started as ``python -m asperity.app.jobs.worker MODULE [LAW...]``: it imports the module and
+Started as ``python -m asperity.app.worker MODULE [LAW...]``: it imports the module and
 registers the laws. A request is ``{"job": "module:function", "argument": ..., "limits": ...}``. The
 function is called with the argument and with a function that sends a message; its result is the
 last message. ``{"cancel": true}`` on the input makes the next report of progress raise `Cancelled`.

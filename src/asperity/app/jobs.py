@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 _BUSY = "too many computations wait; try again later"
+#: Largest number of waiting jobs.
+_MOST_WAITING = 20
 #: Longest message of a worker (bytes).
 _LONGEST = 64 * 1024**2
 #: Time (s) within which a cancelled job must stop.
@@ -23,8 +25,6 @@ class Jobs:
 
     Parameters
     ----------
-    most : int
-        Jobs that may wait.
     preload : str
         Module that a worker imports before its first job.
     laws : sequence of str
@@ -36,12 +36,10 @@ class Jobs:
 
     def __init__(
         self,
-        most: int = 20,
         preload: str = "asperity.orbit",
         laws: Sequence[str] = (),
         folder: Path | None = None,
     ) -> None:
-        self._most = most
         self._folder = folder
         self._preload = (preload, *laws)
         self._free = asyncio.Lock()
@@ -67,7 +65,7 @@ class Jobs:
         Parameters
         ----------
         job : str
-            ``module:function``; see `asperity.app.jobs.worker`.
+            ``module:function``; see `asperity.app.worker`.
         argument
             Value of a JSON type.
         limits : mapping of str to int, optional
@@ -76,7 +74,7 @@ class Jobs:
         seconds : float
             Time after which the job is ended.
         """
-        if self._waiting >= self._most:
+        if self._waiting >= _MOST_WAITING:
             yield {"error": _BUSY, "done": True}
             return
         self._waiting += 1
@@ -170,7 +168,7 @@ class _Worker:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
-        # A single reader for all lines: a caller may stop waiting between two lines.
+        # One task reads all lines, because a caller of `read` may stop waiting between two lines.
         self._lines: asyncio.Queue[bytes] = asyncio.Queue()
         self._reader = asyncio.get_running_loop().create_task(self._read_lines())
 
@@ -182,7 +180,7 @@ class _Worker:
             await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
-                "asperity.app.jobs.worker",
+                "asperity.app.worker",
                 *preload,
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,

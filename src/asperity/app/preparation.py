@@ -1,4 +1,4 @@
-"""Compilation ahead of the first request, in a thread of the server."""
+"""Preparation of the page: programs are compiled in a thread before a request needs them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Preparation:
     Parameters
     ----------
     tasks : mapping of str to callable
-        By the name that the page shows; each compiles some programs.
+        Functions that compile programs, by the name that the page shows.
     """
 
     def __init__(self, tasks: Mapping[str, Callable[[], Any]]) -> None:
@@ -27,15 +27,15 @@ class Preparation:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="asperity-preparation")
 
     def start(self, names: Iterable[str]) -> None:
-        """Queue some tasks; the others are not run before `want`."""
+        """Queue tasks; any other task runs only after a call of `want`."""
         for name in names:
             with contextlib.suppress(RuntimeError):  # the process is ending
                 self._futures[name] = self._pool.submit(self._tasks[name])
 
     def want(self, name: str) -> bool:
-        """Whether a task has ended; a task that has not becomes the next in the queue.
+        """Whether a task has ended; a task that has not ended becomes the next in the queue.
 
-        A task that failed has ended: the request that needs its program reports the reason.
+        A failed task counts as ended: the request that needs its program reports the reason.
         """
         with self._lock:
             future = self._futures.get(name)
@@ -65,11 +65,11 @@ _preparation: Preparation | None = None
 
 
 def use(preparation: Preparation) -> None:
-    """Let answers of this process wait for programs that are being compiled."""
+    """Set the preparation that `is_ready` asks."""
     global _preparation
     _preparation = preparation
 
 
 def is_ready(task: str) -> bool:
-    """Whether a program is compiled, or nothing is prepared; one that is not becomes the next."""
+    """Whether a task has ended, as `Preparation.want`; True without a preparation."""
     return _preparation is None or _preparation.want(task)

@@ -1,1 +1,0 @@
-"""Computations of the server: short ones in threads, long ones in worker processes."""
