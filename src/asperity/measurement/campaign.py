@@ -104,7 +104,7 @@ def run_campaign(
     unfinished = UnfinishedText(out, {**inputs, "files": {str(f): _stamp(f) for f in files}})
     done = int(unfinished.start(resume).get("files", 0))
     report(done, len(files), "")
-    with unfinished.interruptible("files", len(files), counted="files"):
+    with unfinished.interruptible(lambda: f"{done} of {len(files)} files"):
         for path, rows in _measured(files[done:], rows_of, jobs):
             text = "".join(f"{json.dumps(row)}\n" for row in rows)
             failed = sum(bool(row["reason"]) for row in rows)

@@ -36,9 +36,10 @@ class Section(NamedTuple):
     rows: tuple[tuple[str, ...], ...] = ()
     warnings: tuple[str, ...] = ()
 
-    def record(self) -> dict[str, Any]:
-        """The section as JSON values."""
-        return self._asdict()
+
+def records(sections: Iterable[Section]) -> list[dict[str, Any]]:
+    """Sections as JSON values."""
+    return [section._asdict() for section in sections]
 
 
 def aligned(rows: Iterable[Row], indent: str = "") -> str:

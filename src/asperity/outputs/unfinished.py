@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +21,7 @@ from asperity._version import __version__
 from asperity.errors import InputError, require
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
-from asperity.outputs.written import to_disk, writable
+from asperity.outputs.written import replaced, to_disk, writable
 from asperity.parameters.arguments import typed
 
 _Result = TypeVar("_Result")
@@ -127,16 +126,12 @@ class UnfinishedOutput:
         progress : mapping of str to object
             JSON values, from which doubles are restored exactly.
         """
-        fresh = fresh_name(self.record)
         progress = dict(progress)
         saved = {"inputs": self.inputs, "progress": progress, "checksum": _checksum(progress)}
         with writable(self.target):
             to_disk(self.data)
-            with fresh.open("w", encoding="utf-8") as stream:
-                json.dump(saved, stream)
-                stream.flush()
-                os.fsync(stream.fileno())
-            fresh.replace(self.record)
+            with replaced(self.record, fresh_name(self.record)) as fresh:
+                fresh.write_text(json.dumps(saved), encoding="utf-8")
         self.progress = progress
 
     def finish(self) -> None:
@@ -151,10 +146,22 @@ class UnfinishedOutput:
         self.data.unlink(missing_ok=True)
         self.record.unlink(missing_ok=True)
 
-    def discard_if_empty(self) -> None:
-        """Remove all files if no block was finished."""
-        if not self.progress:
-            self.discard()
+    @contextmanager
+    def interruptible(self, finished: Callable[[], str]) -> Iterator[None]:
+        """Raise `Interrupted` on Ctrl-C; remove all files if no block is finished at the end.
+
+        Parameters
+        ----------
+        finished : callable
+            Returns the finished part, such as ``"8 of 12 rows"``.
+        """
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise Interrupted(finished() if self.progress else "") from None
+        finally:
+            if not self.progress:
+                self.discard()
 
 
 class UnfinishedText(UnfinishedOutput):
@@ -222,27 +229,6 @@ class UnfinishedText(UnfinishedOutput):
         writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
         writer.writerows([*([header] if header is not None else []), *rows])
         self.append(text.getvalue(), len(rows), **counts)
-
-    @contextmanager
-    def interruptible(self, what: str, total: int, counted: str = "rows") -> Iterator[None]:
-        """Raise `Interrupted` on Ctrl-C, with the finished number of `total`, called `what`.
-
-        All files are removed if no block is finished.
-
-        Parameters
-        ----------
-        what : str
-        total : int
-        counted : str
-            Name in `append` of the count of finished items.
-        """
-        try:
-            yield
-        except KeyboardInterrupt:
-            done = int(self.progress.get(counted, 0))
-            raise Interrupted(f"{done} of {total} {what}" if done else "") from None
-        finally:
-            self.discard_if_empty()
 
     def text(self) -> str:
         """Return the finished blocks."""

@@ -26,10 +26,7 @@ _PREFIX = ".asperity-unfinished-"
 @typed
 @contextmanager
 def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[Path]:
-    """A temporary path next to `target`, whose file replaces `target` at the end.
-
-    An error or an interruption leaves `target` as it was and removes the new file. What is
-    written has reached the disk before it gets its name.
+    """A temporary path next to `target`, whose file replaces `target` as in `replaced`.
 
     Parameters
     ----------
@@ -44,12 +41,26 @@ def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[
         If the file cannot be written.
     """
     target = Path(target)
-    fresh = fresh_name(target)
+    with writable(target, name), replaced(target, fresh_name(target)) as fresh:
+        yield fresh
+
+
+@contextmanager
+def replaced(target: Path, fresh: Path) -> Iterator[Path]:
+    """The temporary path `fresh`, whose file replaces `target` at the end.
+
+    An error or an interruption leaves `target` as it was and removes the new file. The content has
+    reached the disk before the file gets its name.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
     try:
-        with writable(target, name):
-            yield fresh
-            to_disk(fresh)
-            fresh.replace(target)
+        yield fresh
+        to_disk(fresh)
+        fresh.replace(target)
     finally:
         with contextlib.suppress(OSError):
             fresh.unlink(missing_ok=True)

@@ -18,7 +18,6 @@ import numpy as np
 
 from asperity import materials
 from asperity.outputs import (
-    Interrupted,
     UnfinishedOutput,
     output_file,
     require_disk,
@@ -248,23 +247,17 @@ def run_protocol(
     output = UnfinishedOutput(target, {**protocol.inputs, "rows of a block": rows})
     done = _saved_progress(output, resume)
     require_room(protocol, target, done.lengths.get("time", 0))
-    try:
+    duration = protocol.programme.duration
+    with output.interruptible(lambda: f"{done.time:.6g} s of {duration:.6g} s"):
         while not done.finished:
             with fields_of_protocol():
                 done = _one_block(protocol, output, done, rows, progress)
             if progress is not None and math.isfinite(done.time):
-                progress(done.time, protocol.programme.duration)
+                progress(done.time, duration)
         attributes = _attributes(protocol, done)
         if unstable := stability_statement(protocol):
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
-    except KeyboardInterrupt:
-        total = protocol.programme.duration
-        raise Interrupted(
-            f"{done.time:.6g} s of {total:.6g} s" if output.progress else ""
-        ) from None
-    finally:
-        output.discard_if_empty()
     return RunSummary(
         done.lengths["time"],
         done.lengths["event"],

@@ -100,7 +100,7 @@ def run_table(
     table = TableSource(source, law, filled)
     output = UnfinishedText(out, {"table": table.digest, "law": law, "filled": filled})
     output.start(resume)
-    with output.interruptible("rows", table.rows):
+    with output.interruptible(lambda: f"{output.rows} of {table.rows} rows"):
         advance, width = counted(progress, table.rows, output.rows), len(table.header)
         advance(0)
         for rows in table.blocks(block, skip=output.rows):

@@ -24,7 +24,7 @@ from asperity.app.words import in_labels
 from asperity.app.worker import limited
 from asperity.arrays import Float
 from asperity.errors import naming, require
-from asperity.outputs.tables import Section
+from asperity.outputs.tables import records
 from asperity.parameters import Names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
@@ -154,9 +154,6 @@ def _fit(
     def on_progress(done: int, total: int) -> None:
         report(share=done / total)
 
-    def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
-        return [section.record() for section in sections]
-
     report(share=0.0)
     options = {name: getattr(question, name) for name in FitOptions.model_fields}
     record: dict[str, Any]
@@ -169,7 +166,7 @@ def _fit(
             one = questions.Fit(**{**options, "law": question.laws[0]})
             whole: Any = answer_fit(one, read=_read, progress=on_progress)
             best = whole
-            record = {"fit": fit_record(whole), "sections": described(fit_report(whole))}
+            record = {"fit": fit_record(whole), "sections": records(fit_report(whole))}
         else:
             several = questions.Comparison(**{**options, "laws": question.laws})
             whole = answer_comparison(several, read=_read, progress=on_progress)
@@ -177,8 +174,8 @@ def _fit(
             best = None if judged is None else judged.fit
             record = {
                 "comparison": comparison_record(whole),
-                "sections": described(comparison_report(whole)),
-                "laws": {name: described(fit_report(j.fit)) for name, j in whole.laws.items()},
+                "sections": records(comparison_report(whole)),
+                "laws": {name: records(fit_report(j.fit)) for name, j in whole.laws.items()},
             }
     pictures: list[dict[str, Any]] = []
     posterior = None
@@ -192,7 +189,7 @@ def _fit(
                 progress=lambda done, total: report(draws=done, of=total),
             )
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
-            record["sections"] += described(posterior_sections(posterior))
+            record["sections"] += records(posterior_sections(posterior))
         report(stage="figures")
         record["bands"] = _bands(best, posterior)
         record["residuals"] = _residuals(best)

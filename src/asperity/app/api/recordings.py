@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from pydantic import field_validator
 
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming
-from asperity.outputs.tables import Section
+from asperity.outputs.tables import records
 from asperity.parameters import NAMES, OUTPUTS, Names, display_name
 from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions
@@ -117,9 +117,6 @@ def _measured(
 
     names: Names = argument.get("names", NAMES[0])
 
-    def described(sections: Iterable[Section]) -> list[dict[str, Any]]:
-        return [section.record() for section in sections]
-
     question = questions.Measurement(**argument["options"])
     name = argument["name"]
     report(stage="measuring")
@@ -135,11 +132,11 @@ def _measured(
         "record": measured_record(measurement),
         "rows": measured_rows(Path(name), parts),
         "curves": _curves(measurement),
-        "sections": described(measured_sections(measurement, name, names)),
+        "sections": records(measured_sections(measurement, name, names)),
         "note": note,
     }
     if modulated:
-        measured["amplitudes"] = described(amplitude_sections(measured["rows"], name))
+        measured["amplitudes"] = records(amplitude_sections(measured["rows"], name))
     if stick_slip:
         question = question.model_copy(update={"stick_slip": True, "modulated": None})
     source = Source(**argument["source"])

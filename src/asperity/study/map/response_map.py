@@ -137,7 +137,8 @@ def write_map(
     inputs = {"law": plane.law.name, "numbers": dict(plane.fixed), **axes}
     unfinished = UnfinishedText(target, inputs)
     unfinished.start(resume)
-    with unfinished.interruptible("points", x.count * y.count):
+    count = x.count * y.count
+    with unfinished.interruptible(lambda: f"{unfinished.rows} of {count} points"):
         grid = _solved(plane, unfinished, progress, block)
         dataset = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
         with written_file(target) as file:

@@ -20,6 +20,7 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
+from asperity.outputs.written import replaced
 from asperity.study.grid import SweepGrid
 from asperity.study.plan import ATTRIBUTES
 
@@ -144,15 +145,8 @@ def put(file: Path, content: bytes) -> None:
     """Write a file by renaming a complete one; it is on the disk when this returns."""
     make_way(file)
     file.parent.mkdir(parents=True, exist_ok=True)
-    fresh = file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")
-    try:
-        with fresh.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(fresh, file)
-    finally:
-        fresh.unlink(missing_ok=True)
+    with replaced(file, file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")) as fresh:
+        fresh.write_bytes(content)
     sync_folder(file.parent)
 
 
