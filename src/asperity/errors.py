@@ -19,7 +19,7 @@ from typing import ClassVar, NamedTuple
 class Argument(NamedTuple):
     """An argument of the library, which the command line and the page call by other names.
 
-    Its text is that of the door in use: ``columns['W']`` or ``columns={'W': 'Fn'}`` in Python,
+    Its text depends on the interface in use: ``columns['W']`` or ``columns={'W': 'Fn'}`` in Python,
     ``--load`` or ``--load Fn`` on the command line.
 
     Attributes
@@ -37,7 +37,7 @@ class Argument(NamedTuple):
 
     @property
     def whole(self) -> str:
-        """The name without the numbers of the parts of lists at its end."""
+        """The name without trailing indices of lists: ``data`` for ``data.0``."""
         name = self.name
         while name.rpartition(".")[2].isdigit():
             name = name.rpartition(".")[0]
@@ -80,7 +80,7 @@ def in_files(argument: Argument) -> str:
 
 
 class Key(Argument):
-    """A key of a file, which has the same name at every door."""
+    """A key of a file, which every interface calls by the same name."""
 
     def __str__(self) -> str:
         return in_python(self)
@@ -91,7 +91,7 @@ Symbols = Callable[[str], str]
 
 
 class Naming(NamedTuple):
-    """What a door calls arguments, parameters and files."""
+    """The names that an interface uses for arguments, parameters and files."""
 
     words: Words = in_python
     symbols: Symbols = str
@@ -107,7 +107,7 @@ def name_by(
     symbols: Symbols | None = None,
     files: Mapping[Path, str] | None = None,
 ) -> Naming:
-    """As `naming`, from now on; returns the naming until now."""
+    """Set the naming until the next call, as `naming`; returns the naming before."""
     earlier = _naming.get()
     _naming.set(
         Naming(
@@ -125,16 +125,16 @@ def naming(
     symbols: Symbols | None = None,
     files: Mapping[Path, str] | None = None,
 ) -> Iterator[None]:
-    """Let sentences name things as a door does; what is left out is named as before.
+    """Set the names that messages use within a block; an argument left out keeps its naming.
 
     Parameters
     ----------
     words : callable, optional
-        From an `Argument` to a text.
+        Maps an `Argument` to a text.
     symbols : callable, optional
-        From the name of a parameter to that in the set of names of the user.
+        Maps the name of a parameter to its name in the user's set of names.
     files : mapping of Path to str, optional
-        Names that the user knows, of files that lie under other names.
+        The user's name of a file that is stored under another name.
     """
     earlier = name_by(words, symbols, files)
     try:
@@ -144,7 +144,7 @@ def naming(
 
 
 def symbol(name: str) -> str:
-    """The name of a parameter in the user's set of names, for a sentence."""
+    """The name of a parameter in the user's set of names, for a message."""
     return _naming.get().symbols(name)
 
 
@@ -154,7 +154,7 @@ def symbols(names: Iterable[str]) -> str:
 
 
 def known_as(path: Path) -> Path:
-    """A path as the user knows it, for a sentence."""
+    """A path as the user knows it, for a message."""
     return Path(_naming.get().files.get(path, path))
 
 
@@ -194,12 +194,12 @@ class InputError(ValueError):
         return type(self)(field, self.rule, self.got, self.advice)
 
     def shortened(self) -> InputError:
-        """The same mistake, its parts as lines that a terminal can show."""
+        """The same mistake with each part as one line that a terminal can show."""
         parts = map(printable, (self.rule, self.got, self.advice))
         return type(self)(self.field._replace(name=printable(self.field.name)), *parts)
 
     def worded(self) -> InputError:
-        """The same mistake, its field in the words of the door in use, for every door."""
+        """The same mistake with the name of its field fixed as the present interface has it."""
         return self.about(Key(str(self.field)))
 
     def in_file(self, name: str) -> InputError:
@@ -239,7 +239,7 @@ def require_known(name: str, known: Iterable[str], field: str | Argument, rule: 
     field, rule : str
         As in `InputError`.
     """
-    # Numbers are converted in every evaluation of a fit: the nearest name only where it is needed.
+    # Fits call this in every evaluation; the search for the nearest name is slow.
     if name not in known:
         got = printable(str(name), 80)
         raise InputError(field, rule, f"'{got}'", closest(str(name), known))
@@ -268,35 +268,35 @@ class MistakesError(InputError):
         The file, if there is one.
     """
 
-    #: What has the mistakes, for the message.
+    #: What the message calls the object with the mistakes.
     subject: ClassVar[str] = "input"
 
     def __init__(self, mistakes: Sequence[str | InputError], source: str = "") -> None:
         super().__init__(self.subject)
         self.errors = tuple(m if isinstance(m, InputError) else InputError(m) for m in mistakes)
         self.source = source
-        # Which a copy in another process is made of.
+        # Arguments of the constructor, from which pickle makes a copy in another process.
         self.args = (self.errors, source)
 
     def shortened(self) -> InputError:
-        """As of `InputError`, for every mistake."""
+        """As `InputError.shortened`, for every mistake."""
         return type(self)([error.shortened() for error in self.errors], self.source)
 
     def worded(self) -> InputError:
-        """As of `InputError`, for every mistake."""
+        """As `InputError.worded`, for every mistake."""
         return type(self)([error.worded() for error in self.errors], self.source)
 
     def in_file(self, name: str) -> InputError:
-        """As of `InputError`, for all mistakes."""
+        """As `InputError.in_file`, for all mistakes."""
         return type(self)(self.errors, name)
 
     def noting(self, addition: str) -> InputError:
-        """As of `InputError`, to the last mistake."""
+        """As `InputError.noting`, for the last mistake."""
         return type(self)([*self.errors[:-1], self.errors[-1].noting(addition)], self.source)
 
     @property
     def mistakes(self) -> tuple[str, ...]:
-        """A sentence for each."""
+        """One sentence for each mistake."""
         return tuple(map(str, self.errors))
 
     def __str__(self) -> str:
@@ -315,7 +315,7 @@ class MistakesError(InputError):
 def code_of_others(
     field: str, rule: str = "be code that runs", advice: str = "correct it", where: str = ""
 ) -> Iterator[None]:
-    """Run code that a user or another package has written; it may raise anything.
+    """Run code of a user or of another package, which may raise any exception.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def closest(name: str, known: Iterable[str]) -> str:
     name : str
         What the user wrote.
     known : iterable of str
-        The names that would have been right; of a long list, the first ones are shown.
+        The valid names; of a long list the first ones are shown.
     """
     known = sorted(known)
     lowered = {k.lower(): k for k in known}
@@ -357,19 +357,11 @@ def closest(name: str, known: Iterable[str]) -> str:
     return "choose one of " + listed(known)
 
 
-def listed(names: Iterable[str], joint: str = ", ", most: int = 40) -> str:
-    """Names in one text, the first `most` of them if there are more.
-
-    Parameters
-    ----------
-    names : iterable of str
-    joint : str
-        Text between two names.
-    most : int
-    """
+def listed(names: Iterable[str], most: int = 40) -> str:
+    """The first `most` names in one text, and the number of further ones."""
     every = list(names)
-    rest = len(every) - most
-    return joint.join(every[:most]) + (f" and {rest} more" if rest > 0 else "")
+    further = len(every) - most
+    return ", ".join(every[:most]) + (f" and {further} more" if further > 0 else "")
 
 
 def enumerated(names: Sequence[str], word: str = "and") -> str:
@@ -378,7 +370,10 @@ def enumerated(names: Sequence[str], word: str = "and") -> str:
 
 
 def one_of_types(types: Iterable[str]) -> str:
-    """Types in a sentence, each once: "a text, a list or a number"; a whole number is a number."""
+    """Types in a sentence, each once: "a text, a list or a number".
+
+    "a whole number" is left out next to "a number".
+    """
     known = dict.fromkeys(types)
     if "a number" in known:
         known.pop("a whole number", None)
@@ -391,9 +386,9 @@ def printable(text: str, most: int = 600) -> str:
     Parameters
     ----------
     text : str
-        The text may come from a damaged file.
+        Any text, such as the content of a damaged file.
     most : int
-        Characters.
+        Largest number of characters.
     """
     plain = text
     if not text.isprintable():

@@ -48,9 +48,7 @@ class Series(NamedTuple):
     bands: dict[str, Band]
 
 
-def bands_of(
-    fit: Fit, term: LockInTerm, posterior: Posterior | None, *, seed: int = 0
-) -> list[Series]:
+def bands_of(fit: Fit, term: LockInTerm, posterior: Posterior | None) -> list[Series]:
     """Bands of mean_friction, delta_mu, mu1 and mu2 for each series of a table, slowest first.
 
     Parameters
@@ -59,10 +57,8 @@ def bands_of(
     term : LockInTerm
     posterior : Posterior or None
         Without one, parameters are drawn from the normal approximation.
-    seed : int
-        Seed of the choice of draws.
     """
-    values = _drawn(fit, posterior, np.random.default_rng(seed))
+    values = _drawn(fit, posterior, np.random.default_rng(0))
     count = len(next(iter(values.values())))
     table = term.table
     series = []

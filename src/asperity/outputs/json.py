@@ -51,16 +51,16 @@ def parsed_json(
     ----------
     text : str or bytes
     label : str
-        What it is, for messages.
+        Name of the text in messages.
     parse_constant : callable, optional
-        As of `json.loads`.
+        As for `json.loads`.
 
     Raises
     ------
     InputError
-        If an object names a key twice: Python's reader takes the last one without a word.
+        If an object has a key twice: `json.loads` would use the last value without a warning.
     ValueError, RecursionError
-        If it is no JSON, or is nested too deep.
+        If the text is no JSON, or is nested too deeply.
     """
 
     def named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Sections of a report, rendered as text for a terminal and as HTML for a page; whole pages."""
+"""Sections of a report as text for a terminal, as HTML or as JSON values, and pages of HTML."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Section(NamedTuple):
     ----------
     title : str
     sentences : tuple of str
-        Before the table.
+        Sentences before the table.
     head : tuple of str
-        Headings of the columns; empty for none.
+        Headings of the columns; empty for a table without headings.
     rows : tuple of tuple of str
     warnings : tuple of str
     """
@@ -44,7 +44,7 @@ def records(sections: Iterable[Section]) -> list[dict[str, Any]]:
 
 def aligned(rows: Iterable[Row], indent: str = "") -> str:
     """Rows of text in columns, two blanks apart."""
-    # Names and titles may come from files with anything in them.
+    # Names and titles may come from files, with any characters.
     table = [[printable(cell, 9 * len(cell)) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return "\n".join(
@@ -77,11 +77,11 @@ def html_table(head: Row, rows: Iterable[Row]) -> str:
     return f"<table>{top}{''.join(cells(row, 'td') for row in rows)}</table>"
 
 
-def as_html(sections: Iterable[Section], *, level: int = 3) -> str:
-    """Sections as HTML, with headings of a level."""
+def as_html(sections: Iterable[Section]) -> str:
+    """Sections as HTML."""
     parts = []
     for section in sections:
-        parts += [f"<h{level}>{escape(section.title)}</h{level}>"] if section.title else []
+        parts += [f"<h3>{escape(section.title)}</h3>"] if section.title else []
         parts += [f"<p>{escape(sentence)}</p>" for sentence in section.sentences]
         parts += [html_table(section.head, section.rows)] if section.rows else []
         listed = "".join(f"<li>{escape(warning)}</li>" for warning in section.warnings)
@@ -101,7 +101,7 @@ def html_page(
     header, footer : str
         HTML; the footer follows the name of the program.
     sections : mapping of str to (str, str)
-        Key of each section in addresses within the page, and its HTML, by its heading.
+        Anchor and HTML of each section by its heading.
     """
     body = "\n".join(
         f'<section id="{key}" aria-labelledby="{key}-head"><h2 id="{key}-head">{name}</h2>\n'
@@ -128,7 +128,7 @@ def two_digits(doubt: float) -> str:
 def rounded(value: float, doubt: float) -> tuple[str, str]:
     """A number and its uncertainty, rounded to two uncertain digits.
 
-    The uncertainty is empty where it is unknown, or no more than the rounding of doubles.
+    The uncertainty is empty if it is unknown or not larger than the rounding error of a double.
     """
     seen = doubt > 4 * sys.float_info.epsilon * abs(value)
     if not (math.isfinite(doubt) and doubt > 0 and seen and math.isfinite(value)):

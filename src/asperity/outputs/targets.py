@@ -1,7 +1,4 @@
-"""Checks of output paths, disk space and memory before a computation.
-
-Room in memory and on disk is checked before anything large is computed.
-"""
+"""Checks of output paths, disk space and memory before a computation."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ _UNITS = ("B", "kB", "MB", "GB", "TB", "PB", "EB")
 
 @typed
 def size_text(count: float) -> str:
-    """Return a number of bytes with its unit, such as ``"1.2 GB"``."""
+    """A number of bytes with its unit, such as ``"1.2 GB"``."""
     power = 0
     while count >= 1000 and power < len(_UNITS) - 1:
         count, power = count / 1000, power + 1
@@ -134,9 +131,8 @@ def output_file(
     Raises
     ------
     InputError
-        If the path, or a temporary file next to it, is a
-        folder, a pipe or a device, if its folder does not exist or cannot be written, or if it
-        is one of the inputs.
+        If the path, or a temporary file next to it, is a folder, a pipe or a device, if its folder
+        does not exist or cannot be written, or if it is one of the inputs.
     """
     target = _resolved(path, name, example)
     files = (target, *_temporary_files(target))
@@ -165,7 +161,7 @@ def output_file(
 
 @typed
 def require_netcdf(path: str | os.PathLike[str], name: str, example: str) -> None:
-    """Refuse a name that does not end as one of NetCDF; parameters as of `output_file`."""
+    """Refuse a name that does not end in ``.nc``; parameters as for `output_file`."""
     netcdf = Path(path).suffix.lower() == ".nc"
     require(netcdf, name, "be a NetCDF file", f"'{path}'", f"write it like {example}")
 
@@ -236,7 +232,7 @@ def require_short(target: Path, files: Sequence[Path], name: str = "out") -> Non
     Raises
     ------
     InputError
-        Which calls the target `name`.
+        About `name`.
     """
     length = max(len(os.fsencode(file.name)) for file in files)
     name_length = len(os.fsencode(target.name))

@@ -60,8 +60,8 @@ class UnfinishedOutput:
     target : Path
         Appears only when everything is done.
     inputs : mapping of str to object
-        All that the numbers depend on, as JSON values by name; nested mappings are allowed. The
-        version of the package is added.
+        Everything that the numbers depend on, as JSON values by name; nested mappings are allowed.
+        The version of the package is added.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class UnfinishedOutput:
         return progress
 
     def damaged(self) -> InputError:
-        """Return the error for a record that does not fit the blocks."""
+        """The error for a record that does not agree with the blocks."""
         return InputError(
             f"{self.record} must be the record of finished blocks, got a damaged one; "
             "delete it to start over"
@@ -224,14 +224,14 @@ class UnfinishedText(UnfinishedOutput):
         header: Sequence[object] | None = None,
         **counts: int,
     ) -> None:
-        """`append` rows of cells as CSV, behind a line of column names where there is a header."""
+        """`append` rows of cells as CSV, after a line of column names if a header is given."""
         text = io.StringIO(newline="")
         writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
         writer.writerows([*([header] if header is not None else []), *rows])
         self.append(text.getvalue(), len(rows), **counts)
 
     def text(self) -> str:
-        """Return the finished blocks."""
+        """The finished blocks."""
         with self.data.open("rb") as stream:
             return stream.read(self.progress.get("length", 0)).decode()
 

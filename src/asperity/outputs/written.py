@@ -33,7 +33,7 @@ def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[
     target : str or path
         Checked by `output_file` beforehand.
     name : str
-        What messages call it, such as ``"--plot"``.
+        Name in messages, such as ``"--plot"``.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def require_folder(folder: Path, name: str = "out") -> None:
     Raises
     ------
     InputError
-        Which calls the folder `name`.
+        About `name`.
     """
     staging, lock = _staging(folder, name)
     shutil.rmtree(staging, ignore_errors=True)
@@ -103,15 +103,15 @@ def require_folder(folder: Path, name: str = "out") -> None:
 def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
     """A temporary folder, whose files are moved to `folder` at the end.
 
-    An error, or an interruption, leaves `folder` as it was. Files of other names that lie there
-    stay. The temporary folder lies inside `folder` if that exists, else next to it, so that moving
-    is renaming, which cannot stop half-way through a file. Temporary folders that killed processes
-    have left at that place are removed; those of running processes stay.
+    An error, or an interruption, leaves `folder` as it was. Other files in `folder` stay. The
+    temporary folder is inside `folder` if that exists, else next to it, so that each file is moved
+    by renaming, which is atomic. Temporary folders that killed processes have left there are
+    removed; those of running processes stay.
 
     Raises
     ------
     InputError
-        At once, if the folder, which messages call `name`, cannot be written.
+        About `name`, at once, if the folder cannot be written.
     """
     staging, lock = _staging(folder, name)
     try:
@@ -147,7 +147,7 @@ def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
     place : Path
         Parent folder.
     prefix : str
-        With which its name begins.
+        Beginning of the folder's name.
     """
     # Until it is locked, another process might take the new folder for abandoned and remove it.
     guard = _locked(place, wait=True)
@@ -175,7 +175,7 @@ def _remove_abandoned(place: Path, prefix: str) -> None:
 def _locked(folder: Path, *, wait: bool = False) -> int | None:
     """Lock a folder until the descriptor is closed or the process ends, however it ends.
 
-    None where it is locked by someone else, or where the file system has no locks.
+    None if another process has locked it, or if the file system has no locks.
     """
     if fcntl is None:
         return None

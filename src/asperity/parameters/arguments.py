@@ -58,17 +58,18 @@ def broadcast_shape(label: str, *values: Any) -> tuple[int, ...]:
 
 
 def typed(function: Callable[P, R]) -> Callable[P, R]:
-    """Let annotations be the check of the arguments of a function, or of a class.
+    """Check the arguments of a function, or of a class, by their annotations.
 
-    Numbers of NumPy come in as those of Python, lists as tuples. What `Annotated` adds to a type is
-    a rule for its values, a function of value and name such as `file_path` or ``at_least(2)``.
+    NumPy numbers are passed on as Python numbers, and lists as tuples. The second part of an
+    `Annotated` type is a rule for the value: a function of value and name such as `file_path` or
+    ``at_least(2)``.
 
     Raises
     ------
     InputTypeError
-        By the function, for an argument of another type.
+        By the decorated function, for an argument of another type.
     InputError
-        By the function, for a value that breaks the rule of its annotation.
+        By the decorated function, for a value that breaks the rule of its annotation.
     """
     if isinstance(function, type):
         function.__init__ = typed(function.__init__)  # type: ignore[misc]
@@ -103,12 +104,12 @@ def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def of_type(value: Any, kind: Any, name: str) -> Any:
-    """A value converted to the type of an annotation, with numbers of NumPy as those of Python.
+    """A value as an annotation allows it, converted as in `typed`.
 
     Raises
     ------
     InputTypeError, InputError
-        As `typed`.
+        As for `typed`.
     """
     try:
         return _converted(value, kind, name)
@@ -128,7 +129,7 @@ def _origin_and_parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
 
 def _converted(value: Any, kind: Any, name: str) -> Any:
     origin, parts = _origin_and_parts(kind)
-    # Of ArrayLike, alone or among others: who converts it to SI knows what may stand.
+    # The conversion to SI checks an ArrayLike, alone or in a union.
     if kind is Any or kind is ArrayLike or complex in parts:
         return value
     if origin in (Union, UnionType):
@@ -176,7 +177,7 @@ def _is_one_number(value: Any) -> bool:
     return shape in ((), (1,)) and kind in "iuf"
 
 
-#: Types of numbers, each with those whose values it takes.
+#: For each type of number, the types of the values that it accepts.
 _NUMBERS: Mapping[Any, Any] = {
     bool: bool,
     int: int,
@@ -184,7 +185,7 @@ _NUMBERS: Mapping[Any, Any] = {
     complex: int | float | complex,
 }
 
-#: Types in the words of a message.
+#: Words for types in a message.
 _WORDS: Mapping[Any, str] = {
     bool: "True or False",
     int: "a whole number",
@@ -213,8 +214,8 @@ def _words(kind: Any) -> str:
 
 
 def at_least(least: int) -> Callable[[int, str], int]:
-    """The rule of a count, as in ``Annotated[int, at_least(2)]``: up to a gigabyte of numbers."""
-    most = 100_000_000
+    """The rule of a count, as in ``Annotated[int, at_least(2)]``."""
+    most = 100_000_000  # a gigabyte of numbers
 
     def within(value: int, name: str) -> int:
         require(value >= least, name, f"be at least {least}", shown(value), "give a larger one")
@@ -257,14 +258,14 @@ def one_of(value: Any, known: Iterable[str], label: str) -> str:
 def counted(
     progress: Callable[[int, int], None] | None, total: int, done: int = 0
 ) -> Callable[[int], None]:
-    """A function that takes the parts finished since its last call and reports their sum.
+    """A function of the parts finished since its last call, which reports their sum.
 
     Parameters
     ----------
     progress : callable or None
-        As public functions take it: called with the work done so far and all work.
+        Called with the number of parts finished so far and of all parts.
     total, done : int
-        All parts, and those that an earlier run has finished.
+        Number of all parts, and of those that an earlier run has finished.
     """
 
     def advance(count: int) -> None:
@@ -277,7 +278,7 @@ def counted(
 
 
 def increments(advance: Callable[[int], None] | None) -> Callable[[int, int], None] | None:
-    """The reverse of `counted`: what a public function takes, from a function of increments."""
+    """The inverse of `counted`: a `progress` argument that calls a function of increments."""
     if advance is None:
         return None
     last = 0

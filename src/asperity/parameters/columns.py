@@ -49,14 +49,14 @@ def read_headed_columns(
     numbers, texts : collection of str
         Columns that are read; others are left out.
     label : str
-        What messages call the argument.
+        Name of the argument in messages.
     row : str
-        What a row is, such as ``"a hold"``.
+        Meaning of a row, such as ``"a hold"``.
 
     Returns
     -------
     dict
-        Numbers of a heading with a unit are texts with that unit.
+        Numbers; under a heading with a unit, texts of the number with the unit.
 
     Raises
     ------
@@ -83,23 +83,23 @@ def read_headed_columns(
 
 @dataclass(frozen=True)
 class Sheet:
-    """A CSV, and how it is written.
+    """A CSV file and its dialect.
 
     Attributes
     ----------
     path : Path
     source : Path or bytes
-        Where its text is from: the file, or its content.
+        The file, or its content.
     label : str
-        What messages call the argument.
+        Name of the argument in messages.
     encoding : str
     delimiter : str
     decimal_comma : bool
-        Whether numbers have decimal commas; `rows` have points in their place.
+        Whether numbers have decimal commas; `rows` replaces them by points.
     heading : list of str
-        Cells of the heading, with the units of a row of units in them.
+        Cells of the heading, with the unit of the row of units in each.
     units_below : bool
-        Whether there is a row of units, which `rows` leave out.
+        Whether there is a row of units below the heading; `rows` leaves it out.
     """
 
     path: Path
@@ -117,8 +117,8 @@ class Sheet:
         Raises
         ------
         InputError
-            If the file cannot be read, or a quotation mark is missing, which would merge the rows
-            after it into one cell.
+            If the file cannot be read, or a quotation mark is missing: all rows after it would be
+            one cell.
         """
         with readable(self.path, self.label):
             rows = _rows(self.source, self.encoding, self.delimiter)
@@ -133,12 +133,12 @@ def sheet(
     label: str = "data",
     content: bytes | None = None,
 ) -> Sheet:
-    """Find out how a CSV is written, from all of it.
+    """The dialect of a CSV file, from its whole content.
 
     The delimiter is the one of ``,``, ``;`` and tab that gives the heading the most cells. Numbers
-    have decimal commas where a cell is such a number and none has a decimal point: ``1,234`` next
-    to ``0.5`` may be a thousand, and is no number then. The row below the heading has units if
-    there is no number in its columns of numbers, but a text in one of them.
+    have decimal commas if a cell is such a number and no cell has a decimal point: ``1,234`` next
+    to ``0.5`` may be a thousand, and is then no number. The row below the heading has units if none
+    of its columns of numbers has a number there and one of them has a text.
 
     Parameters
     ----------
@@ -146,9 +146,9 @@ def sheet(
     is_number : callable
         Whether a column of this name has numbers.
     label : str
-        What messages call the argument.
+        Name of the argument in messages.
     content : bytes, optional
-        The file, where it was read as a whole.
+        Content of the file, if it has been read already.
 
     Raises
     ------
@@ -183,13 +183,13 @@ def _opened(source: Path | bytes) -> BinaryIO:
 
 
 def marked_encoding(beginning: bytes) -> str:
-    """UTF-16 where a text begins with its mark, else UTF-8, whose mark may stand in front."""
+    """UTF-16 if a text begins with its byte-order mark, else UTF-8 with or without a mark."""
     marks = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
     return "utf-16" if beginning.startswith(marks) else "utf-8-sig"
 
 
 def _encoding(source: Path | bytes) -> str:
-    """Encoding of a text: UTF-8, UTF-16 by its mark, or else the Windows code page 1252."""
+    """Encoding of a text: UTF-16 by its mark, else UTF-8 if valid, else Windows code page 1252."""
     decoder = codecs.getincrementaldecoder("utf-8")()
     with _opened(source) as file:
         block = file.read(_BLOCK)
@@ -232,7 +232,7 @@ def _with_point(cell: str) -> str:
 def _units_below(
     heading: list[str], row: list[str], is_number: Callable[[str], object]
 ) -> dict[int, str]:
-    """Units of the columns of numbers by their places; empty if the row is none of units."""
+    """Units of the columns of numbers by position; empty if the row is no row of units."""
     units = {}
     for place, (name, cell) in enumerate(zip(heading, row, strict=False)):
         match, unit = _HEADING.fullmatch(name), cell.strip()
@@ -259,14 +259,14 @@ def _is_number(cell: str) -> bool:
 def headings(
     cells: Iterable[str], label: str, known: Callable[[str], object]
 ) -> dict[str, tuple[int, str]]:
-    """Place and unit of each column by its name; the unit is empty where the heading has none.
+    """Position and unit of each column by its name; the unit is empty if the heading has none.
 
     Parameters
     ----------
     cells : iterable of str
         Cells of the heading.
     label : str
-        What messages call the table.
+        Name of the table in messages.
     known : callable
         Whether a column of this name is read; the others are left out.
 
@@ -305,7 +305,7 @@ def cell_number(cell: str) -> float:
     Raises
     ------
     ValueError
-        If it holds none; Python would read "1_5", a damaged "1.5", as 15.
+        If the cell has no number. Python would read "1_5", a damaged "1.5", as 15.
     """
     if "_" in cell:
         raise ValueError(cell)

@@ -1,7 +1,6 @@
-"""A parameter or an output without its value: kind, unit, rule, meaning, and how it is displayed.
+"""A parameter or an output without its value: kind, unit, rule and meaning.
 
-Objects are displayed on consoles and in notebooks as short texts and tables, arrays by what they
-hold.
+`Displayed` shows objects on consoles and in notebooks as short texts and tables.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-#: What a parameter belongs to: the friction law, the machine, the equation of motion, the drive,
-#: or the normal load.
+#: Owner of a parameter: the friction law, the machine, the equation of motion, the drive, or the
+#: normal load.
 Place = Literal["law", "slider", "motion", "drive", "load"]
 
 
@@ -38,40 +37,38 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Its one name: in tables, on the command line, in JSON, as a coordinate of datasets.
+        Name in tables, on the command line, in JSON, and as a coordinate of datasets.
     kind : str
         Kind of quantity, a key of `asperity.units.KINDS`.
     rule : str
         A key of `asperity.parameters.RULES`.
     meaning : str
-        In one line.
+        One line.
     symbol : str
-        In LaTeX.
+        LaTeX.
     place : {"law", "slider", "motion", "drive", "load"}
     path : str
-        Attributes that lead to it from the equations of an operating point, a
-        `asperity.slider.problem.Problem`.
+        Attributes that lead from an `asperity.slider.problem.Problem` to the parameter.
     scale : float
         The attribute at `path` over the parameter: 2 pi for the frequency, as equations have omega.
     default : float or None
-        Value where none is given; None where one must be.
+        Value if none is given; None if a value is required.
     label : str
-        What messages call it.
+        Name in messages.
     argument : str
-        Keyword of the Python functions that take it; empty for a parameter of one law.
+        Keyword of Python functions; empty for a parameter of one law.
     options : tuple of str
         Options of the command line, in addition to ``--set NAME=VALUE``.
     aliases : tuple of str
-        Other names that are accepted.
+        Other accepted names.
     meant : tuple of str
-        Names, in lower case, that are refused with this one as the suggestion: of something
-        near, or too short to be safe.
+        Refused names, in lower case, for which messages suggest this parameter.
     geophysics : str
         Usual names in the literature on faults, in Markdown.
     words : mapping of str to float
         Texts that stand for values.
     angle : bool
-        Whether it is an angle: a number in rad, or a text such as "5 deg".
+        Whether the value is an angle: a number in rad, or a text such as "5 deg".
     """
 
     name: str
@@ -121,12 +118,12 @@ class Parameter:
         value : str, number, array or sequence of these
             A text carries its unit, a number is SI.
         label : str
-            What messages call the value; the parameter's label by default.
+            Name of the value in messages; the parameter's label by default.
 
         Returns
         -------
         array of float
-            Of the shape of `value`; a value that JAX traces is returned as it is.
+            Same shape as `value`; a value traced by JAX is returned unchanged.
 
         Raises
         ------
@@ -143,7 +140,7 @@ class Parameter:
 
     @typed
     def unit_in_si(self, unit: str, label: str) -> float:
-        """The SI value of a unit, such as that in the heading of a column.
+        """The SI value of a unit, such as the unit in the heading of a column.
 
         Raises
         ------
@@ -161,20 +158,20 @@ def plain_text(markdown: str) -> str:
 
 @dataclass(frozen=True)
 class Output:
-    """A quantity that a calculation answers with.
+    """A quantity that a calculation computes.
 
     Attributes
     ----------
     name : str
-        Its one name: attribute of the response, column, variable of datasets, key in JSON.
+        Attribute of the response, column of tables, variable of datasets, key in JSON.
     unit : str
         SI unit as datasets write it: "1" for a pure number.
     meaning : str
-        In one line; the `long_name` of datasets.
+        One line; the `long_name` of datasets.
     symbol : str
-        In LaTeX.
+        LaTeX.
     former : tuple of str
-        Names under which JSON still gives the same, for programs written before the renaming.
+        Further keys of the same number in JSON, for programs that use an earlier name.
     """
 
     name: str
@@ -190,8 +187,8 @@ class Output:
 
 
 Names = Literal["friction", "geophysics"]
-#: Sets of names that tables, figures and sentences are written in. "friction": the letters of
-#: Bureau, Baumberger and Caroli (2000).
+#: Sets of names for tables, figures and messages. "friction": the letters of Bureau, Baumberger
+#: and Caroli (2000).
 NAMES: tuple[Names, ...] = ("friction", "geophysics")
 
 
@@ -204,7 +201,7 @@ class SummaryLine(NamedTuple):
 
 
 class Displayed:
-    """An object that shows itself by its summary.
+    """An object whose `repr` is its summary.
 
     Subclasses that are dataclasses are declared with ``repr=False``.
     """
@@ -228,10 +225,10 @@ class Displayed:
 
 
 class Drawn(Displayed):
-    """An object that shows itself as a picture too."""
+    """An object with a picture."""
 
-    #: ``module:function`` that draws it. A text: pictures import what they draw, not the other way
-    #: round.
+    #: ``module:function`` that draws the object. A text, because the module of the function imports
+    #: the class.
     _drawn_by: ClassVar[str]
 
     @typed
@@ -255,7 +252,7 @@ class Drawn(Displayed):
 
 
 def labelled(figure: Figure, names: Names) -> Figure:
-    """The figure, its labels in a set of names and with µm for um, as texts to type have it."""
+    """The figure with its labels in a set of names, and µm in place of um."""
     in_symbols: Any = import_module("asperity.parameters.table").in_symbols
     labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
     for text in labels:
@@ -265,13 +262,13 @@ def labelled(figure: Figure, names: Names) -> Figure:
 
 
 def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:
-    """A parameter with its value in a unit that reads well; of an array the range and the shape.
+    """A parameter with its value in a readable unit; for an array the range and the shape.
 
     Parameters
     ----------
     parameter : Parameter
     value : float or array
-        In SI, or traced by JAX.
+        SI, or traced by JAX.
     """
     text = _value_text(value, parameter.kind)
     return SummaryLine(parameter.name, text, plain_text(parameter.meaning))
@@ -295,7 +292,7 @@ def count_text(count: int, noun: str) -> str:
 
 
 def number_line(name: str, values: Any, meaning: str = "") -> SummaryLine:
-    """A number, or the range of an array without what is NaN in it."""
+    """A number, or the range of the finite values of an array."""
     array = np.asarray(values, dtype=float)
     known = array[np.isfinite(array)]
     if not known.size:

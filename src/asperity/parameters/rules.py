@@ -67,7 +67,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     value : str, number, array or sequence of these
         A text carries its unit, a number is SI.
     label : str
-        What messages call the value, as ``slider.spring``.
+        Name of the value in messages, such as ``slider.spring``.
     kind : str
         A key of `asperity.units.KINDS`.
     rule : str
@@ -76,19 +76,18 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     Returns
     -------
     array of float
-        Of the shape of `value`. A value that JAX traces is returned as it is, unchecked.
+        Same shape as `value`. A value traced by JAX is returned unchanged and unchecked.
 
     Raises
     ------
     InputError
-        Naming the value, the rule, the first offending element and its unit.
+        With the label, the rule, the first value that breaks the rule, and its unit.
     """
     require_known(rule, RULES, "rule", "be a known rule")
     if is_traced(value):
         return value
     array = np.asarray(to_si(value, kind, label), dtype=float)
-    # As in texts: a number below the smallest normal double has few digits, and its reciprocal may
-    # be infinite.
+    # A number below the smallest normal double has few digits, and its reciprocal may be infinite.
     small = (array != 0) & (np.abs(array) < sys.float_info.min)
     within = "lie within the range of double precision", "give 0 or a larger number"
     for wrong, words, advice in (

@@ -1,11 +1,11 @@
-"""The table of parameters: every number that an operating point depends on, by its one name.
+"""The table of parameters: every number that an operating point depends on, by name.
 
-The table is ``table.toml``, which has every output of a periodic response, too. The parameters of a
-single law are declared in the file of that law; `law_parameters` reads them from the class, so that
-a law written elsewhere has its place in the table as well.
+``table.toml`` has the parameters of the experiment, those that several laws share, and the outputs
+of a periodic response. The file of a law declares the parameters of that law alone;
+`law_parameters` reads them from the class, also from the class of a user's law.
 
-Tables, figures and sentences are written in the names of the paper or in those of geophysics. Keys
-of JSON, columns of files and coordinates keep the one name of each parameter.
+Tables, figures and messages use the names of the paper or those of geophysics. Keys of JSON,
+columns of files and coordinates always have the names of the table.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from asperity.parameters.parameter import Names, Output, Parameter
 
 
 def _frozen(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a frozen record: lists and tables of TOML that cannot be changed."""
+    """Fields with immutable values: tuples for lists, read-only mappings for tables."""
     kinds: dict[type, Any] = {list: tuple, dict: MappingProxyType}
     return {n: kinds[type(v)](v) if type(v) in kinds else v for n, v in fields.items()}
 
 
 def _parameters(part: str, **shared: Any) -> Mapping[str, Parameter]:
-    """The parameters of a part of the table, with fields that they share."""
+    """The parameters of a part of the table, with the fields that all of them share."""
     table: Mapping[str, Mapping[str, Any]] = _TABLE[part]
     return MappingProxyType(
         {name: Parameter(name, **shared | _frozen(fields)) for name, fields in table.items()}
@@ -62,27 +62,27 @@ RESULT_COLUMNS = (
 #: Parameters that several laws share.
 INTERFACE = _parameters("interface")
 
-#: The slider, and what of it counts in the equation of motion.
+#: The slider, and switches of terms in the equation of motion.
 MACHINE = _parameters("machine")
 
 #: Pulling velocity and modulation.
 DRIVE = _parameters("drive")
 
-#: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulated`.
-#: Angles are in rad. Continuation and fits have a harmonic load and take none of them.
+#: Further modulations, 0 if absent: the arguments of `asperity.loads.modulated`. Angles are in
+#: rad. Continuation and fits have a harmonic load and accept none of these.
 MODULATION = _parameters(
     "modulation", kind="dimensionless", rule="finite", place="drive", default=0.0
 )
 
-#: Parameters that belong to no law.
+#: Parameters of the experiment, which belong to no law.
 EXPERIMENT: Mapping[str, Parameter] = MappingProxyType({**MACHINE, **DRIVE, **MODULATION})
 
 
 @typed
 def plain_name(name: str) -> str:
-    """The bare name of a parameter, without additions by Python or a message.
+    """The name of a parameter without additions: ``lambda`` for ``lambda_``, ``D0`` for ``law.D0``.
 
-    ``lambda_`` is how Python has to write ``lambda``; ``law.D0`` is what messages call ``D0``.
+    ``lambda`` is a keyword of Python; messages call a parameter of a law ``law.NAME``.
     """
     return name.removeprefix("law.").rstrip("_")
 
@@ -129,7 +129,7 @@ def point_parameters(law: Any) -> dict[str, Parameter]:
 def all_parameters(laws: Iterable[Any]) -> dict[str, Parameter]:
     """`point_parameters` of several laws together.
 
-    Where two laws have parameters of the same name, that of the first law stands.
+    If two laws have parameters of the same name, the first law's is used.
     """
     parameters: dict[str, Parameter] = {}
     for law in laws:
@@ -144,7 +144,7 @@ def required(law: Any) -> tuple[str, ...]:
 
 @typed
 def canonical_name(name: str, known: Mapping[str, Parameter]) -> str | None:
-    """The one name of a parameter of `known`, by that name or an alias; None if it has none."""
+    """The name in `known` of a parameter, from this name or an alias; None if there is none."""
     if name in known:
         return name
     bare = plain_name(name)
@@ -157,7 +157,7 @@ def canonical_name(name: str, known: Mapping[str, Parameter]) -> str | None:
 def known_name(
     name: str, known: Mapping[str, Parameter], label: str | Argument = "parameter"
 ) -> str:
-    """As `canonical_name`.
+    """As `canonical_name`, but an unknown name is an error.
 
     Raises
     ------
@@ -172,16 +172,19 @@ def known_name(
 
 @typed
 def suggestion(name: str, known: Mapping[str, Parameter], otherwise: str = "") -> str:
-    """``did you mean 'x'?``, or other advice: by default the nearest of the names there are."""
+    """``did you mean 'x'?`` for a name that is known to mean x; else `otherwise`.
+
+    Without `otherwise` the advice is the nearest known name.
+    """
     meant = (parameter_named(name), *(n for n, p in known.items() if name.lower() in p.meant))
     for parameter in filter(known.__contains__, meant):
         return f"did you mean '{symbol(parameter)}'?"
     return otherwise or closest(symbol(name), map(symbol, known))
 
 
-#: Decorations of a formula that a plain name goes without.
+#: Marks of a formula that plain names do not have.
 _DECORATIONS = re.compile(r"\\bar|[\\{}]")
-#: Words of a name, and the run of a parameter, as of ``K[B]/W0``.
+#: Words of an expression; ``[B]``, the recording in ``K[B]/W0``, is one word.
 _WORDS = re.compile(r"\[.*?\]|[A-Za-z]\w*")
 
 
@@ -189,11 +192,7 @@ _WORDS = re.compile(r"\[.*?\]|[A-Za-z]\w*")
 def symbol_of(parameter: Parameter, names: Names = "friction") -> str:
     """LaTeX symbol of a parameter in a set of names.
 
-    Parameters
-    ----------
-    parameter : Parameter
-        In geophysics the first of its usual names there; its symbol where it has none.
-    names : {"friction", "geophysics"}
+    In geophysics this is the first usual name of the parameter, or its symbol if it has none.
     """
     usual = re.match(r"\$([^$=]+)", parameter.geophysics)
     if names == "friction" or usual is None or usual[1].startswith("1/"):
@@ -208,10 +207,10 @@ def display_name(name: str, names: Names = "friction", *laws: type) -> str:
     Parameters
     ----------
     name : str
-        As ``D0``, ``K/W0`` or ``A - B``; words that are no parameter stay as they are.
+        Such as ``D0``, ``K/W0`` or ``A - B``; words that are no parameter are unchanged.
     names : {"friction", "geophysics"}
     *laws : type of Law
-        Whose parameters have names too, in addition to those that several laws share.
+        Laws whose parameters are renamed, in addition to those that several laws share.
     """
     if names == "friction":
         return name
@@ -220,7 +219,7 @@ def display_name(name: str, names: Names = "friction", *laws: type) -> str:
 
 
 def parameter_named(name: str, law: Any = None) -> str:
-    """The name of the parameter that geophysics calls so: D0 for ``D_c`` or ``Dc``."""
+    """The name of a parameter from its name in geophysics: D0 for ``D_c`` or ``Dc``."""
     laws = () if law is None else (law,)
     known = {_folded(usual): parameter for parameter, usual in plain_names(*laws).items()}
     return known.get(_folded(name), name)
@@ -230,12 +229,12 @@ def _folded(name: str) -> str:
     return name.replace("_", "").casefold()
 
 
-#: Symbols of figures in geophysics, in addition to those of `INTERFACE`.
+#: Symbols of geophysics by those of figures, in addition to the symbols of `INTERFACE`.
 _SYMBOLS = {"F": r"\tau", "W": r"\sigma_n", "W_0": r"\bar\sigma_n", "K": "k", r"\Phi": r"\theta"}
 
 
 def in_symbols(text: str) -> str:
-    """A label of a figure with the symbols of its formulas as geophysics writes them."""
+    """A label of a figure with the symbols of geophysics in its formulas."""
     known = {p.symbol: symbol_of(p, "geophysics") for p in INTERFACE.values()} | _SYMBOLS
     word = re.compile(r"(?<![\\\w{])(?:[A-Z](?:_0)?|\\Phi)(?![\w}])")
 
@@ -247,7 +246,7 @@ def in_symbols(text: str) -> str:
 
 @cache
 def plain_names(*laws: Any) -> dict[str, str]:
-    """Plain names of geophysics by the names of the parameters, where they differ."""
+    """Plain names of geophysics by parameter, for parameters whose name differs there."""
     parameters = {**INTERFACE, **all_parameters(laws)}
     return {
         name: _DECORATIONS.sub("", symbol_of(parameter, "geophysics"))

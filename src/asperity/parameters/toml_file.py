@@ -1,7 +1,4 @@
-"""The one reader of TOML: plans, protocols, recipes, materials, and claims of papers.
-
-Files are read as a whole, up to a largest size.
-"""
+"""Reading of TOML files: plans, protocols, recipes, materials, and claims of papers."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from typing import Any
 from asperity.errors import InputError, printable
 from asperity.parameters.arguments import file_path
 
-#: Bytes of a file of texts: a table or a plan with a million rows of several numbers has less.
+#: Largest size of a text file (bytes): a table with a million rows of several numbers is smaller.
 LARGEST = 128 * 2**20
 
 
@@ -27,7 +24,7 @@ def file_content(path: Path) -> bytes:
     Raises
     ------
     OSError
-        If it cannot be read, is a device, or is larger than any text that this package is given.
+        If it cannot be read, is a device, or is larger than `LARGEST`.
     """
     with path.open("rb") as stream:
         if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
@@ -38,11 +35,11 @@ def file_content(path: Path) -> bytes:
     return content
 
 
-#: Tables and lists in each other: what is written by hand has a tenth of it.
+#: Largest nesting of tables and lists, ten times that of files written by hand.
 _DEEPEST = 100
-#: Integers that TOML promises to keep.
+#: Integers that every TOML parser must accept.
 _INTEGERS = range(-(2**63), 2**63)
-#: A key of so many parts, for which the parser takes a time that grows with their square.
+#: A key of `_DEEPEST` parts or more; the time of the parser grows with the square of their number.
 _LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}"""
 )
@@ -54,7 +51,7 @@ class SyntaxMistakeError(InputError):
     Attributes
     ----------
     line : int
-        Of the mistake, counted from 1.
+        Line of the mistake, counted from 1.
     """
 
     line = 0
@@ -67,12 +64,12 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
     ----------
     path : str or path
     label : str
-        What the file is, for messages: ``plan``, ``protocol``.
+        Kind of the file, for messages: ``plan``, ``protocol``.
 
     Raises
     ------
     InputError
-        If there is no such file, it cannot be read, or as of `parsed_toml`.
+        If there is no such file, it cannot be read, or its text is invalid as in `parsed_toml`.
     """
     file = file_path(path, label)
     try:
@@ -96,13 +93,13 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
     label : str
         Kind of the content, for messages.
     source : str
-        Where it is from, for messages.
+        Source of the text, for messages.
 
     Raises
     ------
     InputError
-        If it is not TOML, is nested deeper than anybody reads, or has an integer of more than
-        64 bits, which TOML does not promise to keep.
+        If the text is not TOML, is nested too deeply, or has an integer of more than 64 bits, which
+        a TOML parser need not accept.
     """
     deep = InputError(
         label,
@@ -118,13 +115,13 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         what = printable(" ".join(str(error).split()))
         got, advice = f"{source} ({what})", "correct that line"
         mistake = SyntaxMistakeError(label, "be valid TOML", got, advice)
-        line = re.search(r"at line (\d+)", what)  # otherwise it is at the end
+        line = re.search(r"at line (\d+)", what)  # a mistake at the end has no line
         mistake.line = int(line[1]) if line else text.count("\n") + 1
         raise mistake from None
     except RecursionError:
         raise deep from None
     except ValueError:
-        # Python reads no integer of more than some thousand digits.
+        # Python refuses integers of more than 4300 digits.
         raise _too_large(label, source) from None
     level: list[Any] = [content]
     for _ in range(_DEEPEST):

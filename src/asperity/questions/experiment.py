@@ -20,11 +20,11 @@ class ProtocolError(MistakesError):
 
 
 def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
-    """The steps; a wrong step is one mistake, which pydantic would report for each kind of step."""
+    """The steps. A wrong step is one mistake; pydantic would report it for each type of step."""
     try:
         return fill(steps)
     except ValidationError as error:
-        # Of a table, what is wrong in the table rather than that it is no text.
+        # For a table the mistake in the table comes first, before "must be a text".
         ranked = sorted(error.errors(), key=lambda m: "Repeat" not in m["loc"])
         wrong = {m["loc"][0]: m for m in reversed(ranked) if m["loc"]}
         if not wrong:
@@ -55,7 +55,7 @@ class Repeat(Record):
     Attributes
     ----------
     repeat : int
-        How often.
+        Number of repetitions.
     steps : tuple of str, ProgrammeStep or Repeat
     """
 
@@ -92,9 +92,9 @@ class Track(Record):
     length : float or str
         Correlation length of mu0 (m).
     exponent : float
-        Exponent of the power law of its spectrum beyond one over that length.
+        Exponent of the power law of its spectrum at wavenumbers above 1/length.
     origin : float or str
-        Where on the track the slider begins (m).
+        Position of the slider on the track at the beginning (m).
     """
 
     amplitude: StrictFloat
@@ -148,7 +148,7 @@ class Experiment(Point):
         Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
     folder : Path
-        Where files that steps name lie.
+        Folder of the files that steps name.
     """
 
     subject = "protocol"

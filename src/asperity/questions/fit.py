@@ -80,7 +80,7 @@ _PLUS_MINUS = re.compile(r"^\s*(.+?)\s*(?:\+-|±|\+/-)\s*([-+.\deE]+)\s*(.*?)\s*
 
 
 def _priors(value: Any) -> Any:
-    """Priors by parameter; a material is a key with the value None."""
+    """Priors by parameter; a material is a key whose value is None."""
     if value is None or isinstance(value, Mapping):
         return value or {}
     texts = (value,) if isinstance(value, str) else value
@@ -166,7 +166,7 @@ class FitOptions(Estimation):
 
     @model_validator(mode="after")
     def _order_of_a_gauge(self) -> FitOptions:
-        # Without a corner frequency there is no low-pass that could have an order.
+        # Without a corner frequency there is no low-pass.
         same = self.gauge_order == FitOptions.model_fields["gauge_order"].default
         rule = f"go with {Argument('gauge')}"
         advice = "give its corner frequency, of a recording, or leave it out"

@@ -1,4 +1,4 @@
-"""Questions as options of the command line: the name of each field, and a question as a command."""
+"""Questions as options of the command line: the option of each field, and questions as commands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--t
 
 
 def _named(record: type[Record], *others: str, without: tuple[str, ...] = ()) -> dict[str, str]:
-    """The option of each field of a record and of `others`, under the name of the field."""
+    """The option of each field of a record and of `others`, by the name of the field."""
     names = [name for name in (*record.model_fields, *others) if name not in without]
     return {name: f"--{name.replace('_', '-')}" for name in names}
 
@@ -67,7 +67,7 @@ def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[st
     fields : mapping
         Values by field; one that is None or False is left out.
     options : mapping of str to str
-        Option of each field; fields without one are left out.
+        Option of each field; a field without an option is left out.
     """
     parts = []
     for name, value in fields.items():
@@ -80,7 +80,7 @@ def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[st
             texts = (_pair(key, one) for key, one in value.items())
             parts += [f"{option} {shlex.quote(text)}" for text in texts]
         else:
-            # A number of the machine is one of several of an option, as --set K=...
+            # A number of the machine is a NAME=VALUE pair of an option, as in --set K=...
             option, _, key = option.partition(" ")
             text = _text(value, _UNITS.get(name, ""))
             parts.append(f"{option} {shlex.quote(f'{key}={text}' if key else text)}")
@@ -131,12 +131,12 @@ def number_option(
 
 
 def quoted(value: str, also: str = "") -> str:
-    """A value as a person writes it in a shell: quoted unless it is a word or a plain number."""
+    """A value as written in a shell: quoted unless it is a word or a plain number."""
     return value if all(c.isalnum() or c in "_." + also for c in value) else f'"{value}"'
 
 
 def source_options(source: Source) -> list[str]:
-    """How a file is read, as options."""
+    """The options with which a file is read."""
     parts = []
     for role, column in source.columns.items():
         option = COLUMN_OPTIONS.get(role)
@@ -154,7 +154,7 @@ def measure_options(question: Measurement, *, modulated: bool) -> list[str]:
     ----------
     question : Measurement
     modulated : bool
-        What the recording was read as: options of the other kind are left out.
+        Whether the recording was read as modulated: options of the other kind are left out.
     """
     of_steps, of_modulation = {"steps", "velocities", "holds"}, set(OF_MODULATION) - {"detrend"}
     other = of_steps if modulated else of_modulation

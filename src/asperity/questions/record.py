@@ -33,13 +33,13 @@ T = TypeVar("T")
 
 #: A number in SI, a text with its unit, or a switch.
 Given = bool | float | str
-#: Characters of a part of a field's place.
+#: Largest number of characters of each part of a field's path in messages.
 _LONGEST = 60
-#: Names that pydantic adds to the place of a field with several types, in addition to texts with
-#: brackets and the names of records.
+#: Names of types that pydantic adds to the path of a field with several types. It also adds names
+#: of records, and texts with brackets.
 _TYPES = frozenset({"bool", "float", "int", "str", "constrained-str", "nullable"})
 
-#: Rule that a value breaks, by the beginning of pydantic's name of the mistake.
+#: Words for the rule that a value breaks, by the beginning of pydantic's error type.
 _WORDS = {
     "bool_": "true or false",
     "int_": "a whole number",
@@ -64,16 +64,16 @@ _units_required: ContextVar[bool] = ContextVar("units_required", default=False)
 
 
 class Record(BaseModel):
-    """A part of a question: frozen, and without fields of other names.
+    """A part of a question: frozen; unknown fields are refused.
 
     All mistakes of a record are in one `MistakesError`.
 
     Attributes
     ----------
     subject : str
-        Name of the record in messages without a field; that of its class by default.
+        Name of the record in messages without a field; the name of its class by default.
     prefix : str, optional
-        What they put before the name of a field; the name of the class and a point by default.
+        Text before the name of a field in messages; by default the name of the class and a point.
     mistakes_error : type of MistakesError
     """
 
@@ -90,17 +90,17 @@ class Record(BaseModel):
         except ValidationError as error:
             raise self.mistakes_error(mistakes_in(error, type(self))) from None
 
-    # As pydantic's own: the mistakes of a record within another one have their place there.
+    # With this mark pydantic validates nested records itself, with the path of each mistake.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A record with some fields replaced, checked as any other."""
+        """A record with some fields replaced; the new record is validated."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self)(**{**fields, **(update or {})})
 
 
 class Question(Record):
-    """A question, which a file may ask; its mistakes are the same within another question."""
+    """A question, which can be read from a file."""
 
     subject: ClassVar[str] = "question"
     prefix: ClassVar[str | None] = ""
@@ -112,13 +112,13 @@ class Question(Record):
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
         """Read a question from a TOML file, in which every quantity carries its unit.
 
-        Files that it names lie relative to its folder.
+        Paths in the file are relative to its folder.
 
         Parameters
         ----------
         path : str or path
         **fields
-            Fields that the file may leave out.
+            Values of fields that the file does not have.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class Question(Record):
     @classmethod
     @typed
     def of_content(cls, content: Mapping[str, Any], source: str = "") -> Self:
-        """The question that the content of a file asks, with the rules of a file."""
+        """The question with the content of a file, in which every quantity carries its unit."""
         with units_required():
             try:
                 return cls(**content)
@@ -148,7 +148,7 @@ class Question(Record):
 
 @contextmanager
 def units_required() -> Iterator[None]:
-    """Refuse numbers in the place of quantities, as files do."""
+    """Refuse quantities without a unit within the block, as in files."""
     token = _units_required.set(True)
     try:
         yield
@@ -157,12 +157,12 @@ def units_required() -> Iterator[None]:
 
 
 def require_unit(value: Any, kind: str, field: str = "") -> Any:
-    """The quantity unchanged, if it has the unit that files require.
+    """The quantity unchanged.
 
     Raises
     ------
     InputError
-        For a bare number in a file.
+        If it is a number without a unit, and units are required.
     """
     for mistake in without_unit([(field, kind, value)]):
         raise mistake
@@ -170,12 +170,12 @@ def require_unit(value: Any, kind: str, field: str = "") -> Any:
 
 
 def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
-    """Mistakes about numbers without a unit, in files.
+    """Mistakes about numbers without a unit, if units are required; else none.
 
     Parameters
     ----------
     numbers : iterable of (str, str, object)
-        Place, kind of quantity and value of each.
+        Path of the field, kind of quantity and value of each.
     """
     mistakes: dict[str, InputError] = {}
     for place, kind, value in numbers if _units_required.get() else ():
@@ -214,12 +214,12 @@ def _plain_integer(value: Any) -> Any:
     return int(value) if isinstance(value, np.integer) else value
 
 
-#: A whole number; neither `true` nor a text.
+#: A whole number; booleans and texts are refused.
 Whole = Annotated[StrictInt, BeforeValidator(_plain_integer)]
 
 
 def parts_of(value: Any) -> Any:
-    """The parts of a text with commas or semicolons between them; anything else unchanged."""
+    """The parts of a text with commas or semicolons; any other value unchanged."""
     if isinstance(value, str):
         return tuple(part.strip() for part in re.split("[,;]", value) if part.strip())
     return value
@@ -237,7 +237,7 @@ def _seconds(value: Any) -> float:
 
 
 def _span(value: Any) -> tuple[float, float]:
-    """Both ends of a span; one that is left open in a text is infinite."""
+    """Both ends of a span; an end that a text leaves open is infinite."""
     if isinstance(value, str):
         start, colon, end = (part.strip() for part in value.partition(":"))
         require(colon, "", "be START:END", f"'{value}'", "write it like 10:60")
@@ -265,7 +265,7 @@ def shown(value: Any) -> str:
 
 def mistakes_in(error: ValidationError, model: type[Record]) -> list[InputError]:
     """The mistakes that pydantic reports in a record, each once."""
-    # Of a field of several types, a value may fit none.
+    # pydantic reports a value that fits none of several types once for each type.
     alike: dict[tuple[str, ...], list[InputError]] = {}
     for reported in error.errors(include_url=False):
         for mistake in _mistakes(reported, model):
@@ -274,7 +274,7 @@ def mistakes_in(error: ValidationError, model: type[Record]) -> list[InputError]
 
 
 def _any_of(alike: Sequence[InputError]) -> InputError:
-    """One mistake for those that differ only in their rules."""
+    """One mistake for several mistakes that differ only in their rules."""
     first = alike[0]
     be = "be " if first.rule.startswith("be ") else ""
     rule = be + one_of_types(mistake.rule.removeprefix("be ") for mistake in alike)
@@ -294,7 +294,7 @@ def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputEr
     prefix = f"{model.__name__}." if model.prefix is None else model.prefix
     field = prefix + ".".join(place) if place else model.subject or model.__name__
     if isinstance(raised, InputError):
-        # Types of values do not know where they are used.
+        # The validator of a type does not know the field.
         return (raised if raised.field.name else raised.about(field),)
     if reported["type"] == "missing":
         *around, name = reported["loc"]
@@ -305,7 +305,7 @@ def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputEr
     value = shown(reported["input"])
     if reported["type"] == "extra_forbidden":
         known = list(_types_at(model, reported["loc"][:-1]))
-        # A word that only one field takes says more than the likeness of names: scale = "log".
+        # If the value is a choice of a single field, as in scale = "log", that field is meant.
         word = reported["input"] if isinstance(reported["input"], str) else None
         meant = [n for n in known if word in _choices(model, reported["loc"], n)]
         near = f"did you mean '{meant[0]}'?" if len(meant) == 1 else closest(place[-1], known)
@@ -334,14 +334,14 @@ def _mistakes(reported: Mapping[str, Any], model: type[Record]) -> tuple[InputEr
 
 
 def _choices(model: type[BaseModel], place: tuple[Any, ...], name: str) -> list[Any]:
-    """Words from which a field of the table around a place is chosen."""
+    """Words that the field `name` accepts, next to the unknown field at `place`."""
     kind = _types_at(model, place[:-1])[name]
     kinds = [kind, *get_args(kind)]
     return [word for one in kinds if get_origin(one) is Literal for word in get_args(one)]
 
 
 def _types_at(model: type[BaseModel], place: tuple[Any, ...]) -> dict[str, Any]:
-    """Types of the fields of the table at a place, by their names in a file."""
+    """Types of the fields of the table at a path, by their names in a file."""
     at: Any = model
     for part in place:
         fields = at.model_fields if _is_model(at) else {}

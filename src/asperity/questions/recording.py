@@ -17,13 +17,13 @@ Column = str | int
 
 
 def _hold(value: Any) -> Any:
-    """A velocity of zero needs no unit: it is that of a hold."""
+    """A velocity; zero, the velocity in a hold, needs no unit."""
     return 0.0 if isinstance(value, str) and value.strip() == "0" else value
 
 
 #: Velocity of the drive between two steps (m/s), 0 in a hold.
 Pulling = Annotated[quantity("velocity", "not negative"), BeforeValidator(_hold)]  # type: ignore[valid-type]
-#: Velocities between steps, one more than these; a text has commas between them.
+#: Velocities between steps, one more than there are steps; a text has commas between them.
 Velocities = Annotated[tuple[Pulling, ...], BeforeValidator(parts_of)]  # type: ignore[valid-type]
 
 
@@ -99,9 +99,9 @@ def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float]
     return tuple(ordered)
 
 
-#: Fields that say how a modulated load is read; a drift is that of sliding too.
+#: Fields about the reading of a modulated load; ``detrend`` also applies to steps and holds.
 OF_MODULATION = ("frequency", "exact_frequency", "harmonics", "whole_periods", "detrend")
-#: Numbers of the machine, which only slip events need.
+#: Numbers of the machine, which are used for slip events only.
 OF_SLIPS = ("stiffness", "velocity", "mass", "normal_load")
 
 
@@ -164,7 +164,7 @@ class Measurement(Question):
     @model_validator(mode="before")
     @classmethod
     def _without_modulation(cls, fields: Any) -> Any:
-        """Steps and holds are those of a recording without modulation."""
+        """Set `modulated` to False if steps or holds are given."""
         given = isinstance(fields, Mapping) and (fields.get("steps") or fields.get("holds"))
         if given and fields.get("modulated") is None:
             return {**fields, "modulated": False}
@@ -196,7 +196,7 @@ class Measurement(Question):
             rule, got = f"go without {Argument('measure.holds')}", "both"
             advice = "write 0 as the velocity of a hold"
             require(self.holds is None, "measure.velocities", rule, got, advice)
-        # Steps and holds alone say too that there is no modulation.
+        # Steps or holds imply that there is no modulation.
         named = next((n for n in ("steps", "holds") if getattr(self, n)), "modulated")
         kind = Argument(f"measure.{named}")
         alone = self.modulated is None or not self.stick_slip

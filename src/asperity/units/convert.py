@@ -43,8 +43,8 @@ def to_si(value: Any, kind: str, name: str) -> Any:
     Returns
     -------
     float or array
-        In the SI unit of `kind`. Arrays keep their type and shape; a JAX value under
-        transformation passes through untouched, since it has no value to check yet.
+        In the SI unit of `kind`. Arrays keep their type and shape; a value traced by JAX is
+        returned unchanged, because it has no number to check.
 
     Raises
     ------
@@ -159,15 +159,15 @@ def display_unit(value: float, unit: str, digits: int = 4) -> tuple[str, int]:
     spec = next((kind for kind in KINDS.values() if kind.si == unit), None)
     if spec is None or not value or not math.isfinite(value):
         return unit, 0
-    # The last unit not larger than the value as rounded, so that 0.99999 um reads 1 um.
+    # The largest unit below the rounded value, so that 0.99999 um reads 1 um.
     size = abs(float(f"{value:.{digits}g}"))
     fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
     return fitting[-1] if fitting else spec.ladder[0]
 
 
 def is_traced(value: Any) -> bool:
-    """Whether `value` is a tracer of a JAX transformation, which has no number yet."""
-    # Looked up, not imported: a program that has not loaded JAX has no tracers.
+    """Whether `value` is a tracer of a JAX transformation, which has no number."""
+    # JAX is not imported here: a program that has not loaded it has no tracers.
     jax = sys.modules.get("jax")
     return jax is not None and isinstance(value, jax.core.Tracer)
 

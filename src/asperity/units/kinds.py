@@ -77,7 +77,7 @@ def with_article(name: str) -> str:
 
 
 def require_text(value: object, name: str) -> None:
-    """Refuse what is no text; `asperity.parameters.arguments.typed` stands above this package."""
+    """Refuse any value but a text; this room cannot import `typed` of `asperity.parameters`."""
     if not isinstance(value, str):
         raise InputTypeError(name, "be a text", shown(value))
 

@@ -1,7 +1,7 @@
-"""Unit text to its SI value, as an exact decimal.
+"""The SI value of a unit, as an exact decimal.
 
-The spellings of `asperity.units.kinds` are looked up directly; any other is read by pint, which
-costs a third of a second to load and is therefore loaded only then.
+The spellings of `asperity.units.kinds` are looked up directly. Any other spelling is read by pint,
+which takes a third of a second to load and is therefore loaded only then.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ EXACT = Context(prec=60)
 _UNIT = re.compile(r"[A-Za-zΩµμ%°][A-Za-z0-9Ωµμ%°²³⁻¹·_ */^.()+-]*|1 ?/[A-Za-z0-9_ */^.()+-]+")
 _LONGEST_UNIT = 60
 
-#: Exponents of the base units of the SI, in alphabetic order; those that are zero are left out.
+#: Exponents of the SI base units in alphabetic order, without zeros.
 Dimension = tuple[tuple[str, float], ...]
 
-#: Several kinds may have the same dimension; the first one is used.
+#: Kinds in the order of search by dimension: several kinds may have the same dimension.
 _KINDS = (
     "dimensionless", "force", "pressure", "length", "time", "velocity", "frequency", "stiffness",
     "damping", "mass", "area", "viscosity", "temperature",
@@ -33,7 +33,7 @@ _KINDS = (
 
 
 def normalised(unit: str) -> str:
-    """One spelling of micro (two code points look alike) and of ``/um``, and single blanks."""
+    """The unit with ``u`` for each code point of micro, ``1/um`` for ``/um``, single blanks."""
     text = " ".join(unit.replace("µ", "u").replace("μ", "u").split())
     return f"1/{text[1:].lstrip()}" if text.startswith("/") else text
 
@@ -45,7 +45,7 @@ def _known(kind: str) -> Mapping[str, Decimal]:
 
 
 def unit_factor(unit: str, kind: str, name: str, text: str) -> Decimal:
-    """SI value of one `unit`; `name` and `text` only serve the message."""
+    """SI value of one `unit`; `name` and `text` are for messages only."""
     known = _known(kind).get(unit)
     if known is not None:
         return known
@@ -126,7 +126,7 @@ def _registry() -> Any:
 
 
 def dimension_of(exponents: Mapping[str, float]) -> Dimension:
-    """A dimension of exponents, those that are zero left out."""
+    """The dimension with these exponents."""
     return tuple(sorted((name, float(n)) for name, n in exponents.items() if n))
 
 
@@ -160,7 +160,7 @@ def base_units(unit: str) -> tuple[float, Dimension]:
 
 
 def kind_of_dimension(dimension: Dimension) -> str | None:
-    """Key of `asperity.units.KINDS` for a dimension, None if none has it."""
+    """Key of `asperity.units.KINDS` with this dimension; None if there is none."""
     return next((kind for kind in _KINDS if base_units(KINDS[kind].si)[1] == dimension), None)
 
 
