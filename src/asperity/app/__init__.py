@@ -1,5 +1,5 @@
-"""The browser page: a server on this machine, and a page that fetches nothing from outside.
+"""The browser page: a server on this machine, and a page that loads nothing from elsewhere.
 
-Nothing here solves anything: a request becomes a call of the other rooms, and its result becomes
-JSON. A tab of the page is one module in `asperity.app.api` and one in ``static/tabs``.
+This room solves nothing: it turns a request into a call of another room, and the result into JSON.
+A tab of the page is a module in `asperity.app.api` and a module in ``static/tabs``.
 """

@@ -23,7 +23,7 @@ class Page:
     Attributes
     ----------
     address : str
-        Which any browser of this machine can open.
+        Address for any browser of this machine.
     height : int
         Height of the frame (px).
     """
@@ -59,7 +59,7 @@ def explore(
     Parameters
     ----------
     slider : Slider, optional
-        Where the sliders of the page start; its law must be a registered one.
+        Start values of the page's sliders; its law must be registered.
     velocity, epsilon, frequency : float or str, optional
         As for `asperity.periodic_response`.
     height : int
@@ -111,7 +111,7 @@ def explore(
 
 @cache
 def _server() -> str:
-    """The address of this process' server, started when it is first needed."""
+    """The address of the server of this process, which starts at the first call."""
     from asperity.app.server import serve_in_background
 
     return serve_in_background()

@@ -1,6 +1,6 @@
-"""The server: listens on this machine only, and ends in order.
+"""The server of the page, which listens on this machine only.
 
-The packages of the extra ``app``, which the page needs beyond the core, are checked first.
+The packages of the extra ``app`` are checked first.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from asperity.parameters.arguments import shown
 
 
 def require_extra() -> None:
-    """Check that the packages of the extra are installed.
+    """Refuse to serve the page if a package of the extra ``app`` is not installed.
 
     Raises
     ------
     InputError
-        If one is not.
     """
     for name in ("starlette", "uvicorn", "latex2mathml"):
         try:
@@ -48,7 +47,7 @@ def serve(
     Parameters
     ----------
     port : int
-        0 for any that is free.
+        0 for any free port.
     laws : sequence of str
         Laws outside the package, as `asperity.laws.known_law` takes them.
     started : callable, optional
@@ -68,8 +67,7 @@ def serve(
     server = server_on(listening, laws=laws)
     if started is not None:
         _call_when_started(server, started, address_of(listening))
-    # uvicorn ends in order on both signals, and raises them again when it is done: an end by
-    # signal is no failure.
+    # uvicorn shuts down on both signals, and then raises them again, which would be an error here.
     earlier = {s: signal.signal(s, signal.SIG_IGN) for s in (signal.SIGTERM, signal.SIGINT)}
     try:
         server.run(sockets=[listening])
@@ -101,7 +99,7 @@ def listen(port: int) -> socket.socket:
     Raises
     ------
     InputError
-        If the port is no port or is taken.
+        If the number is no port, or the port is in use.
     """
     holds, advice = 0 <= port < 65536, "leave it out for 8765"
     require(holds, "--port", "be from 0 to 65535", shown(port), advice)
@@ -128,7 +126,7 @@ def server_on(
     prepare: bool = True,
     laws: Sequence[str] = (),
 ) -> Any:
-    """A uvicorn server for a socket; parameters as of `asperity.app.application.build`."""
+    """A uvicorn server for a socket; parameters as for `asperity.app.application.build`."""
     import uvicorn
 
     from asperity.app.application import build

@@ -1,4 +1,4 @@
-"""Labels of the page for the arguments that sentences of the library name."""
+"""Names of the page for arguments in messages of the library: their labels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from asperity.errors import Argument, symbol
 
-#: Label of the page of each field.
+#: Label of each field on the page.
 LABELS: Mapping[str, str] = {
     "window": "Window",
     "slice.start and slice.end": "Window",
@@ -55,7 +55,7 @@ LABELS: Mapping[str, str] = {
 }
 #: Functions of the library whose arguments are fields of the Data tab.
 _OF_DATA = ("measure", "read", "lock_in", "stress_to_force")
-#: What a channel is, by its role.
+#: Quantity of a channel by its role.
 ROLES: Mapping[str, str] = {
     "time": "time",
     "W": "normal load",
@@ -67,8 +67,8 @@ ROLES: Mapping[str, str] = {
 
 
 def in_labels(argument: Argument) -> str:
-    """The words of the page: ``Normal load``, ``Unit of Fn: N``."""
-    # A part of a list has the label of the list.
+    """An argument as the page labels it: ``Normal load``, ``Unit of Fn: N``."""
+    # An item of a list has the label of the list.
     name, key, value = argument.whole, argument.key, argument.value
     head, _, field = name.partition(".")
     if head in ("data", "runs") and field:

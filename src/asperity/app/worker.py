@@ -1,4 +1,4 @@
-"""The process that runs jobs: a request is one line of JSON, each message of a job another line.
+"""The process that runs jobs: a request is a line of JSON, and so is each message of a job.
 
 Started as ``python -m asperity.app.worker MODULE [LAW...]``: it imports the module and
 registers the laws. A request is ``{"job": "module:function", "argument": ..., "limits": ...}``. The
@@ -42,7 +42,7 @@ def set_limits(limits: Mapping[str, int]) -> None:
 
 @contextlib.contextmanager
 def limited(limits: Mapping[str, int]) -> Iterator[None]:
-    """`set_limits` for a part of the work."""
+    """`set_limits` within a block."""
     ends = _limit_values(limits)
     earlier = {kind: resource.getrlimit(kind) for kind in ends}
     for kind, end in ends.items():
@@ -89,13 +89,13 @@ Report = Callable[..., None]
 class Cancelled(BaseException):
     """The client no longer waits for the result.
 
-    Not an `Exception`, so that no handler in between catches it.
+    It is no `Exception`, so that no other handler catches it.
     """
 
 
 def main() -> None:
     """Run jobs until the input ends."""
-    # Output of libraries must not mix with the messages.
+    # Output of libraries goes to stderr, because stdout has the messages.
     channel = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)
     with contextlib.suppress(AttributeError, OSError):

@@ -1,5 +1,5 @@
 """The command line: a thin shell without physics and without defaults.
 
-Data go to stdout, talk to stderr. Exit code 0: done; 1: done, but some points failed and say why;
-2: bad input; 130: interrupted.
+Results go to stdout, messages to stderr. Exit code 0: done; 1: done, but some points have a reason
+in place of numbers; 2: bad input; 130: interrupted.
 """

@@ -83,7 +83,7 @@ def air(
     hertz = [number(text, "--frequency", "frequency", "positive") for text in frequencies]
     layer = None
     if not vacuum:
-        # The layer must be complete, though the value of what is sought is not used.
+        # The layer must be complete, although the value of the sought parameter is not used.
         P0, h0, R, eta = (numbers.get(name, 1.0) for name in ("P0", "h0", "R", "eta"))
         layer = AirLayer(P0=P0, h0=h0, eta=eta, R=R)
     if inverse is None or layer is None:
@@ -95,7 +95,7 @@ def air(
 def _numbers(
     given: dict[str, str], material: Material | None, vacuum: bool, unknown: str
 ) -> dict[str, float]:
-    """SI values of the parameters; the one that is sought need not be known."""
+    """SI values of the parameters; the sought parameter need not be known."""
     from asperity.air.layer import LAYER
     from asperity.air.normal_contact import LAMBDA_Z
     from asperity.parameters import MACHINE

@@ -67,7 +67,7 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
 
 
 def _sections(result: Design) -> list[Section]:
-    """A design as a person reads it."""
+    """A design as sections of text."""
     from asperity.outputs.tables import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si

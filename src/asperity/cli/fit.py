@@ -66,7 +66,7 @@ More than 20,000 samples are compared as means over blocks (--fit-rate).
 
 #: Options of the sampling, with their defaults.
 _SAMPLING = {"chains": 4, "draws": 1000, "seed": 0}
-#: Options that are fields of the question: what is given, as of `field_option`.
+#: Options that are fields of the question, with their metavar as for `field_option`.
 _FIELDS = {
     "free": "NAMES",
     "material": "NAME",
@@ -88,7 +88,7 @@ def _field(name: str) -> Any:
     return field_option("asperity.questions.fit:Fit", name, _FIELDS[name])
 
 
-#: Options of the data and of what is estimated, what is needed first before the others.
+#: Options of data and estimation: the most used ones, then the others.
 _FIRST = (
     option("--window", "START:END", "Seconds of a recording to fit."),
     _field("free"),
@@ -120,7 +120,7 @@ def _question_options(*further: Decorator) -> Decorator:
     Parameters
     ----------
     *further : click options
-        Options of this command alone, after the options that are needed first.
+        Options of this command alone.
     """
 
     def with_options(command: Command) -> Command:
@@ -135,6 +135,8 @@ def _question_options(*further: Decorator) -> Decorator:
             window: str | None,
             steps: str | None,
             velocities: str | None,
+            report: Path | None,
+            output: Output,
             **others: Any,
         ) -> Any:
             from asperity.questions.options import FIT_OPTIONS
@@ -157,7 +159,10 @@ def _question_options(*further: Decorator) -> Decorator:
                 }
                 if "free" in fields:
                     fields["free"] = ",".join(map(parameter_name, fields["free"].split(",")))
-                return command(fields=fields, **others)
+                if report is not None:
+                    require_folder(report, "--report")
+                output.require_picture(*data)
+                return command(fields=fields, report=report, output=output, **others)
 
         first = (
             click.argument("data", nargs=-1, required=True, type=Path),
@@ -214,9 +219,6 @@ def fit(
     one, advice = len(laws) < 2 and "all" not in laws, "compare several: asperity compare"
     require(one, "--law", "be one law for a fit", ",".join(laws), advice)
     _check_sampling(posterior, sampling, out)
-    if report is not None:
-        require_folder(report, "--report")
-    output.require_picture(*(d["file"] for d in fields["data"]))
     question = Fit(law=laws[0] if laws else None, **fields)
     with bar("window" if question.windows else "step", "fit", raising=False) as update:
         answer = answer_fit(question, progress=update)
@@ -251,7 +253,7 @@ def _say_written(report: Path) -> None:
 
 
 def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None) -> None:
-    """Refuse what cannot be sampled or written before anything is computed."""
+    """Refuse impossible sampling options before anything is computed."""
     if not posterior:
         require(out is None, "--out", "come with --posterior", "it alone", "add --posterior")
         for name, usual in _SAMPLING.items():
@@ -317,9 +319,6 @@ def compare(
         )
         advice = "compare with --window START:END, one at a time"
         raise InputError("--windows", "go with asperity fit", got, advice)
-    if report is not None:
-        require_folder(report, "--report")
-    output.require_picture(*(d["file"] for d in fields["data"]))
     fields["laws"] = laws or ("all",)
     question = Comparison(**fields)
     with bar("%", raising=False) as update:

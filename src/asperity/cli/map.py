@@ -35,7 +35,7 @@ bifurcation and the frequency of its mode.
 """
 
 
-#: What a picture shows by default.
+#: Quantity of the picture by default.
 _SHOWN = "growth_rate"
 
 
@@ -86,7 +86,7 @@ def map(
     output_files({"--out": out, "--plot": output.plot})
     require_netcdf(out, "--out", "map.nc")
     along_x, along_y = _axis(x, log_x, "--x"), _axis(y, log_y, "--y")
-    # A material's number gives way to an axis; one that was given for this map does not.
+    # An axis replaces a number of the material; a number given by an option stays, and is refused.
     axes = (along_x.name, along_y.name)
     numbers = {
         name: number
@@ -126,7 +126,7 @@ def map(
 
 
 def _axis(text: str, log: bool, option: str) -> Axis:
-    """The axis of an option, which messages name."""
+    """The axis that an option describes; messages name the option."""
     from asperity.study.map import Axis
 
     try:

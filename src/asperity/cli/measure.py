@@ -61,7 +61,7 @@ class FileRows:
     conditions: dict[Path, dict[str, Any]] = field(default_factory=dict)
 
     def __call__(self, path: Path) -> Rows:
-        """Rows of a file; one row with the reason if it cannot be measured."""
+        """Rows of a file; a single row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import MACHINE_FIELDS, failed_row
         from asperity.measurement.from_file import measured_parts
         from asperity.measurement.report import measured_rows
@@ -76,7 +76,7 @@ class FileRows:
                 return [{**known, **row} for row in measured_rows(path, result)]
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
-            except Exception as error:  # one damaged file must not cost the others
+            except Exception as error:  # a damaged file must not stop the campaign
                 reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
                 return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
 
@@ -87,7 +87,7 @@ class FileRows:
     def inputs(self) -> dict[str, Any]:
         """Everything except the files that rows depend on, as JSON values.
 
-        Of a reduction file its contents: a campaign is not resumed with another one.
+        The contents of a reduction file are included: a changed file prevents a resumption.
 
         Raises
         ------
@@ -383,7 +383,7 @@ def _cycles(
             return campaign
         columns = np.array([machines[k] for k in modelled]).T[:, :, None]
         machine = dict(zip(("K", "W0", "M"), columns, strict=True))
-        # The ends lie a little beyond the recordings.
+        # The curves extend a little beyond the recordings.
         speeds = np.geomspace(V.min() / 1.2, V.max() * 1.2, _POINTS)
         model = stick_slip_response(slider_from(chosen, {**values, **machine}), velocity=speeds)
         return replace(campaign, model=model, modelled=tuple(modelled))

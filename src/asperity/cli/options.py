@@ -26,7 +26,7 @@ Decorator = Callable[[Command], Command]
 
 
 def stacked(*decorators: Decorator) -> Decorator:
-    """Several decorators as one, the first of them outermost."""
+    """Several decorators as one; the first is the outermost."""
     return lambda command: reduce(lambda inner, add: add(inner), reversed(decorators), command)
 
 
@@ -36,7 +36,7 @@ class Count(click.ParamType):
     Parameters
     ----------
     least : int, optional
-        Without it the limits are those of the question or the function that takes the number.
+        Smallest number; without it the question or function that takes the number checks it.
     """
 
     name = "N"
@@ -45,7 +45,7 @@ class Count(click.ParamType):
         self.least = least
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: Any) -> int:
-        """The number that a text is."""
+        """The number from its text."""
         option = "" if param is None else param.opts[0]
         try:
             count = int(value)
@@ -55,17 +55,17 @@ class Count(click.ParamType):
 
 
 class OnceOption(click.Option):
-    """An option with a value that is given once; click alone would take the last of several."""
+    """An option that may be given once only; click alone would take the last of several."""
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
-        """Let the parser keep every value; a switch has none."""
+        """Let the parser keep every value; a switch has no value."""
         if self.is_flag:
             super().add_to_parser(parser, ctx)
             return
         parser.add_option(obj=self, opts=self.opts, dest=self.name, action="append", nargs=1)
 
     def consume_value(self, ctx: click.Context, opts: Any) -> Any:
-        """The one value, and where it is from."""
+        """The value, and its source."""
         values = opts.get(self.name)
         if isinstance(values, list):
             got, option = " and ".join(f"'{value}'" for value in values), self.opts[0]
@@ -75,9 +75,9 @@ class OnceOption(click.Option):
 
 
 class FieldOption(OnceOption):
-    """An option with the text, the default and the choices of a field of a question in its help.
+    """An option whose help has the docstring, the default and the choices of a field of a question.
 
-    The record is imported for the help only; without the option the default of the record applies.
+    The record is imported for the help only. Without the option the default of the record applies.
     """
 
     def __init__(self, *names: Any, record: str = "", **look: Any) -> None:
@@ -105,21 +105,21 @@ def option(names: str, metavar: str | None, about: str, kind: Any = None, **more
     Parameters
     ----------
     names : str
-        Its names, and that of the argument of the command where it is another one.
+        Names of the option, and the name of the command's argument if it differs.
     metavar : str or None
-        What is given.
+        Placeholder of the value in the help.
     about : str
-        For the help.
+        Help text.
     kind : type, optional
     **more
-        As in `click.option`.
+        As for `click.option`.
     """
     more = {"cls": click.Option if more.get("multiple") else OnceOption, **more}
     return click.option(*names.split(), metavar=metavar, help=about, type=kind, **more)
 
 
 def switch(names: str, about: str) -> Decorator:
-    """An option without a value; parameters as of `option`."""
+    """An option without a value; parameters as for `option`."""
     return click.option(*names.split(), is_flag=True, help=about)
 
 
@@ -129,16 +129,16 @@ def field_option(record: str, field: str, metavar: str | None = None, short: str
     Parameters
     ----------
     record : str
-        Its place, as ``module:Name``.
+        The record, as ``module:Name``.
     field : str
     metavar : str, optional
-        What is given: empty for the choices of the field, "N" for a whole number; None for a
-        switch.
+        Placeholder of the value in the help: "N" for a whole number, empty for the choices of the
+        field; None for a switch.
     short : str
         A second name of the option.
     """
     names = f"{short} --{field.replace('_', '-')} {field}"
-    # With is_flag=False Click takes an option for one whose value may be left out.
+    # With is_flag=False Click allows to leave out the value.
     look: dict[str, Any] = {"is_flag": True} if metavar is None else {}
     kind = Count() if metavar == "N" else None
     return option(names, metavar, "", kind, cls=FieldOption, record=record, **look)
@@ -156,7 +156,7 @@ def material_option() -> Decorator:
 def set_option(
     example: str, meaning: str = "A number with its unit, instead of the material's"
 ) -> Decorator:
-    """``--set``, to be repeated."""
+    """``--set``, which may be repeated."""
     about = f"{meaning}; repeatable. Example: {example}"
     return option("--set settings", "NAME=VALUE", about, multiple=True)
 
@@ -192,7 +192,7 @@ _OUTPUT = (
 
 
 def _chosen(context: click.Context, names: str) -> str:
-    """The set of names, in which sentences are written too."""
+    """Use the chosen set of names in messages too."""
     if names != NAMES[0]:
         from asperity.laws.registry import symbols_of
 
@@ -230,7 +230,7 @@ def law_option(
         "Friction law, such as elasto-plastic, or a law of yours as module:Name or file.py:Name."
     ),
 ) -> Decorator:
-    """``--law``; a law given by its place is imported and registered, and its name passed on."""
+    """``--law``; a law given as module:Name or file.py:Name is imported and registered."""
     return option(
         "--law",
         "NAME",
@@ -240,7 +240,7 @@ def law_option(
 
 
 def law_options(command: Command) -> Command:
-    """``--law``, which may be repeated, and ``--laws``, with commas between names: `laws`."""
+    """``--law``, which may be repeated, and ``--laws`` with commas; the command gets `laws`."""
 
     def names(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> Any:
         parts = (part.strip() for text in texts for part in text.split(","))
@@ -257,7 +257,7 @@ def law_options(command: Command) -> Command:
 
 
 def known_place(text: str) -> str:
-    """Name of a law; one given by its place is imported and registered."""
+    """Name of a law; a law given as module:Name or file.py:Name is imported and registered."""
     if ":" not in text:
         return text
     from asperity.laws import known_law
@@ -267,7 +267,7 @@ def known_place(text: str) -> str:
 
 
 def _option(parameter: Parameter) -> Decorator:
-    """The option of a parameter, which the command gets under the name of its argument."""
+    """The option of a parameter; the command gets its value as the parameter's `argument`."""
     names = " ".join((*parameter.options, parameter.argument))
     meaning = parameter.meaning[0].upper() + parameter.meaning[1:]
     if parameter.rule == "switch":
@@ -287,14 +287,14 @@ def pairs_of(
     like : str
         An example of a text.
     form : str
-        What messages call the value.
+        Name of the value in messages.
     at_last : bool
-        Whether a name may have an ``=``: the last one splits a text.
+        Whether a name may have an ``=``: a text is then split at its last ``=``.
 
     Raises
     ------
     InputError
-        If one has no name or value, or a name is given twice.
+        If a text has no name or no value, or a name is given twice.
     """
     pairs: dict[str, str] = {}
     for text in texts:
@@ -307,7 +307,7 @@ def pairs_of(
 
 
 def settings_of(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
-    """Parameters by their one names, from texts as of `pairs_of`."""
+    """Values by the name of their parameter, from texts as in `pairs_of`."""
     settings: dict[str, str] = {}
     for name, value in pairs_of(texts, option, f'"{symbol("K")}=0.2 N/um"').items():
         add_setting(settings, parameter_name(name), value, option)
@@ -315,7 +315,7 @@ def settings_of(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
 
 
 def parameter_name(name: str) -> str:
-    """The one name of a parameter that the user calls as ``--names`` says."""
+    """The name of a parameter from its name in the set that ``--names`` chooses."""
     context = click.get_current_context(silent=True)
     if context is None or context.meta.get(CHOSEN_NAMES, NAMES[0]) == NAMES[0]:
         return name
@@ -327,7 +327,7 @@ def parameter_name(name: str) -> str:
 
 
 def add_setting(settings: dict[str, str], name: str, value: str | None, option: str = "") -> None:
-    """Add a value that another option gives, if it does; twice the same name is an error."""
+    """Add a value unless it is None; a name that has a value already is an error."""
     if value is None:
         return
     field, twice = f"{option} {symbol(name)}".strip(), f"'{settings.get(name)}' and '{value}'"
@@ -336,7 +336,7 @@ def add_setting(settings: dict[str, str], name: str, value: str | None, option: 
 
 
 def point_of(law: str | None, material: str | None, given: dict[str, str]) -> Point:
-    """The operating point of options."""
+    """The operating point that options describe."""
     from asperity.questions.point import Point
 
     return Point(law=law or "", material=material or "", parameters=given)

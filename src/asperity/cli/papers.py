@@ -1,4 +1,4 @@
-"""``asperity recipe`` and ``asperity reproduce``: a paper's procedure, and all of its results."""
+"""``asperity recipe`` and ``asperity reproduce``: a paper's procedure, and all its results."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ the first oscillations, frequency_err. They give A, B and D0.
 """
 
 
-#: Numbers of readings that all rows may share.
+#: Numbers that may be the same for all rows of the readings.
 _OF_ROWS = ("V", "epsilon", "frequency")
 
 

@@ -1,4 +1,4 @@
-"""Progress of long work on stderr, a bar on a terminal or lines in a log, and Ctrl-C in it."""
+"""Progress on stderr, as a bar on a terminal or as lines in a log, and interruption by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from typing import Any
 
 import click
 
-#: Seconds before a bar shows itself, between its updates, and between lines of a log.
+#: Seconds before a bar appears, between its updates, and between lines of a log.
 _SILENT, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
 
 
 @contextmanager
 def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callable[..., None]]:
-    """Progress, to be called with the work done, all work, and what is being worked on.
+    """A function of the work done, all work, and a label, which shows progress.
 
-    A short job prints nothing. Within the block, Ctrl-C raises, or ends the process at once where
-    there are no files to put in order (`raising` False).
+    A short job prints nothing. Within the block, Ctrl-C raises `KeyboardInterrupt`.
 
     Parameters
     ----------
     unit : str
         Unit of the work.
     doing : str
-        What is done, where calls do not say it.
+        Label of calls without a label.
+    raising : bool
+        False for work without files to clean up: Ctrl-C then ends the process at once.
     """
     shown = _on_terminal(unit) if sys.stderr.isatty() else _in_log(unit)
     with shown as show, interruptible() if raising else nullcontext(lambda: None) as check:
@@ -56,7 +57,7 @@ def _on_terminal(unit: str) -> Iterator[Callable[[int, int, str], None]]:
 
         def show(done: int, total: int, label: str) -> None:
             if shown.total is None:
-                # The work of an earlier run does not count for the speed.
+                # The work of an earlier run does not count in the speed.
                 shown.initial = shown.n = done
             shown.total = total
             if label:
@@ -85,7 +86,7 @@ def _in_log(unit: str) -> Iterator[Callable[[int, int, str], None]]:
 
 @contextmanager
 def waiting(doing: str) -> Iterator[None]:
-    """Say on a terminal what is done, where it takes long and has no parts to count."""
+    """Print on a terminal what is done, if it takes long; for work without parts to count."""
     timer = threading.Timer(_SILENT, click.echo, [f"asperity: {doing} ..."], {"err": True})
     if sys.stderr.isatty():
         timer.start()
@@ -103,10 +104,10 @@ Handler = Callable[[int, Any], Any]
 
 @contextmanager
 def ending_at_once() -> Iterator[None]:
-    """Leave the process on Ctrl-C without unwinding.
+    """End the process on Ctrl-C without unwinding the stack.
 
-    Python's default, an exception between any two steps, crashes compiled modules that are just
-    being loaded, and JAX's callbacks swallow it.
+    By default Python raises an exception between any two instructions: it crashes compiled modules
+    during their import, and callbacks of JAX discard it.
     """
     with _handling(_leave):
         yield
@@ -114,12 +115,12 @@ def ending_at_once() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
-    """Raise `KeyboardInterrupt` on Ctrl-C, for work that has files to put in order.
+    """Raise `KeyboardInterrupt` on Ctrl-C, for work that has files to clean up.
 
     Yields
     ------
     callable
-        To be called now and then: raises again if the first exception was swallowed.
+        Raises again if other code has discarded the first exception; to be called repeatedly.
     """
     pressed = False
 
@@ -137,7 +138,7 @@ def interruptible() -> Iterator[Callable[[], None]]:
 
 
 def _leave(signum: int, frame: Any) -> None:
-    # Not through sys.stderr: the interrupted step may be in the middle of writing to it.
+    # The interrupted code may be writing to sys.stderr.
     os.write(2, f"\nasperity: {MESSAGE}\n".encode())
     os._exit(INTERRUPTED)
 

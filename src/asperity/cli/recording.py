@@ -1,4 +1,4 @@
-"""Options on how a recording is read: columns, units, channels; and lists of times."""
+"""Options for reading a recording: columns, units, channels; and lists of times."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Any
 from asperity.cli.options import Command, add_setting, option, pairs_of, stacked
 from asperity.errors import InputError, require
 
-#: Where no channel has the motion of the drive.
+#: Velocities for recordings without a channel of the motion of the drive.
 velocities_option = option(
     "--velocities", "VALUES", 'Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.'
 )
 
 
 def listed_times(text: str, option: str) -> list[str]:
-    """Parts of a list like ``12.5,60`` or ``100:110,200:300``, or of a file with one a line.
+    """Items of a list like ``12.5,60`` or ``100:110,200:300``, or lines of a file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or there is no part.
+        If the file cannot be read, or there is no item.
     """
     path, like = Path(text), "100:110,200:300" if option == "--holds" else "12.5,60"
     # Times begin with a digit, a sign, a point, or the colon of an open span.
@@ -72,12 +72,12 @@ _OPTIONS = (
     option("--delimiter", "SIGN", "Of a text: a character, tab or blank."),
     option("--decimal", "SIGN", "Decimal mark of a text: . or ,"),
 )
-#: Options that are fields of the source under the same name.
+#: Options with the name of their field of the source.
 _FIELDS = ("rate", "group", "area", "recipe", "format", "delimiter", "decimal")
 
 
 def source_options(command: Command) -> Command:
-    """Options that say how a recording is read; the command is called with `source`."""
+    """Options for reading a recording; the command gets `source`."""
 
     @wraps(command)
     def gathered(
@@ -95,7 +95,7 @@ def source_options(command: Command) -> Command:
             add_setting(roles, role, others.pop(chosen.lstrip("-")), "--column")
         like = '"force = 2.4 N/V * Gauge"'
         source = Source(
-            # Columns of files without headers are chosen by number, in the digits 0 to 9.
+            # Columns of files without a heading are chosen by number.
             columns={
                 role: int(name) if re.fullmatch(r"[0-9]{1,9}", name) else name
                 for role, name in roles.items()

@@ -1,4 +1,4 @@
-"""Answers as they leave: JSON for programs, sections for people, pictures."""
+"""The output of a command: JSON, or sections as text, and a picture."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
     from asperity.outputs.tables import Section
 
-#: Where click's context keeps the set of names that the user has chosen.
+#: Key of the chosen set of names in click's context.
 CHOSEN_NAMES = "asperity.names"
 
 
 @dataclass(frozen=True)
 class Output:
-    """How a command answers: its options ``--json``, ``--names`` and ``--plot``.
+    """The options of a command on its output: ``--json``, ``--names`` and ``--plot``.
 
     Attributes
     ----------
@@ -45,17 +45,17 @@ class Output:
     ) -> None:
         """Print the record as JSON, or the sections as text.
 
-        Keys of JSON keep the one name of each parameter; ``names`` among them says what another
-        set of names calls it. A number that is not finite becomes null.
+        Keys of JSON are the names of `asperity.parameters`; with another set of names, the key
+        ``names`` maps them to it. A number that is not finite becomes null.
 
         Parameters
         ----------
         record, sections : callable
-            Only the one that is printed is called.
+            Only the printed one is called.
         law : str
-            Whose parameters have names too.
+            Law whose parameters are renamed, in addition to those that several laws share.
         indent : str
-            Before the rows of a table.
+            Text before each row of a table.
         """
         from asperity.laws import get_law
         from asperity.outputs import json
@@ -81,14 +81,14 @@ class Output:
             output_files({"--plot": self.plot}, inputs={f"the file {p}": p for p in inputs})
 
     def draw(self, draw: Callable[[], Figure]) -> None:
-        """Draw a figure where ``--plot`` was given."""
+        """Draw a figure if ``--plot`` is given."""
         if self.plot is not None:
             save_figure(draw, self.plot, self.names)
             say(f"the figure is {self.plot}")
 
 
 def say(*sentences: object) -> None:
-    """Sentences on stderr, a line each, without those that are empty."""
+    """Print sentences on stderr, a line each; those that are empty are left out."""
     for sentence in filter(None, sentences):
         click.echo(f"asperity: {sentence}", err=True)
 
@@ -105,7 +105,7 @@ def save_figure(
     names : {"friction", "geophysics"}
         Names of parameters in its labels.
     option : str
-        That names the path, for messages.
+        Option of the path, for messages.
     """
     from asperity.figures.style import style
     from asperity.outputs import written_file

@@ -46,7 +46,7 @@ velocity over its mean), tilt (of the exciter). Angles are in rad;
 --set "tilt=5 deg" is understood too.
 """
 
-#: Outputs that the text shows.
+#: Outputs in the text.
 _SHOWN = (
     *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
     *("floquet_max", "stable", "mode", "mode_frequency", "growth_rate"),
@@ -213,7 +213,7 @@ def _sections(
     rows = []
     for name, value, unit, meaning in outputs:
         if value == "" or (isinstance(value, float) and not math.isfinite(value)):
-            continue  # of a law without states, which has no modes
+            continue  # a law without states has no modes
         text = f"{value:.9g} {unit}".removesuffix(" 1") if isinstance(value, float) else str(value)
         yes_or_no = name in ("stable", "steady")
         rows.append((name, ("no", "yes")[int(value)] if yes_or_no else text, symbol(meaning)))

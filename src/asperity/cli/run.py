@@ -87,7 +87,7 @@ def run(
         inputs={"protocol": protocol},
     )
     require_netcdf(out, "--out", "run.nc")
-    with naming(symbols=str):  # a file has the names of friction
+    with naming(symbols=str):  # protocols have the names of friction
         wanted = load_protocol(protocol)
     if law is not None and wanted.law != law:
         got = f"'{law}' and law = '{wanted.law}'"
@@ -125,7 +125,7 @@ def run(
 
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
-    """On Ctrl-C, say that the motion is finished and which other files are."""
+    """On Ctrl-C, name the files that are complete: the motion and those written after it."""
     from asperity.cli.progress import interruptible
 
     try:
@@ -159,7 +159,7 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
         size += 8 * _TEXT_BYTES * wanted.rows
         require_disk(size, text.resolve().parent, "--csv", rows, way_out)
     if record is not None:
-        # A recording is made of whole signals: those of the motion and those of its channels.
+        # Signals of the motion and of the recording's channels are in memory as a whole.
         require_memory(2 * wanted.rows * wanted.row_bytes, "--record", rows, way_out)
     require_disk(size, out.resolve().parent, "solver.sampling", rows,
                  "lower the rate, shorten the steps or write to another disk")  # fmt: skip

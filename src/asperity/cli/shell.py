@@ -17,7 +17,7 @@ from asperity.cli.words import in_options
 from asperity.errors import InputError, naming, printable, require_known
 
 _BAD_INPUT = 2
-#: What a missing option could be, by its metavar, where its help has no example.
+#: Example of a missing option by its metavar, if its help has no example.
 _EXAMPLES = {
     "CSV": "table.csv",
     "NC": "motion.nc",
@@ -27,7 +27,7 @@ _EXAMPLES = {
     "AXIS": "V",
 }
 _EXAMPLE_IN_HELP = re.compile(r'like ("[^"]+")')
-#: What an argument could be, by its name.
+#: Example of a missing argument by its name.
 _ARGUMENTS = {
     "data": "recording.csv",
     "paper": "bureau2000",
@@ -40,10 +40,10 @@ _ARGUMENTS = {
 
 
 class Shell(click.Group):
-    """Commands by the module that defines each, under its name.
+    """A group of commands, each imported from its module when it is called.
 
-    A command returns its exit code, None for 0. `InputError` and click's errors become one
-    line on stderr and exit code 2, Ctrl-C one line and 130.
+    A command returns its exit code, None for 0. `InputError` and click's errors become one line on
+    stderr and exit code 2, Ctrl-C one line and 130.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Shell(click.Group):
         return sorted(self.modules)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
-        """Import a command; an unknown name is answered with the nearest one."""
+        """Import a command; the error for an unknown name has the nearest one."""
         require_known(cmd_name, self.modules, "command", "be a known one")
         command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
         return command
@@ -73,9 +73,9 @@ class Shell(click.Group):
         standalone_mode: bool = False,
         **extra: Any,
     ) -> NoReturn:
-        """Run, and leave with the exit code.
+        """Run a command, and end with its exit code.
 
-        Click's standalone mode is not used: its messages take several lines.
+        Click's standalone mode is not used, because its messages have several lines.
         """
         with ending_at_once(), _warnings_as_sentences(), naming(in_options):
             try:
@@ -90,7 +90,7 @@ class Shell(click.Group):
 
 
 def _in_our_words(error: click.ClickException) -> InputError:
-    """Click's message about options and arguments as one of our sentences."""
+    """Click's message about options and arguments as an `InputError`."""
     command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else ""
     if isinstance(error, click.MissingParameter) and error.param is not None:
         name, metavar = error.param.opts[-1], error.param.metavar or ""
@@ -135,6 +135,6 @@ def _warnings_as_sentences() -> Iterator[None]:
 
 
 def _print_error(message: str, code: int) -> int:
-    """One line, whatever the user's text in the message holds."""
+    """Print a message as one line; the user's text in it may have line breaks."""
     click.echo("asperity: " + " ".join(message.split()), err=True)
     return code

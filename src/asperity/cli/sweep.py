@@ -22,7 +22,7 @@ _PERIODS = ((86_400 * 365.25, "years"), (86_400, "days"), (3600, "h"), (60, "min
 
 
 def _time_text(seconds: float) -> str:
-    """A duration as a person says it; "unknown" where there is no estimate."""
+    """A duration in a readable unit; "unknown" if there is no estimate."""
     if not math.isfinite(seconds):
         return "unknown"
     for length, name in _PERIODS:
@@ -54,7 +54,7 @@ chunks are kept, and the numbers are the same to the last bit.
 
 
 class SweepGroup(click.Group):
-    """A group whose first argument may also be a plan, for the command that runs it."""
+    """A group whose first argument may also be a plan, which is then run."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Insert the command ``run`` if the first argument is a plan."""

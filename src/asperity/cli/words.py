@@ -1,4 +1,4 @@
-"""Options of the command line for the arguments that sentences of the library name."""
+"""Names of the command line for arguments in messages of the library: their options."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     ----------
     argument : Argument
     options : mapping of str to str, optional
-        Options of the current command by field, where other commands have other options for it.
+        Options of the current command by field, if they differ from those of other commands.
     """
     from asperity.questions.options import (
         COLUMN_OPTIONS,
@@ -51,7 +51,7 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     )
 
     options = options or {}
-    # A part of a list has the option of the list.
+    # An item of a list has the option of the list.
     name, key, value = argument.whole, argument.key, argument.value
     if name in ("columns", "Trace.channel") and key:
         if key in COLUMN_OPTIONS:
@@ -80,14 +80,14 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     key = symbol(key) if name in _PAIRS else key
     if name in _PAIRS and key and value:
         return f"{option} {quoted(f'{key}={value}', also='=')}"
-    # A switch says yes or no by itself.
+    # A switch has no value.
     value = "" if value in ("True", "False") else value
     return " ".join([option, *([key] if key else []), *([quoted(value)] if value else [])])
 
 
 @contextmanager
 def fields_as_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Let sentences name the fields of a question by the options of the current command.
+    """Let messages name the fields of a question by the options of the current command.
 
     Parameters
     ----------

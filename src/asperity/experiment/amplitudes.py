@@ -2,8 +2,8 @@
 
 Bureau et al. (2000), Sec. II: the slider slides steadily; for each amplitude the modulation is
 switched on, the mean force and its harmonics are read, and after switching off the unmodulated
-force is measured again, so that a slow drift of the interface shows. The exciter applies a
-modulation, of which the contacts carry a part.
+force F(0) is measured again, which reveals a slow drift of the interface. The contacts carry a part
+of the modulation that the exciter applies.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 @typed
 @dataclass(frozen=True)
 class Exciter:
-    """A harmonic load, of which an air layer may carry a part.
+    """A harmonic normal load; an air layer may carry a part of it.
 
     Attributes
     ----------
     frequency : float or str
         Hz.
     transfer : complex
-        T, borne over applied modulation, e^{+i w t}: eps_eff = abs(T) eps.
+        T, modulation on the contacts over applied modulation, e^{+i w t}: eps_eff = abs(T) eps.
     """
 
     frequency: Given
@@ -60,7 +60,7 @@ class Exciter:
     def through_air(
         cls, frequency: Given, slider: Slider, lambda_z: Given, layer: AirLayer | None
     ) -> Exciter:
-        """The exciter of a slider on elastic contacts and an air layer, None for a vacuum.
+        """The exciter of a slider on elastic contacts and an air layer.
 
         Bureau et al. (2000), Appendix, Eq. (40).
 
@@ -73,6 +73,7 @@ class Exciter:
         lambda_z : float or str
             Normal elastic length (m).
         layer : AirLayer or None
+            None in a vacuum.
         """
         hertz = number(frequency, "exciter.frequency", "frequency", "positive")
         length = number(lambda_z, "exciter.lambda_z", "length", "positive")
@@ -95,7 +96,7 @@ class Exciter:
         Raises
         ------
         InputError
-            If the contacts would be lost.
+            If the load on the contacts would reach zero.
         """
         size, phase = cmath.polar(self.transfer)
         got = f"{epsilon:g} of which they bear {size * epsilon:g}"
@@ -337,7 +338,8 @@ def amplitude_series(
     velocity : float or str
         Pulling velocity (m/s).
     sliding, modulated, rise : float or str
-        Seconds of sliding before, between and after, of modulation, and of its coming and going.
+        Durations (s): sliding before, between and after the modulations; each modulation; the rise
+        and fall of its amplitude.
     harmonics : int
         To read.
     seed : int

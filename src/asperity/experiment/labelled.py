@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 def shaped(array: Any, shape: tuple[int, ...]) -> Any:
-    """An array with the points first, with the points in the shape of the arguments."""
+    """An array whose first axis, the points, is reshaped to the shape of the arguments."""
     array = np.asarray(array)
     return array.reshape((*shape, *array.shape[1:]))
 
 
 def measured(unit: str, meaning: str = "") -> Any:
-    """A field of a `Labelled` record, with unit and meaning; a drive quantity has no meaning."""
+    """A field of a `Labelled` record; a quantity of the drive has a unit but no meaning."""
     return field(metadata={"unit": unit, "meaning": meaning})
 
 
@@ -53,7 +53,7 @@ class Labelled(Displayed):
         return {n: (a["unit"], a["meaning"]) for n, a in about.items() if a.get("meaning")}
 
     def outcomes(self) -> str:
-        """Numbers of points by outcome, as text."""
+        """Number of points of each outcome, as text."""
         raise NotImplementedError
 
     def values(self) -> list[tuple[str, float, str, str]]:
@@ -61,7 +61,7 @@ class Labelled(Displayed):
         return [(n, float(getattr(self, n).item()), *about) for n, about in self.meanings.items()]
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """The law and the outcomes, and the range of the most important numbers."""
+        """Law and outcomes, and the ranges of the fields `shown`."""
         lines = [number_line(n, getattr(self, n), self.meanings[n][1]) for n in self.shown]
         return f"{type(self).__name__}, {self.slider.law.name}, {self.outcomes()}", lines
 

@@ -1,7 +1,7 @@
 """Holds and velocity steps of many simulated sliders at once.
 
-Static friction, healing and its rate, what happens in the hold, the extremum after a step, and the
-way back to steady sliding. The extremum is located, not sampled.
+Static friction, healing and its rate, relaxation and slip in the hold, the extremum after a step,
+and the return to steady sliding. The extremum is located as a root, not among samples.
 """
 
 from __future__ import annotations
@@ -64,9 +64,9 @@ _UNSTABLE = (
 class _Memory(Labelled):
     """Outcomes of tests of the memory of friction."""
 
-    distance: Float = measured("m", "way of the drive to the extremum")
+    distance: Float = measured("m", "displacement of the drive to the extremum")
     slip: Float = measured("m", "slip to the extremum")
-    settling_distance: Float = measured("m", f"way of the drive {_WITHIN}")
+    settling_distance: Float = measured("m", f"displacement of the drive {_WITHIN}")
     settling_slip: Float = measured("m", f"slip {_WITHIN}")
     stable: Bool = measured("1", "whether steady sliding is stable")
     result: NDArray[np.object_]
@@ -74,7 +74,7 @@ class _Memory(Labelled):
     velocity: Float = measured("m/s")
 
     def outcomes(self) -> str:
-        """How many points there are, and how many do not settle."""
+        """Number of points, and number of those that do not settle."""
         lost = sum(text != _SENTENCES[End.STEADY] for text in self.result.ravel())
         return f"{self.result.size} points" + (f", {lost} of which do not settle" if lost else "")
 
@@ -338,7 +338,7 @@ def _in_batches(run: Any, slider: Slider, V: Float, *other: Float) -> Any:
 def _common(
     response: Any, after: SettlingDistance | None, slider: Slider, V: Float
 ) -> dict[str, Any]:
-    """Columns of both tests: the way to the extremum, stability, and what follows."""
+    """Columns of both tests: displacement to the extremum, stability, and the motion after it."""
     run = lambda slider, V: steady_growth(QuasiStatic(slider, V, 1.0))  # noqa: E731
     stable = np.asarray(_in_batches(run, slider, V) < 0)
     none = np.full(len(V), np.nan)

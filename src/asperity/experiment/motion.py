@@ -15,7 +15,7 @@ from asperity.slider import Slider
 from asperity.transients import integrate_blocks
 from asperity.tribometer.tribometer import Tribometer
 
-#: Channels that a tribometer may have of a simulated slider; the drive is the load point.
+#: Channels that a tribometer may record of a simulated slider; the drive is the load point.
 FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
 
 #: Smallest number of samples of the motion for each sample of the recorder; with half as many,
@@ -48,7 +48,7 @@ def signals(
     names : tuple of str
         Attributes of `Trajectory`.
     rule : str
-        Beginning of the message where the motion ends early: field and rule.
+        Beginning of the message if the motion ends early: field and rule.
     options : mapping
         Options of `asperity.transients.transient`.
 

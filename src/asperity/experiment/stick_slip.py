@@ -71,7 +71,7 @@ class StickSlip(Labelled, Drawn):
     cycle: LimitCycle | None = None
 
     def outcomes(self) -> str:
-        """How many points there are, and how many have a cycle."""
+        """Number of points, and number of those with stick-slip."""
         return f"{self.slips.size} points, {int(np.sum(self.slips > 0))} with stick-slip"
 
 

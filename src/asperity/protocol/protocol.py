@@ -1,4 +1,4 @@
-"""`Protocol`: law, numbers and steps of an experiment."""
+"""`Protocol`: an experiment as text, with its checked numbers, programme and slider."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _FIELDS = {
 
 @contextmanager
 def fields_of_protocol() -> Iterator[None]:
-    """Let mistakes in the arguments of a transient name the fields of a protocol."""
+    """Name the fields of a protocol in messages about the arguments of a transient."""
     with naming(
         lambda argument: in_files(argument._replace(name=_FIELDS.get(argument.name, argument.name)))
     ):
@@ -59,7 +59,7 @@ def fields_of_protocol() -> Iterator[None]:
 
 
 class Protocol(Experiment):
-    """An experiment that can be run: its fields, and the numbers and programme they make.
+    """An experiment that can be run: its fields, and the numbers and the programme from them.
 
     Raises
     ------
@@ -94,13 +94,13 @@ class Protocol(Experiment):
             mistakes.append(error)
         if mistakes:
             raise ProtocolError(mistakes)
-        # Mistakes of the programme as a whole, such as steps without duration.
+        # The programme as a whole may be invalid, such as one without duration.
         with fields_of_protocol():
             require_contact(self.programme, self._numbers["W0"].value)
             solver = self.integration
             initial, _ = solver.pop("initial"), solver.pop("sampling")
             motion = checked_integration(self.slider, self.programme, **solver).motion
-            # The states of steady sliding take a compilation.
+            # The states of steady sliding are not computed here: they need a compilation.
             if isinstance(initial, str):
                 require_sliding(self.programme)
             else:
@@ -154,7 +154,7 @@ class Protocol(Experiment):
 
     @cached_property
     def setup(self) -> RecordingSetup | None:
-        """Sensors and recorder of the run, None without a tribometer."""
+        """Sensors and recorder of the run; None without a tribometer."""
         if self.tribometer is None:
             return None
         K = self._numbers.get("K")  # missing if another mistake prevents the numbers
@@ -201,7 +201,7 @@ class Protocol(Experiment):
             for path, leaf in jax.tree_util.tree_leaves_with_path(segment):
                 values = np.asarray(leaf, float)
                 digest.update(values.tobytes())
-                # A digest represents recordings, which may have millions of samples.
+                # Arrays, which may have millions of samples, are compared by the digest.
                 if values.ndim == 0 and number <= _COMPARED:
                     segments[f"segment {number}{jax.tree_util.keystr(path)}"] = float(values)
         return {

@@ -39,7 +39,7 @@ _SIGNALS = {
     "load-point displacement": "load point",
 }
 
-#: Quantity that a channel must have whose name is that of a role.
+#: Quantity of a channel by the role that its name implies.
 _CLAIMS = {"F": "shear force", "W": "normal load"}
 
 
@@ -179,12 +179,12 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
     try:
         return kind(**fields)
     except InputError as error:
-        # The sensor does not know its channel.
+        # The message of a sensor does not name its channel.
         raise error.about(f"{place}.{error.field.name.rpartition('.')[2]}") from None
 
 
 def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:
-    """Check, before the computation, the sampling that the tribometer needs of the motion."""
+    """Check, before the computation, that the motion is sampled finely enough."""
     wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-#: Growth per slip distance (1/m) that counts as zero, far below that of any interface.
+#: Growth rate over velocity (1/m) that counts as zero; that of any interface is far larger.
 _ROUND_OFF = 1e-3
 
 
@@ -76,7 +76,7 @@ def stability_statement(protocol: Protocol) -> str:
 
 
 def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
-    """The sentence from the growth rate of a small disturbance of steady sliding."""
+    """The sentence, from the growth rate of a small disturbance of steady sliding."""
     from asperity.slider.problem import flatten
     from asperity.theory.memory import steady_growth
 
@@ -306,7 +306,7 @@ def _one_block(
         progress=progress,
         **protocol.integration,
     )
-    # After the end of the programme there is no block.
+    # There is no block after the end of the programme.
     for block in islice(blocks, 1):
         new = not block.time.size or not block.time[0] <= done.time
         dataset = block.to_dataset()

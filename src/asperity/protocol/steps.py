@@ -37,7 +37,7 @@ from asperity.units import to_si
 #: Quantities that a recording can prescribe: the role and the kind of the channel.
 _CHANNELS = {"load": ("W", "force"), "velocity": ("velocity", "velocity")}
 
-#: Findings that make a recording unusable here: interpolation would hide them.
+#: Findings that make a recording unusable: interpolation would hide the defect.
 _UNUSABLE = frozenset({"gap", "truncated", "malformed row", "repeated time", "backward time"})
 
 #: Kind of each quantity of a form.
@@ -53,7 +53,7 @@ _KINDS = {
     "frequency": "frequency",
 }
 
-#: Lists of quantities of a form, whose steps convert them.
+#: Lists of quantities of a form; the step converts them to SI.
 _LISTS = ("holds", "velocities")
 
 #: Largest number of steps with repetitions; a misprint must not fill the memory.
@@ -92,7 +92,7 @@ def follow(channels: str, file: Path) -> Follow:
         trace = read(file)
         followed = {name: trace.channel(_CHANNELS[name][0]) for name in names}
     except InputError as error:
-        # A step has none of the arguments of `read` that the sentence advises to give.
+        # The advice of `read` names its arguments, which a step does not have.
         known = InputError("file", error.rule, error.got, advice) if error.rule else error
         raise (known if file.exists() else error.about("file")) from None
     for finding in trace.findings:
@@ -224,7 +224,7 @@ def _meant(line: str, name: str) -> list[StepForm]:
         if forms:
             return forms
     verbs = sorted({verb for form in FORMS for verb in (form.verb, form.verb.split()[0])})
-    # "ramp" begins two forms; "step velocity" may also mean a form with a velocity.
+    # "ramp" begins two forms; "step velocity" may mean any form with a velocity.
     if words and words[0] in verbs:
         named = f"{{{words[1]}}}" if len(words) > 1 else "{}"
         return [f for f in FORMS if f.verb.split()[0] == words[0] or named in f.pattern]
@@ -259,7 +259,7 @@ def _arguments(
 
 @dataclass(frozen=True)
 class PlannedStep:
-    """A step, its place counted from 1 such as ``"step 3.2"``, and the line it was written as."""
+    """A step, its position counted from 1, such as ``"step 3.2"``, and its line."""
 
     place: str
     text: str
@@ -277,7 +277,7 @@ def plan(
     folder : Path
         Folder of files that lines name.
     prefix : str
-        What the place of a step begins with.
+        Beginning of the position of a step.
     """
     planned: list[PlannedStep] = []
     mistakes: list[InputError] = []
@@ -321,14 +321,14 @@ def _planned(step: Any, place: str, folder: Path) -> tuple[list[PlannedStep], li
     if times * len(block) > MOST:
         rule, got = f"come to at most {MOST} steps", f"{shown(times)} times {len(block)}"
         return [], [*mistakes, InputError(place, rule, got, "repeat it less often")]
-    # Without a right step inside, times may be too large for a list.
+    # If all steps inside are wrong, `times` may exceed the length of any list.
     return block * min(times, MOST), mistakes
 
 
 def _repetition(line: str, place: str) -> tuple[int, list[str]]:
-    """How often a line repeats, and the lines that it repeats."""
+    """Number of repetitions of a line, and the lines that it repeats."""
     match = REPEAT.fullmatch(line)
-    # A number of a thousand digits exceeds `MOST` as well as a longer one, which Python refuses.
+    # Python refuses integers of more than 4300 digits; a thousand digits exceed `MOST` already.
     times = int(match["times"][:1000]) if match and match["times"].isdecimal() else 0
     if match is None or times < 1:
         rule = "say how often what is repeated"

@@ -24,7 +24,7 @@ from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
 
-#: Columns of texts.
+#: Names of the columns of texts; all other columns have numbers.
 TEXTS = ("law", "data")
 
 #: Rows of a block of random draws. Each block has its own seed, so that it can be drawn without the
@@ -273,7 +273,7 @@ def _cases(
     """Columns of the rows of all cases; a case gives every combination of its lists."""
     names = dict.fromkeys(_name(name, known) for case in cases for name in case)
     for name in (name for name in TEXTS if name in names):
-        # Such a case would take the law of another case, and its label would be empty.
+        # A case without a law would be solved with the law of another case.
         without = [str(i) for i, case in enumerate(cases, start=1) if name not in case]
         got = f"none in case {', '.join(without[:5])}"
         require(not without, "cases", f"all have '{name}' or none of them", got, "add it there")

@@ -74,7 +74,7 @@ load_plan = SweepPlan.from_file
 def _quantities(
     place: str, tree: Any, column: str, known: Mapping[str, Parameter]
 ) -> Iterator[tuple[str, str, Any]]:
-    """Place, kind and value of every quantity in a part of a plan."""
+    """Path, kind and value of every quantity in a part of a plan."""
     if isinstance(tree, Mapping):
         for key, inner in tree.items():
             at = (place, column) if key in _OF_COLUMN else (f"{place}.{key}", key)
@@ -123,7 +123,7 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         supplied = solve.supplied(named)
     if not mistakes:
         columns = [columns_of(axis) for axis in axes.values()]
-        # What varies together with others may be there for the record.
+        # A column that varies together with others may be a label without influence.
         alone = [names[0] for names in columns if len(names) == 1]
         varied = dict.fromkeys(itertools.chain(*columns), 1.0)
         with _noted(mistakes):
@@ -150,7 +150,7 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
 
 @contextmanager
 def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
-    """Add an `InputError` to the mistakes of a plan, which are reported together."""
+    """Add an `InputError` of the block to the mistakes of a plan, which are reported together."""
     try:
         yield
     except InputError as error:
@@ -180,11 +180,11 @@ def _law_files(plan: Sweep) -> dict[str, str]:
 
 
 def _with_imports(file: Path) -> list[Path]:
-    """A file of Python, and the files in its folder that it or one of them imports."""
+    """A Python file, and the files of its folder that it imports, directly or indirectly."""
     files = [file]
     for source in files:
         code: ast.AST = ast.Pass()
-        with suppress(SyntaxError, ValueError):  # no source, or one that is never imported
+        with suppress(SyntaxError, ValueError):  # a compiled module, or a file never imported
             code = ast.parse(source.read_bytes())
         for node in ast.walk(code):
             imported = node.names if isinstance(node, ast.Import | ast.ImportFrom) else []
@@ -269,7 +269,7 @@ def _missing(
 
 
 def _present(axis: Mapping[str, Any], law: str) -> set[str]:
-    """Columns of an axis that have a value in every row of a law."""
+    """Columns of an axis with a value in every row of a law."""
     if "over" in axis:
         return set(axis["over"])
     columns = axis["columns"]

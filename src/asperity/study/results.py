@@ -172,7 +172,7 @@ def _pooled(parts: list[tuple[float, ...]]) -> dict[str, float]:
             "min": float(low.min()), "max": float(high.max())}  # fmt: skip
 
 
-#: Columns of texts.
+#: Columns of texts in an export.
 _TEXTS = (*TEXTS, "outcome")
 
 

@@ -201,7 +201,7 @@ class TableSource:
         require(named, str(path), rule, "an empty file", advice)
         self.columns, self.units = _checked_header(self.header, str(path))
         laws: Counter[str] = Counter()
-        #: First text, and its row, of the columns in which no row so far has a number.
+        #: For each column without a number so far, its first text and the row of this text.
         texts = {name: ("", 0) for name in self.columns if name != "law"}
         for count, row in enumerate(self._sheet.rows(), 1):
             laws[self.law_of(row)] += 1
@@ -248,14 +248,14 @@ class TableSource:
             raise InputError(str(self.path), rule, got, "add them or name a material that has them")
 
 
-def _checked_header(header: Sequence[str], shown: str) -> tuple[dict[str, int], dict[str, float]]:
+def _checked_header(header: Sequence[str], label: str) -> tuple[dict[str, int], dict[str, float]]:
     """Position of every known column, and the SI value of the unit in its heading.
 
     Parameters
     ----------
     header : sequence of str
         As read; blanks around a name are ignored.
-    shown : str
+    label : str
         Name of the table in messages.
 
     Raises
@@ -268,16 +268,16 @@ def _checked_header(header: Sequence[str], shown: str) -> tuple[dict[str, int], 
     for name in map(str.strip, header):
         meant = None if name in known else _nearest(name, known)
         advice = f"did you mean '{meant}'? If not, rename the column"
-        require(not meant, shown, "have columns of known names", f"'{name}'", advice)
+        require(not meant, label, "have columns of known names", f"'{name}'", advice)
     columns, units = {}, {}
     for name, (place, unit) in headings(
-        header, shown, {*known, *RESULT_COLUMNS}.__contains__
+        header, label, {*known, *RESULT_COLUMNS}.__contains__
     ).items():
         rule = "not have a column named like a result"
-        require(name in known, shown, rule, f"'{name}'", "rename or remove it")
+        require(name in known, label, rule, f"'{name}'", "rename or remove it")
         columns[name] = place
         if unit and name in parameters:
-            units[name] = parameters[name].unit_in_si(unit, f"{shown}.{name}")
+            units[name] = parameters[name].unit_in_si(unit, f"{label}.{name}")
     return columns, units
 
 

@@ -1,4 +1,4 @@
-"""Choices of the page: materials, laws with their equations, parameters with units.
+"""The catalogue of the page: materials, laws with their equations, parameters with units.
 
 Names, units, rules and defaults come from `asperity.parameters`, values from the materials.
 """
@@ -40,8 +40,9 @@ DOCS = Path(__file__).parents[4] / "docs" / "_build" / "html"
 #: Numbers of the air layer and of the contacts, by their names in materials.
 AIR = {**LAYER, "lambda_z": LAMBDA_Z}
 
-#: A slider without a range of its material covers the first factor on both sides of a pure number,
-#: the second on both sides of a quantity with a unit; a slider from zero ends at the third.
+#: Range of a slider whose material has no range for its number: the first factor on both sides of a
+#: pure number, the second on both sides of a quantity with a unit. A slider that begins at zero
+#: ends at the third factor times its number.
 _PURE, _WITH_UNIT, _FROM_ZERO = 10.0, 100.0, 4.0
 
 
@@ -74,13 +75,13 @@ def as_json() -> str:
 
 @cache
 def package_material(name: str, field: str = "material") -> Material:
-    """A material that comes with the package: no other file is read for a request."""
+    """A material of the package; a request cannot name another file."""
     require_known(name, packaged(), field, "be a known material")
     return materials.load(name)
 
 
 def mathml(latex: str, *, display: bool = False) -> str:
-    """A formula as a ``<math>`` element; empty for none."""
+    """A formula as a ``<math>`` element; empty for an empty formula."""
     if not latex:
         return ""
     result: str = convert(latex, display="block" if display else "inline")
@@ -141,7 +142,7 @@ def _material(material: Material) -> dict[str, Any]:
 
 
 def slider(name: str, material: Material) -> dict[str, Any]:
-    """Value at which the slider of a parameter starts, its ends, and whether it is logarithmic."""
+    """Start value and ends of the slider of a parameter, and whether its scale is logarithmic."""
     parameter = known_parameters()[name]
     kind = parameter.kind
     value = to_si(parameter.example, kind, name) if parameter.default is None else parameter.default

@@ -1,4 +1,4 @@
-"""Data: recordings that the page sends, and a law over one with numbers that are moved by hand.
+"""The Data tab: uploaded recordings, and the motion of a law with numbers that the user moves.
 
 Fits are in `fits`, the virtual tribometer in `protocols`.
 """
@@ -25,7 +25,7 @@ from asperity.questions.recording import Measurement
 from asperity.slider.named import slider_from
 from asperity.transients import transient
 
-#: Tolerance, and steps after which numbers are refused: a curve that follows a slider.
+#: Tolerance, and largest number of steps, of a curve that follows a slider.
 _RTOL, _MOST_STEPS = 1e-5, 20_000
 #: Points of the curve.
 _MOST = 800
@@ -34,7 +34,7 @@ _Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
 class Driven(Question):
-    """A law, its numbers, and how the slider is pulled.
+    """A law, its numbers, and the velocity of the drive over time.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Driven(Question):
     numbers : dict of str to float
         Numbers of the law, with K over the load (1/m) as ``K/W0``; SI.
     segments : list of (float, float)
-        Durations (s) and pulling velocities (m/s), 0 in a hold; the first one is steady sliding.
+        Durations (s) and pulling velocities (m/s), 0 in a hold; the first is steady sliding.
     """
 
     law: Annotated[str, Field(max_length=60)]
@@ -51,7 +51,7 @@ class Driven(Question):
 
 
 def model(question: Driven) -> dict[str, Any]:
-    """Friction F/W over time (s) from the beginning; ``stopped`` says why it ends before its end.
+    """Friction F/W over time (s); ``stopped`` is the reason if the motion ends early.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def model(question: Driven) -> dict[str, Any]:
         Slide(duration=length, velocity=v) if v > 0 else Hold(duration=length)
         for length, v in question.segments
     ]
-    # Of a load of 1 N; friction is that of any.
+    # Friction does not depend on the load, which is 1 N.
     slider = slider_from(law, {**numbers, "K": stiffness, "W0": 1.0})
     programme = Programme(*steps, load=1.0, velocity=velocity)
     times = _times(np.array([length for length, _ in question.segments]))
@@ -91,7 +91,7 @@ def _times(lengths: Float) -> Float:
 
 
 class Recording(Question):
-    """A file that was sent, how to read and to measure it, and the names in its sentences."""
+    """An uploaded file, how to read and to measure it, and the names in its sentences."""
 
     recording: str
     source: Source = Field(default_factory=Source)

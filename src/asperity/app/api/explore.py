@@ -1,7 +1,7 @@
-"""Explore: the response at an operating point, answered at once.
+"""The Explore tab: the response at an operating point.
 
-The fast methods answer within milliseconds; orbits that they do not solve are searched for by
-`search`, a job, after the last change of a slider.
+The fast methods answer within milliseconds. The job `search` looks for orbits that they do not
+solve, after the last change of a slider.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from asperity.orbit import (
 )
 from asperity.parameters import OUTPUTS
 
-#: Harmonics and instants of the period that are shown, and amplitudes and frequencies of curves.
+#: Numbers of harmonics and of instants of the period, and of amplitudes and frequencies of curves.
 _HARMONICS, _INSTANTS, _AMPLITUDES, _FREQUENCIES = 8, 256, 24, 80
-#: Curves against the amplitude.
+#: Quantities with a curve against the amplitude.
 _CURVES = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
 #: Methods that take milliseconds.
 _FAST = ("fourier",)
-#: Laws with which the tab begins, and amplitudes of the grids of the fast method.
+#: Laws at the start of the tab, and amplitudes that need different grids of the fast method.
 _FIRST = ("elasto-plastic", "rice-ruina", "linker-dieterich")
 _AMPLITUDE, _LARGE = (0.1,), (0.3, 0.5)
 #: Programs that are compiled when the server starts.
@@ -70,7 +70,7 @@ class Explored(OperatingPoint):
 
 
 def explore(question: Explored) -> dict[str, Any]:
-    """Response, curves and share of the air layer, as far as the fast methods solve them."""
+    """Response, curves and share of the air layer, as far as the fast methods can solve them."""
     numbers = question.sourced()
     values = {name: number.value for name, number in numbers.items()}
     epsilon = epsilon_on_contacts(question, values)
@@ -138,7 +138,7 @@ _function = cache(partial(response_function, harmonics=2, multipliers=False, sea
 
 
 def point_record(response: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
-    """Everything that is shown of one response."""
+    """One response as the page shows it."""
     converged = bool(response.converged)
     record: dict[str, Any] = {"converged": converged, "searched": searched or converged}
     if not converged:
@@ -210,7 +210,7 @@ def text(question: Explored) -> dict[str, str]:
 def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Search for the orbits that the fast methods did not solve: the point, then the curves.
 
-    Each message has ``point``, or ``curve`` with the law, the indices and the values there.
+    Each message has ``point``, or ``curve`` with the law, the indices and their values.
     """
     question = Explored(**argument)
     values = question.values()
@@ -234,9 +234,9 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
 
 
 def preparations() -> dict[str, Callable[[], Any]]:
-    """Programs by law, quasi-static; those of `AT_START` are compiled when the server starts.
+    """Quasi-static programs by law; those of `AT_START` are compiled when the server starts.
 
-    The grid of the fast method depends on the amplitude, and each grid is a program.
+    The grid of the fast method depends on the amplitude, and each grid needs a program.
     """
     names = [name for name, law in registered().items() if law.rate_dependent]
     tasks: dict[str, Callable[[], Any]] = {

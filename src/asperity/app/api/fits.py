@@ -36,7 +36,7 @@ from asperity.recording.readers.from_file import read_source
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
 #: Largest number of transients that are shown enlarged, smallest number of samples of a transient,
-#: and the share of its largest departure from the final line below which it counts as settled.
+#: and the share of its largest deviation from the final line below which a transient has settled.
 _MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
 
 
@@ -48,7 +48,7 @@ class Table(Question):
 
 
 class Run(Question):
-    """A recording for a fit of its whole motion, with fields as of `asperity.questions.fit.Data`.
+    """A recording for a fit of its whole motion, with fields of `asperity.questions.fit.Data`.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def check(question: Fitted) -> None:
 
 
 def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
-    """The fields of a question, with path and name of each recording."""
+    """The fields of a question, and path and name of each recording."""
     files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
     return {"question": question.model_dump(mode="json"), "files": places}
@@ -224,7 +224,7 @@ def _data(
 
 
 def _names(data: Iterable[Mapping[str, Any]]) -> dict[Path, str]:
-    """Names of files as the user knows them, by the path on the server."""
+    """The user's names of files, by their paths on the server."""
     return {Path(file["file"]): file["name"] for file in data}
 
 
@@ -274,7 +274,7 @@ def _bands(result: Any, posterior: Any) -> list[dict[str, Any]]:
 
 
 def _report(result: Any, posterior: Any, names: Names) -> str:
-    """The folder of a fit or a comparison, as ``--report`` writes it: a ZIP file in base64."""
+    """The folder of ``asperity fit --report`` or ``compare --report`` as a ZIP file in base64."""
     from asperity import fit_report, inference
 
     packed = io.BytesIO()
@@ -340,7 +340,7 @@ def _around(time: Float, fitted: Float, begin: float, end: float) -> slice:
     return slice(*np.searchsorted(time, (begin - length / 3, min(begin + length, end))))
 
 
-#: Stands for the rows that were measured on the page.
+#: File name, in the command for copying, of the rows that were measured on the page.
 _ROWS = "campaign.csv"
 
 

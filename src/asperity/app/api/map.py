@@ -1,4 +1,4 @@
-"""Map tab: response and stability over any two numbers, on ever finer grids."""
+"""The Map tab: response and stability over any two numbers, on a sequence of finer grids."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class MapQuestion(OperatingPoint):
 
 
 def check(question: MapQuestion) -> None:
-    """Raise `InputError` for what cannot be mapped, before a process is started."""
+    """Raise `InputError` for an invalid map, before a process is started."""
     advice, axes = "a map has epsilon on the contacts", "choose another one for y"
     require(question.air is None, "map.air", "be left out", "an air layer", advice)
     one_of(question.show, SHOWN, "show")
@@ -87,7 +87,7 @@ def text(question: MapQuestion) -> dict[str, Any]:
 
 
 def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Solve ever finer grids.
+    """Solve a sequence of finer grids.
 
     Each message has ``grid``: axes, `MapQuestion.show` on the grid, where it is stable, why a point
     failed, and the boundary with its bifurcations; or ``progress``, a share of all work. The first

@@ -23,11 +23,11 @@ from asperity.recording.extremes import thinned
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, integrate_blocks
 
-#: Velocity before the motion, over V: what disturbs steady sliding.
+#: Velocity before the motion over V; the step to V disturbs steady sliding.
 _BEFORE = 0.7
 #: Periods of the load over which the modulation begins.
 _RISE = 3.0
-#: The computed time is that of so many cycles of stick-slip with this drop of F/W0.
+#: Drop of F/W0 and number of cycles of stick-slip from which the computed time follows.
 _DROP, _CYCLES = 0.15, 12.0
 #: Cycles after which the computation stops, and e-folds of growth or decay that are computed.
 _ENOUGH, _FOLDS = 6, 6.0
@@ -42,7 +42,7 @@ _SLIPPING, _STICKING = 3.0, 0.3
 
 
 class Motion(OperatingPoint):
-    """An operating point, and what Explore knows of its stability.
+    """An operating point, and its stability from the Explore tab.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def motion(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
     epsilon = epsilon_on_contacts(question, values)
     unstable = question.growth_rate is not None and question.growth_rate > 0
     duration = _duration(values, epsilon, question.growth_rate)
-    # Without a mass nothing bounds the velocity of a slip, not even of the slip after the start.
+    # Only the mass bounds the velocity of a slip, including the slip after the start.
     inertia = values.get("M", 0.0) > 0
     slider = slider_from(law, values)
     V, f = values["V"], values["frequency"]
@@ -180,7 +180,7 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
 def _record(
     whole: Trajectory, values: Mapping[str, float], inertia: bool, cycles: Cycles | None
 ) -> dict[str, Any]:
-    """Curves of the motion so far, and what it is."""
+    """Curves of the motion so far, and its stick-slip if there is any."""
     time, W0, V = whole.time, values["W0"], values["V"]
     curves = {
         "force": thinned(time, whole.force / W0, _BLOCKS),

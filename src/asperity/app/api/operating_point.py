@@ -1,4 +1,4 @@
-"""The operating point that Explore and Map ask about, from names and numbers to checked values."""
+"""The operating point of the Explore and Map tabs: checked values from names and numbers."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import one_of
 from asperity.units import KINDS
 
-#: A number that is written into a field may lie beyond its slider's ends by this factor, and where
-#: the slider begins at zero, below its upper end by the second one. Farther away, searches take
-#: minutes to find nothing, and numbers overflow.
+#: A number in a field may exceed the ends of its slider by the first factor; if the slider begins
+#: at zero, it may be smaller than the upper end by the second factor. For numbers farther away,
+#: searches fail after minutes and numbers overflow.
 _BEYOND, _BELOW = 1e4, 1e8
 
 Name = Annotated[str, Field(max_length=60)]
@@ -43,13 +43,13 @@ class OperatingPoint(Question):
     Attributes
     ----------
     material : str
-        One that comes with the package.
+        A material of the package.
     law : str
     numbers : mapping of str to number or str
         By the names of `asperity.parameters`; other numbers are those of the material.
     air : mapping of str to number or str, optional
-        Numbers of `AIR` that are not the material's; epsilon is then the amplitude of the load
-        before the air layer takes its share. None: epsilon is what the contacts bear.
+        Numbers of `AIR` that replace those of the material; epsilon is then the applied amplitude,
+        of which the air layer bears a share. None: epsilon is the amplitude on the contacts.
     """
 
     material: Name = "bureau2000"
@@ -136,7 +136,7 @@ def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> f
     Raises
     ------
     InputError
-        If the air layer makes more of it than the load itself.
+        If the amplitude on the contacts is not below 1.
     """
     if point.air is None:
         return values["epsilon"]

@@ -1,4 +1,4 @@
-"""Paper: the figures of a published paper with its numbers moved, and the ledger of its claims."""
+"""The Paper tab: figures of a paper with numbers that the user moves, and the paper's claims."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ChosenPaper(Question):
 
 
 class MovedFigure(ChosenPaper):
-    """A figure of a paper, and the numbers that are moved.
+    """A figure of a paper, and the moved numbers.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def _slider(paper: Paper, name: str) -> dict[str, Any]:
 
 
 def check(question: MovedFigure) -> None:
-    """Raise `InputError` for what cannot be drawn, before a process is started."""
+    """Raise `InputError` for an invalid figure or number, before a process is started."""
     known = _paper(question.paper).tab
     one_of(question.figure, known, "figure")
     _changes(question)
@@ -149,7 +149,7 @@ def _moved_numbers(question: MovedFigure) -> Material:
 
 
 def _changes(question: MovedFigure) -> dict[str, float]:
-    """The moved numbers, in the units that they are printed in."""
+    """The moved numbers, in their printed units."""
     paper = _paper(question.paper)
     known = paper.words.figures[question.figure].numbers
     changes = {}
@@ -168,7 +168,7 @@ def _changes(question: MovedFigure) -> dict[str, float]:
 
 
 def figure(question: MovedFigure) -> dict[str, Any]:
-    """Curves of a figure as printed and with the moved numbers, and what the text states."""
+    """Curves of a figure with the printed and with the moved numbers, and the text's statements."""
     check(question)
     paper, numbers = _paper(question.paper), _moved_numbers(question)
     words, chosen = paper.words, paper.tab[question.figure]
@@ -202,7 +202,7 @@ _slow_as_printed: dict[tuple[str, str, str], dict[str, Any]] = {}
 
 
 def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Lines that take seconds, a message each: ``curve``, and ``printed`` with printed numbers."""
+    """Slow lines, one a message: ``curve``, and ``printed`` with the printed numbers."""
     question = MovedFigure(**argument)
     paper, numbers = _paper(question.paper), _moved_numbers(question)
     chosen = paper.tab[question.figure]

@@ -1,6 +1,6 @@
 """Protocols of the page: checked with the line of each mistake, run, and recorded.
 
-A protocol of the page names no file: no file with a law or a material, and no recording that a
+A protocol of the page cannot name a file: neither a law, nor a material, nor a recording that a
 step follows.
 """
 
@@ -45,7 +45,7 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
     if not errors:
         try:
             protocol = Protocol.of_content(content)
-            _ = protocol.rows  # what the solver's table says is read here
+            _ = protocol.rows  # raises for an invalid table of the solver
             return protocol, []
         except ProtocolError as error:
             errors = error.errors
@@ -129,7 +129,7 @@ def _check_size(protocol: Protocol) -> None:
 
 
 def _files_named(content: dict[str, Any]) -> Iterator[InputError]:
-    """Mistakes about what would read a file of this machine."""
+    """Mistakes about fields and steps that would read a file of this machine."""
     if "folder" in content:
         yield InputError("folder", "be left out on the page", "one", "write the steps out")
     for field, known in (("law", registered()), ("material", packaged())):
@@ -176,7 +176,7 @@ def _lines(text: str, content: dict[str, Any]) -> dict[str, int]:
 
 
 def _line_of(error: InputError, lines: dict[str, int], text: str) -> int | None:
-    """The line of the field that a mistake is about, else of the value that it has."""
+    """The line of the field of a mistake, else of its value."""
     place = error.field.name
     while place:
         if place in lines:

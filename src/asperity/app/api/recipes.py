@@ -1,4 +1,4 @@
-"""A calculation of the page as Python and as a command, for copying."""
+"""A response or a map of the page as Python and as a command, for copying."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def explore(point: OperatingPoint, values: Mapping[str, float], epsilon: float) 
     values : mapping of str to float
         All numbers in SI.
     epsilon : float
-        On the contacts.
+        Amplitude on the contacts.
     """
     options = _command_of_point(point, {**values, "epsilon": epsilon})
     command = f"asperity response {' '.join(options)}"
@@ -130,7 +130,7 @@ def _published(material: Material, name: str) -> float | None:
 
 
 def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> list[str]:
-    """Options of the numbers that differ from the material's."""
+    """Options of the numbers that differ from those of the material."""
     material = point.chosen_material()
     known = point_parameters(get_law(point.law))
     parts = [f"--law {point.law} --material {material.name}"]

@@ -1,6 +1,6 @@
-"""Recordings: read and measured in a separate process with limits.
+"""Recordings of the page: read and measured in a separate process with limits.
 
-Imports are late and few, because a new process reads each file.
+A new process reads each file; it imports modules late to start quickly.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ LARGEST_TABLE = 1024**2
 
 
 class Source(questions.Source):
-    """How an uploaded file is read: without a reduction file, whose path would be on the server."""
+    """How an uploaded file is read.
+
+    A reduction file is refused, because its path would be one on the server.
+    """
 
     @field_validator("recipe")
     @classmethod
@@ -150,7 +153,7 @@ def _measured(
 
 
 def _curves(measurement: Any) -> dict[str, Any]:
-    """What the page draws of a measurement of any kind."""
+    """Curves of a measurement of any kind."""
     from asperity.measurement.record import mean_cycle, middle_events, residual_spectrum
 
     if hasattr(measurement, "reading"):
@@ -173,7 +176,7 @@ def _curves(measurement: Any) -> dict[str, Any]:
 
 
 def _table_in(path: Path, name: str) -> dict[str, Any] | None:
-    """The text of a lock-in table; None for any other file."""
+    """The content of a lock-in table; None for any other file."""
     if path.stat().st_size > LARGEST_TABLE:
         return None
     content = path.read_bytes()

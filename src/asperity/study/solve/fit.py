@@ -52,8 +52,8 @@ _ESTIMATE = {
     "low": "lower end of the 95 % interval",
     "high": "upper end of the 95 % interval",
 }
-#: Quantities that are a column of a table or a number of the plan, with a number that stands for
-#: the plan's while only the columns are read.
+#: Quantities that are a column of a table or a number of the plan. The values are placeholders,
+#: with which a table is read for the names of its columns.
 _OPERATING = {"V": 1e-6, "epsilon": 0.1, "frequency": 1.0}
 NOISE_SEED = Parameter(
     "noise_seed",
@@ -204,7 +204,7 @@ def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> Loc
     rule, advice = "not change while a sweep runs", "restore the file, or choose another store"
     got = f"'{path}', which has changed since the sweep began"
     require(not digest or _digest(Path(path)) == digest, "data", rule, got, advice)
-    # Without a digest only the columns are read, and any operating numbers serve.
+    # Without a digest only the names of the columns are needed.
     return read_table(path, dict(for_all) if digest else _OPERATING)
 
 
@@ -231,7 +231,7 @@ def _fit_point(
     fixed = _fixed(values, [n for n in known if n not in free], record["origins"], tables)
     truth = {name: values[name] for name in free if name in values}
     inertia, damped = values.get("inertia", 0.0) > 0, values.get("eta", 0.0) > 0 or "eta" in free
-    # A material has a mass whether it counts or not.
+    # A material may have a mass although the fit is without inertia.
     without = {name for name, counts in (("M", inertia), ("eta", damped)) if not counts}
     fixed = {name: value for name, value in fixed.items() if name not in without}
     if "noise_seed" in values:
