@@ -1,6 +1,6 @@
 """Figures: numbers to CSV, then to a picture. Nothing is solved here.
 
-Each name below is imported when first used: Matplotlib takes its time.
+Each name below is imported when first used, because importing Matplotlib takes long.
 """
 
 from asperity._lazy import lazy_names

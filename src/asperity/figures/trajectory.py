@@ -29,7 +29,7 @@ _PANELS = (
     ("velocity", ELASTO_PLASTIC, 1e6, "velocity (µm/s)"),
     ("age", RICE_RUINA, 1.0, r"age $\Phi$ (s)"),
 )
-#: Largest number of marked events; more events are only counted.
+#: Colours of the kinds of events that are marked, and the largest number of one kind.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
 _MOST_MARKS = 60
 #: Number of intervals of a trajectory whose extremes are drawn; more than a figure has pixels.

@@ -58,7 +58,7 @@ def figure(svg: str, caption: str, *, wide: bool = False) -> str:
 
 RUN_CAPTION = (
     "Friction of the recording, thinned where it has many samples, and the motion of the law with "
-    "offset and trend of the gauge; below, what is left."
+    "offset and trend of the gauge; below, the residuals."
 )
 
 
@@ -75,8 +75,8 @@ def write_report(
         Converged.
     posterior : Posterior, optional
     names : {"friction", "geophysics"}
-        Names of parameters on the page, but for warnings, which have those of the fit; files keep
-        the names of friction.
+        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        friction.
 
     Raises
     ------
@@ -222,8 +222,8 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     comparison : Comparison
         With one converged fit at least.
     names : {"friction", "geophysics"}
-        Names of parameters on the page, but for warnings, which have those of the fit; files keep
-        the names of friction.
+        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        friction.
 
     Raises
     ------

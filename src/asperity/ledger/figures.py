@@ -267,7 +267,7 @@ class FiguresFile(Question):
         tables: Mapping[str, tuple[pd.DataFrame, Sequence[str]]],
         draw: Callable[[FigureNumbers], Figure] | None = None,
     ) -> PaperFigure:
-        """The figure of the report that `numbers` are of.
+        """The figure of the report with these numbers.
 
         Parameters
         ----------

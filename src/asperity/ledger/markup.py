@@ -61,7 +61,7 @@ def rich(text: str) -> str:
 def table(
     heads: Mapping[str, str], rows: Iterable[Sequence[str]], label: str, kind: str = "ledger"
 ) -> str:
-    """A table whose cells carry their column's head along, for screens too narrow for columns.
+    """A table whose cells repeat the head of their column, for screens too narrow for columns.
 
     Parameters
     ----------

@@ -7,9 +7,9 @@ NAME = "package". It holds
   and the ends of its published uncertainties (`asperity.ledger.contents`);
 - ``checks``, a module or package: one function for each claim without formulas (``values``),
   marked with `asperity.ledger.check`, from the paper's numbers to computed numbers by name. A
-  function ``model`` there, if any, turns the paper's numbers into what the checks are given, so
-  that they can share what is computed once; its attribute ``terms``, if any, maps names to
-  functions and objects that formulas may use;
+  function ``model`` there, if any, turns the paper's numbers into the argument of the checks, an
+  object that computes common results once; its attribute ``terms``, if any, maps names to functions
+  and objects that formulas may use;
 - ``figures.toml``: titles, captions and alternative texts of its figures, and what is drawn;
 - ``figures``, a module or package: ``FIGURES``, functions that return a
   `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of

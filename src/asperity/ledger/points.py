@@ -39,7 +39,7 @@ LEVEL = 0.05
 #: A test must reject a curve that is wrong by this share with the probability 1 - LEVEL.
 WRONG_BY = 0.2
 
-#: The same in a sentence, for what is written.
+#: The rule as a sentence, for the page and the files.
 RULE = (
     f"agrees: chi^2 = sum ((y - curve)/y_err)^2 is not larger than its {100 * (1 - LEVEL):g} % "
     "quantile for as many degrees of freedom as points, nothing being fitted to them here, while "

@@ -120,8 +120,8 @@ def reproduce(
     Raises
     ------
     InputError
-        If the folder cannot be written, or the file of points breaks a rule; before any work,
-        but for points of a curve that is not there or beyond its ends.
+        If the folder cannot be written, or the file of points breaks a rule. Points of an unknown
+        curve or beyond its ends are found when their figure is computed, other mistakes at once.
     """
     start = time.perf_counter()
     out = Path(out)
@@ -144,7 +144,7 @@ def reproduce(
         shown += [_show(section, folder, begin, points) for section in sections[1:]]
         begin("page")
         _write_json(paper, claims, folder / "claims.json")
-        # Without their separate numbers.
+        # The separate numbers of claims are in claims.json only.
         rows = ([getattr(claim, name) for name in _FIELDS] for claim in claims)
         write_table(folder / "claims.csv", _FIELDS, rows)
         agreement = points.write(folder)

@@ -181,12 +181,12 @@ def formula_value(
     place : str
         Place of the formula, for messages.
     terms : mapping of str to object, optional
-        Further names: functions, and what they are given.
+        Further names: functions, and their arguments.
 
     Raises
     ------
     InputError
-        If it is no such formula, or names something else.
+        If it is not such a formula, or has an unknown name.
     """
     known = {**_FUNCTIONS, **(terms or {})}
 

@@ -258,7 +258,7 @@ def variations(machine: Machine) -> dict[str, dict[str, float]]:
 
     A is moved at constant B - A, because that difference is measured by itself, as the slope of
     the friction coefficient over ln V; B and lambda are moved alone. lambda is moved over 0.62 +-
-    0.15 um, what the quasi-static test gives, the fitted 0.7 um lying within.
+    0.15 um, the result of the quasi-static test; the fitted 0.7 um lie within.
     """
     p = machine.numbers
     ends: dict[str, dict[str, float]] = {}

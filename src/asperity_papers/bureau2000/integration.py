@@ -1,9 +1,9 @@
 """A second opinion: the paper's equations integrated in time, closed into a periodic orbit.
 
 Plain NumPy and SciPy, nothing shared with `asperity.laws`, `asperity.slider` or `asperity.orbit`:
-the equations of section III are written out again, so that a formula or a fast solver that agrees
-with this has been checked by something else. It also carries the inertia of the slider, which the
-quasi-static solver leaves out. One period is integrated by DOP853 and closed by Newton's method.
+the equations of section III are written out again, so that agreement with a formula or with the
+fast solver is an independent check. The inertia of the slider, which the quasi-static solver leaves
+out, is an option. One period is integrated by DOP853 and closed by Newton's method.
 
 States, dimensionless: y = F/W0 - mu, phi = ln(V Phi/D0), and with inertia also u = ln(v/V), for
 rigid asperities.

@@ -1,4 +1,4 @@
-"""The paper's slider, drive and air layer at one set of its numbers, and what they respond.
+"""The paper's slider, drive and air layer at one set of its numbers, and their responses.
 
 Amplitudes called `applied` are the experiment's eps, `borne` ones the eps_eff that the contacts
 carry and that the models receive: 0.48 eps at 120 Hz, the paper's fit. A statement that names no
@@ -37,6 +37,9 @@ from asperity_papers.bureau2000.integration import (
 PAPER = Paper("bureau2000", "asperity_papers.bureau2000")
 
 Float = NDArray[np.float64]
+#: What a check returns, by name.
+Numbers = dict[str, float]
+Mixed = dict[str, float | str]
 Pair = tuple[float, float]
 Result = TypeVar("Result")
 
@@ -52,7 +55,7 @@ class Law(NamedTuple):
     inertia : bool
         Whether the mass of the slider counts; only at the strongest modulation then.
     strongest : bool
-        Whether it is asked at the strongest modulation, whatever the amplitude.
+        Whether it is evaluated at the strongest modulation, whatever amplitude is asked for.
     """
 
     name: str
@@ -62,7 +65,7 @@ class Law(NamedTuple):
 
 
 RR, LD, EXT = "rice-ruina", "linker-dieterich", "elasto-plastic"
-#: The elasto-plastic law with the plastic velocity in the age law too, which the paper does not.
+#: The elasto-plastic law with the plastic velocity in the age law too; the paper has the slider's.
 EXT_AGE = "elasto-plastic-age"
 
 #: Names of the two velocities, of curves and of the numbers of claims.
@@ -143,7 +146,7 @@ class Machine:
         return np.linspace(0.0, STRONGEST, self.steps + 1)
 
     def borne_amplitudes(self) -> Float:
-        """Amplitudes of the figures drawn against eps_eff: up to 0.3, as the text has it."""
+        """Amplitudes of the figures drawn against eps_eff: up to 0.3, as in the text."""
         return np.linspace(0.0, self.numbers.no_saturation_below, self.steps + 1)
 
     @property
@@ -340,7 +343,7 @@ class Machine:
 
         drop: "a typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is
         named: -20 % of the friction coefficient at 1 and at 10 um/s. mu1: "of order 1e-3", half a
-        decade to either side. ratio: mu2/mu1. mu2: what both leave to it.
+        decade to either side. ratio: mu2/mu1. mu2: the products of both.
         """
         p = self.numbers
         slow, fast = (-p.relative_drop * self.mu_ss(V) for V in self.velocities)

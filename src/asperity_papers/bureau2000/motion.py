@@ -79,7 +79,7 @@ def period_figure(machine: Machine) -> FigureNumbers:
 
 #: Quality factor of the damped resonance. The paper gives no damping; ten is our choice.
 QUALITY = 10.0
-#: Ranges of the two cuts: beyond what is published of lambda (um), and around 120 and 200 Hz.
+#: Ranges of the two cuts: beyond the published values of lambda (um), and around 120 and 200 Hz.
 _LENGTHS, _FREQUENCIES, _POINTS = (0.4, 1.0), (80.0, 800.0), 100
 
 

@@ -100,7 +100,7 @@ def read_thresholds(path: str | Path) -> Thresholds:
     return Thresholds(Path(path).name, **columns)
 
 
-#: Name in the paper's file of numbers, and of the number whose uncertainty it has.
+#: Names in the paper's file of numbers: of the published value, and of its uncertainty.
 _PUBLISHED = {
     **{name: (name, name) for name in ("mu0", "A", "B", "D0")},
     "eps_ratio": ("transmission", "transmission"),
@@ -127,8 +127,8 @@ def paper_procedure(
     thresholds : Thresholds
         For step 2.
     fixed : mapping, optional
-        K and W0 where they are no columns, in SI or as texts with units; those of the paper if
-        they are neither. V0, at which mu0 is read, is 1 um/s by default.
+        K and W0 if they are not columns, in SI or as texts with units; by default those of the
+        paper. V0, at which mu0 is read, is 1 um/s by default.
     progress : callable, optional
         Called with steps done, all steps, and a label.
 
@@ -228,7 +228,7 @@ class _SteadyStateNumbers:
         return [(self.values(shift), self.values(-shift)) for shift in shifts]
 
 
-# What leaves the range of doubles is refused at the end.
+# Numbers beyond the range of doubles are refused at the end.
 @np.errstate(all="ignore")
 def _steady_and_threshold(
     steady: LockInTable, thresholds: Thresholds, V0: float, warnings: list[str]
@@ -330,8 +330,8 @@ def _fitted(
 ) -> _FittedNumber:
     """The fit of a parameter, with the numbers of earlier steps fixed and `others` free too.
 
-    With `same_readings` those of `ratio`, the number of step 3, are those of this step: their noise
-    is not counted again.
+    With `same_readings`, step 3 had found `ratio` from the readings of this step: their noise is
+    not counted again.
     """
     fixed, material = {**constants, **base.values()}, PAPER.numbers
     if ratio is not None:

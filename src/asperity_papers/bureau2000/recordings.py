@@ -1,8 +1,9 @@
 """The simulated machine, the recordings of the paper's protocol, and the points read off them.
 
-The machine has the paper's slider, exciter and air layer, and sensors of our choice. Where the
-paper gives a number it is taken. It does not give the noise of its gauges; and at its central
-values sliding is unsteady without modulation, with which its protocol begins.
+The machine has the paper's slider, exciter and air layer at the paper's numbers. Two things differ:
+the paper does not give the noise of its sensors, which is our choice; and B is a little smaller,
+because at the paper's central values sliding without modulation, with which the protocol begins, is
+unsteady.
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ PRINTED = Machine()
 # --- The machine ----------------------------------------------------------------------------------
 
 #: B lies this much of its stated uncertainty below its central value, where K/Kc = 1.6 instead of
-#: 0.88. The response hardly depends on B: of fast modulation not at all.
+#: 0.88. The response hardly depends on B; that to fast modulation not at all.
 _BELOW = 0.6
 
-#: Of the eddy-current gauge: noise (m), and rms of the drift (m/s) that runs differ by.
+#: Eddy-current gauge: noise (m), and rms (m/s) of the drift, which differs between runs.
 GAUGE_NOISE, GAUGE_DRIFT = 10e-9, 0.2e-9
-#: Of the load cell (N), and the bandwidth of both (Hz).
+#: Noise of the load cell (N), and bandwidth of gauge and load cell (Hz).
 CELL_NOISE, BANDWIDTH = 5e-3, 1000.0
 
 #: Samples and cut-off of the recorder, over the frequency of the modulation. 35 samples in six
@@ -64,7 +65,8 @@ def slider() -> Slider:
 def exciter(frequency: float, *, vacuum: bool = False) -> Exciter:
     """The exciter at a frequency (Hz), on the air under a patch as the appendix proposes.
 
-    The appendix' full disc gives half of the measured shares at both frequencies, a patch both.
+    The full disc of the appendix gives half of the measured shares at both frequencies; a patch
+    gives both of them.
     """
     layer = None if vacuum else PRINTED.air_layer(R=radius())
     return Exciter.through_air(frequency, slider(), PRINTED.numbers.lambda_z, layer)
@@ -140,8 +142,8 @@ SimulatedPoints: TypeAlias = Mapping[str, pd.DataFrame]
 _GRAVITY = ("ok", "suspicious", "bad")
 #: Runs of a point, as many as the paper has averaged over in its Fig. 6.
 _SEEDS = 10
-#: Sliding without and with modulation (m), and never for less than so long (s): transients take
-#: two memory lengths and more.
+#: Distance (m) and shortest time (s) of sliding without and with modulation: transients take two
+#: memory lengths and more.
 _SLIDING, _MODULATED = (15e-6, 2.0), (16e-6, 2.0)
 #: Integration error of a step: a hundredth of the noise of any reading.
 _RTOL = 1e-6
@@ -175,7 +177,7 @@ class Series:
 
     @property
     def seeds(self) -> list[int]:
-        """Of its runs."""
+        """Seeds of the runs."""
         return [_SEEDS * self.number + run for run in range(int(PRINTED.numbers.runs_averaged))]
 
     @property
@@ -190,7 +192,7 @@ class Series:
 
     @property
     def transfer(self) -> complex:
-        """Borne over applied modulation, as the machine has it."""
+        """Borne over applied modulation in the machine."""
         return exciter(self.frequency, vacuum=self.vacuum).transfer
 
 
@@ -271,7 +273,7 @@ def all_series() -> tuple[Series, ...]:
 
 
 def _series(velocity: float, epsilons: tuple[float, ...], number: int) -> Series:
-    """In air, at the frequency of most of the paper's data; its name is that of the velocity."""
+    """A series in air, at the frequency of most of the paper's data, named after its velocity."""
     name = f"{1e6 * velocity:.3g} um/s"
     return Series(name, velocity, PRINTED.numbers.frequency, epsilons, number)
 
@@ -282,10 +284,10 @@ _ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"
 
 @contextmanager
 def experiment_in_background() -> Iterator[Callable[[], SimulatedPoints]]:
-    """Begin `experiment`, and hand out what waits for it; the same numbers on any machine.
+    """Start `experiment` in another process, and yield a function that waits for its points.
 
-    On a single core it is done when it is asked for. Left early, by Ctrl-C or an error, the
-    process ends.
+    On a single core, that function computes them. The numbers are the same on any machine. If the
+    block is left early, by Ctrl-C or an error, the process is ended.
     """
     from loky import ProcessPoolExecutor, cpu_count
 

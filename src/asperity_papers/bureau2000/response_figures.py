@@ -20,7 +20,7 @@ from asperity_papers.bureau2000.machine import EXT, LD, RR, SLOW, Float, Machine
 
 #: Velocities per decade in figure 3.
 _PER_DECADE = 12
-#: Curves of figure 5, with what bears the load.
+#: Curves of figure 5: the pressure of the air, and the extent of the layer.
 VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
 
 
@@ -105,7 +105,7 @@ figure_6 = CurveFigure(
 )
 
 
-#: Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop.
+#: Rice-Ruina at the slow velocity, with the stated drop at the fitted share.
 figure_7 = CurveFigure("figure-07", lambda machine: figure_6.curves(machine)[:1])
 
 
@@ -129,11 +129,11 @@ def curves_9(machine: Machine) -> list[FigureCurve]:
     return curves_of_laws(machine, {**two, "RR": (RR, {})})
 
 
-#: Linker-Dieterich with two coefficients, and Rice-Ruina to hold it against.
+#: Linker-Dieterich with two coefficients, and Rice-Ruina for comparison.
 figure_9 = CurveFigure("figure-09", curves_9)
 
 
-#: The elasto-plastic law, what the uncertainties make of it, and inertia.
+#: The elasto-plastic law, also at the ends of its parameters' uncertainties, and with inertia.
 figure_11 = CurveFigure(
     "figure-11", lambda machine: elastic_curves(machine, machine.borne_amplitudes())
 )

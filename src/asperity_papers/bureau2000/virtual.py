@@ -1,8 +1,9 @@
 """A virtual experiment: the paper's protocol, simulated, recorded with noise and read again.
 
-The measured points of Figs. 2 to 5 are not in the text, and nothing here stands for them: these are
-the points that the elasto-plastic law would have made of the same protocol, with error bars from
-the same reading that a laboratory's recordings get, next to the model's lines.
+The measured points of Figs. 2 to 5 are not in the text, and nothing here replaces them. The points
+are those that the same protocol measures on a simulated slider with the elasto-plastic law. Their
+error bars come from the analysis of recordings that a laboratory uses; the model's lines are drawn
+next to them.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ class RecoveredQuantity:
     value, uncertainty : float
         Standard uncertainty.
     true_value : float
-        Value of the model, or given to the machine: what the readings know nothing of.
+        Value of the model, or the one given to the machine. The readings do not use it.
     stated : str
         What the text of the paper says about its own experiment.
     """
@@ -89,7 +90,7 @@ class RecoveredQuantity:
 
     @property
     def agrees(self) -> bool:
-        """Whether the 95 % interval holds the value in the simulated machine."""
+        """Whether the 95 % interval contains the value in the simulated machine."""
         return bool(abs(self.value - self.true_value) <= NORMAL * self.uncertainty)
 
 
@@ -282,7 +283,7 @@ def collapse(vacuum: pd.DataFrame, air: pd.DataFrame) -> tuple[float, float]:
     return float(best[0]), float(np.sqrt(covariance[0, 0]))
 
 
-#: What makes each figure out of the experiment, in the order of the paper.
+#: The functions that make the figures from the points, in the order of the paper.
 VIRTUAL: tuple[Callable[[SimulatedPoints], VirtualFigure], ...] = (
     partial(over_amplitude, "virtual-02", SPEEDS),
     over_velocity,
@@ -329,7 +330,7 @@ def _within(figure: VirtualFigure) -> np.ndarray:
 
 
 def recovered_table(figures: Sequence[VirtualFigure]) -> str:
-    """What the recordings say, the value in the simulated machine, and what the paper states."""
+    """The readings, the values in the simulated machine, and the statements of the paper."""
     heads = {
         "Read off simulated recordings": "statement", "Reading, ± 95 %": "computed",
         "The machine has": "stated", "The text has": "stated",
@@ -349,7 +350,7 @@ def _cells(quantity: RecoveredQuantity) -> tuple[str, ...]:
 
 
 def provenance(figure: VirtualFigure, what: str) -> list[str]:
-    """What the first lines of a CSV say: `what` it has, points or lines, and how it was made."""
+    """First lines of a CSV file: its content (`what`: points or lines), and how it was made."""
     runs = [
         f"  {s.name}, {s.frequency:g} Hz: seeds {', '.join(map(str, s.seeds))}; eps_eff/eps "
         f"{abs(s.transfer):.6g}; sliding {s.sliding:.4g} s, modulated {s.modulated:.4g} s"

@@ -21,7 +21,7 @@ _PER_STRETCH = 400
 
 
 def figure_2(laboratory: Laboratory) -> FigureNumbers:
-    """Velocity steps, by an integration of both."""
+    """Velocity steps up and down, integrated in time."""
     p, rows, peaks = laboratory.numbers, [], {}
     slow, fast = laboratory.pair("V_2")
     for n, (name, letter) in enumerate(LAWS.items()):
@@ -32,7 +32,7 @@ def figure_2(laboratory: Laboratory) -> FigureNumbers:
         programme = Programme(*steps, load=1.0, velocity=slow)
         ends = np.concatenate([[0.0], np.cumsum(spans)])
         way = np.concatenate([[0.0], np.cumsum(lengths)])
-        # Close to each step, where much happens, and even beyond.
+        # Dense just after each step, evenly spaced beyond.
         share = np.unique(
             np.concatenate([np.linspace(0, 1, _PER_STRETCH), np.geomspace(1e-4, 1, _PER_STRETCH)])
         )
@@ -47,13 +47,13 @@ def figure_2(laboratory: Laboratory) -> FigureNumbers:
     return FigureNumbers("figure-02", pd.concat(rows, ignore_index=True), peaks, quoted)
 
 
-#: Curves of Figure 3: law, spring, and how they are called.
+#: Springs of Figure 3, and their symbols in the names of its curves.
 _SPRINGS = {"soft": "k_n", "stiff": "k_s"}
 
 
-def figure_3(laboratory: Laboratory, times: np.ndarray | None = None) -> FigureNumbers:
+def figure_3(laboratory: Laboratory) -> FigureNumbers:
     """Healing against hold time, three laws at two springs, and the points."""
-    time = np.geomspace(2, 1e5, 48) if times is None else times
+    time = np.geomspace(2, 1e5, 48)
     springs = {"soft": laboratory.soft, "stiff": laboratory.stiff}
     rows = [
         pd.DataFrame(

@@ -84,7 +84,7 @@ class Laboratory:
         return self.granite(name, A=p.A_2, B=p.B_2, D0=p.D0_2)
 
     def gouge(self) -> RiceRuina:
-        """Quartz gouge of Figure 5, with the memory length of granite: its is not printed."""
+        """Quartz gouge of Figure 5, with the memory length of granite: its own is not printed."""
         p = self.numbers
         return self.granite(AGEING, A=p.B_5 - p.B_less_A_5, B=p.B_5)
 

@@ -25,7 +25,7 @@ from asperity.ledger import (
 from asperity.ledger.claims import computed_numbers, headlines
 from asperity.ledger.contents import HeadlineWords
 from asperity_papers.bureau2000 import checks
-from asperity_papers.bureau2000.checks import features, perturbation
+from asperity_papers.bureau2000.checks import introduction, perturbation
 from asperity_papers.bureau2000.machine import APPLIED, EXT, Law, Machine
 from references import snippets as pages
 
@@ -192,8 +192,8 @@ def test_the_curves_reach_the_amplitude_of_the_saturation_claim():
 
 
 def test_features_have_the_verdicts_of_their_claims(claims, model):
-    lacking = features.missed(model, Law(EXT))
-    for name, key in features.CLAIMS.items():
+    lacking = introduction.missed(model, Law(EXT))
+    for name, key in introduction.FEATURES.items():
         assert (name in lacking) == (claims[key].verdict != "reproduced"), name
 
 
@@ -316,9 +316,9 @@ def test_a_wrong_model_would_change_the_verdicts_on_the_measurements(model):
     for name in ("mu1-order", "drop-over-mu1"):
         assert _one(name, changed).verdict == "differs"
     strongest = Law(EXT, strongest=True)
-    lacking = features.missed(changed, strongest)
+    lacking = introduction.missed(changed, strongest)
     assert {"mu1", "mu1 against V", "drop over mu1", "mu2 over mu1"} <= set(lacking)
-    assert features.missed(model, strongest) == []
+    assert introduction.missed(model, strongest) == []
 
 
 def test_negligible_inertia_would_be_reproduced(model):

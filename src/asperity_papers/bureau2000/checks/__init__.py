@@ -12,5 +12,5 @@ from asperity_papers.bureau2000.machine import Machine
 
 
 def model(numbers: Material) -> Machine:
-    """What the checks are given: slider and air layer at one set of the paper's numbers."""
+    """The argument of the checks: slider and air layer at one set of the paper's numbers."""
     return Machine(numbers)

@@ -11,11 +11,7 @@ from asperity.air import (
     shear_viscosity_ratio,
 )
 from asperity.ledger import check
-from asperity_papers.bureau2000.machine import RR, Float, Machine
-
-Numbers = dict[str, float]
-Mixed = dict[str, float | str]
-
+from asperity_papers.bureau2000.machine import RR, Float, Machine, Mixed, Numbers
 
 # --- The contacts in the normal direction, and the gap between them ------------------------------
 

@@ -19,11 +19,9 @@ from asperity_papers.bureau2000.machine import (
     STRONGEST,
     Float,
     Machine,
+    Numbers,
     by_speed,
 )
-
-Numbers = dict[str, float]
-
 
 # --- II.A: the machine, and the steadiness of sliding --------------------------------------------
 

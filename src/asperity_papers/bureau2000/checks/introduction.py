@@ -2,18 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 from scipy.integrate import quad
 
 from asperity.laws import LinkerDieterich
-from asperity.ledger import check
-from asperity_papers.bureau2000.checks.features import met, missed
-from asperity_papers.bureau2000.machine import EXT, LD, RR, Law, Machine, by_speed
+from asperity.ledger import check, judge_claims
+from asperity_papers.bureau2000.machine import (
+    EXT,
+    LD,
+    PAPER,
+    RR,
+    Law,
+    Machine,
+    Mixed,
+    Numbers,
+    by_speed,
+)
 
-Numbers = dict[str, float]
-Mixed = dict[str, float | str]
+#: Features of the response at 120 Hz, 1 and 10 um/s, and the claim that states each. The text
+#: prints no experimental points; a law is compared with what these claims say was measured.
+FEATURES: Mapping[str, str] = {
+    "drop": "relative-drop",
+    "drop against V": "drop-velocity-independent",
+    "mu1": "mu1-order",
+    "mu1 against V": "mu1-velocity-independent",
+    "drop over mu1": "drop-over-mu1",
+    "mu2 over mu1": "mu2-over-mu1",
+    "mu2 against V": "mu2-lower-when-slow",
+}
+
+
+def missed(machine: Machine, law: Law) -> list[str]:
+    """The features that a law does not meet, judged by the rules and amplitudes of their claims."""
+    stated = tuple(entry for entry in PAPER.contents.claim if entry.id in FEATURES.values())
+    contents = PAPER.contents.model_copy(update={"claim": stated})
+    model = SimpleNamespace(terms=machine.terms | {"EXT": law})
+    claims = judge_claims(contents, {}, machine.numbers, lambda _: model)
+    failed = {claim.id for claim in claims if claim.verdict != "reproduced"}
+    return [name for name, claim in FEATURES.items() if claim in failed]
+
+
+def met(machine: Machine, law: Law) -> str:
+    """How many of the features a law meets, and which it misses, as text."""
+    lacking, total = missed(machine, law), len(FEATURES)
+    text = f"{total - len(lacking)} of {total}"
+    return f"{text} (not: {', '.join(lacking)})" if lacking else text
 
 
 # --- Abstract, and the summary of results in section I -------------------------------------------

@@ -11,12 +11,9 @@ from asperity_papers.bureau2000.machine import (
     RR,
     STRONGEST,
     Machine,
+    Numbers,
     at,
 )
-
-Numbers = dict[str, float]
-Mixed = dict[str, float | str]
-
 
 # --- III.A.2 and III.A.3: the Rice-Ruina model integrated numerically ----------------------------
 

@@ -11,9 +11,8 @@ from asperity import Slider, perturbation_response
 from asperity.ledger import check
 from asperity.theory import SmallModulation, closed_forms as cf
 from asperity_papers.bureau2000.integration import IntegratedOrbit
-from asperity_papers.bureau2000.machine import RR, Machine
+from asperity_papers.bureau2000.machine import RR, Machine, Numbers
 
-Numbers = dict[str, float]
 Form = Literal["as_printed", "derived"]
 
 #: Amplitude of the integrations that check formulas of leading order: eps mu/A = 0.04.

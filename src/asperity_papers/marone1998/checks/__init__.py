@@ -7,5 +7,5 @@ from asperity_papers.marone1998.laboratory import Laboratory
 
 
 def model(numbers: Material) -> Laboratory:
-    """Arguments of the checks."""
+    """The argument of the checks."""
     return Laboratory(numbers)

@@ -19,14 +19,14 @@ from asperity_papers.marone1998.laboratory import (
     by_law,
 )
 
-#: Over the paper's: a spring that hardly yields.
+#: Stiffness over the paper's of a spring that hardly yields.
 _STIFF = 1e4
 
 
 def up_and_down(
     laboratory: Laboratory, name: str, factor: float = 1.0, *, settling: bool = False
 ) -> VelocityStepResponse:
-    """The steps of Figure 2, from steady sliding both."""
+    """The steps of Figure 2, both from steady sliding."""
     p = laboratory.numbers
     slow, fast = laboratory.pair("V_2")
     return step_response(
@@ -54,7 +54,7 @@ def figure_2(laboratory: Laboratory, name: str) -> Numbers:
 @check("peak-height", "direct")
 @check("peak-to-end", "evolution")
 def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
-    """Of each law at the printed stiffness and at one that does not matter."""
+    """Change of friction at the printed stiffness, and at one so high that it does not matter."""
 
     def change(law: str, *stiffness: float) -> float:
         return float(getattr(up_and_down(laboratory, law, *stiffness), name)[0])
@@ -65,7 +65,7 @@ def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
 
 @check("end-level")
 def end_level(laboratory: Laboratory) -> Numbers:
-    """At 7 Dc, by an integration of that length, and in the end."""
+    """Drop of friction 7 Dc after the step, by integration, and in the limit."""
     p = laboratory.numbers
     slow, fast = laboratory.pair("V_2")
     steps = Programme(Slide(7 * p.D0_2 / fast, velocity=fast), load=1.0, velocity=slow)

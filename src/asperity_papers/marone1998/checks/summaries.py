@@ -94,7 +94,7 @@ def afterslip_relation(laboratory: Laboratory) -> Numbers:
 
 @check("maximum-condition")
 def maximum_condition(laboratory: Laboratory) -> Numbers:
-    """One and what is said to vanish: healing as printed, and d mu/dt over k V, at the maximum."""
+    """One plus what is said to vanish at the maximum: healing as printed, d mu/dt over k V."""
     k, V = laboratory.stiff
     held = laboratory.holds(AGEING, k, V, 1e3)
     return {
