@@ -106,6 +106,16 @@ def test_stamps_of_an_exact_clock_are_kept(seed) -> None:
     assert [f.name for f in check(Trace(time, {}))] == ["gap"]
 
 
+@pytest.mark.parametrize(("samples", "rate", "digits"), [(40, 400, 3), (5000, 1000.02, 5)])
+def test_a_few_steps_of_two_quanta_or_more_are_enough(samples, rate, digits) -> None:
+    """Lost samples make steps of whole samples, and a delay is no multiple of the other steps."""
+    stamps = np.round(np.arange(samples) / rate, digits)
+    assert [f.name for f in check(Trace(stamps, {}))] == ["rounded time"]
+    assert np.ptp(np.diff(even_times(stamps))) < 1e-9
+    stamps[samples // 2 :] += 0.4 / rate
+    assert [f.name for f in check(Trace(stamps, {}))] == ["uneven sampling"]
+
+
 @pytest.mark.parametrize("lost", [1, 5, 30, 100])
 @pytest.mark.parametrize("seed", range(3))
 def test_samples_lost_at_random_are_gaps(seed, lost) -> None:
