@@ -30,11 +30,11 @@ _MOSTLY_EQUAL, _WHOLE = 0.5, 0.02
 #: where the load in F/W changes by a step of its own.
 _LEAST = 0.05
 #: A sample-and-hold channel repeats at least a tenth of its samples, and has several quantisation
-#: steps between them.
-_REPEATED, _STEPS = 0.1, 4.0
-#: Regular holding: share of runs of the usual length. Irregular holding: share of repeated samples,
-#: and size of the steps between them.
-_REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
+#: steps between them: a sine whose usual difference is this many steps repeats 5 % at its extremes.
+#: Of 73 held channels of `benchmarks.hostile_modulation` all are named, and of 1,046 clean ones of
+#: `benchmarks.clipped_recordings` four, three of them with narrow peaks and one with four samples a
+#: period.
+_REPEATED, _STEPS = 0.1, 5.0
 
 
 #: No rows.
@@ -228,11 +228,6 @@ def held_length(values: Float) -> float | None:
     repeated = 1 - moving.size / max(steps.size, 1)
     if repeated < _REPEATED or moving.size < 16:
         return None
-    jump = float(np.median(moving)) / float(moving.min())
-    at = np.flatnonzero(steps > 0)
-    runs = np.diff(at)
-    length = float(runs.mean())
-    regular = float(np.mean((runs >= np.floor(length)) & (runs <= np.ceil(length))))
-    if jump > _STEPS and regular > _REGULAR:
-        return length
-    return length if jump > _FAR and repeated > _OFTEN else None
+    if not float(np.median(moving)) > _STEPS * float(moving.min()):
+        return None
+    return float(np.diff(np.flatnonzero(steps > 0)).mean())
