@@ -16,6 +16,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import symbol
 from asperity.lock_in.reading import LockInReading
+from asperity.lock_in.reference import strongest_line
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import LOCK_IN, Check
 from asperity.measurement.window import LoadInterval
@@ -24,12 +25,13 @@ from asperity.recording.defects.levels import held_length
 _PIECE = 1 << 16
 #: Mains frequencies (Hz), how many harmonics of them count, and how far a network wanders (Hz).
 _MAINS, _MAINS_HARMONICS, _WANDER = (50.0, 60.0), 4, 0.2
-#: A line counts above this multiple of its scatter.
+#: A line counts above this multiple of its background, a median. White noise exceeds it at one of
+#: the five spectral values that are searched once in 13,000 times.
 _SEEN = 4.0
 #: A modulation is switched off where less than this share of it is left.
 _SWITCHED = 0.5
-#: Pieces of a pause from which the scatter of a line is estimated, and fewest periods of a piece.
-_LINE_PIECES, _LINE_PERIODS = 8, 4
+#: Fewest periods and samples in which a line is searched.
+_LINE_PERIODS, _LINE_SAMPLES = 32, 128
 
 #: Phases into which a period is folded, and fewest samples of a phase.
 _PHASES, _FEWEST = 128, 4
@@ -119,9 +121,9 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
     switched = False
     for part in parts:
         cut = slice(part.first, part.stop)
-        line, doubt = _line(samples.time[cut], samples.load[cut], f)
-        quiet = not part.modulated and doubt < np.inf
-        switched |= quiet and line + doubt < _SWITCHED * number * abs(reading.W0)
+        line, background = _line(samples.time[cut], samples.load[cut], f)
+        quiet = not part.modulated and background < np.inf
+        switched |= quiet and line + background < _SWITCHED * number * abs(reading.W0)
     sentence = (
         f"the modulation, epsilon = {number:.3g} at {f:.6g} Hz, lies at a harmonic of the mains "
         f"({near[0]:g} Hz); so small a one may be hum in the load's signal and no modulation"
@@ -159,14 +161,14 @@ def lines_in_the_pauses(
                 continue
             f = n * reading.frequency
             cut = slice(part.first, part.stop)
-            line, doubt = _line(samples.time[cut], samples.force[cut], f)
-            if not doubt < np.inf:
+            line, background = _line(samples.time[cut], samples.force[cut], f)
+            if not background < np.inf:
                 continue
             harmonic = reading.phasor(n)
             height = max(harmonic.amplitude, harmonic.amplitude_uncertainty) * abs(reading.W0)
             number = line / height
             # An effect smaller than the uncertainty of the harmonic is not reported.
-            seen = line > _SEEN * doubt and line > harmonic.amplitude_uncertainty * abs(reading.W0)
+            seen = line > max(_SEEN * background, harmonic.amplitude_uncertainty * abs(reading.W0))
             if largest is None or (seen, number) > (largest[2], largest[0]):
                 sentence = (
                     f"without modulation the force has a line of {number:.2g} mu{n} "
@@ -195,9 +197,9 @@ def hum(reading: LockInReading, time: Float, force: Float) -> Check:
             # Harmonics of the modulation are responses.
             if abs(m * base / f - round(m * base / f)) * f < 1.0:
                 continue
-            line, doubt = _line(time, force, m * base)
+            line, background = _line(time, force, m * base)
             share = line / max(reading.phasor(n).amplitude * abs(reading.W0), 1e-300)
-            if line > _SEEN * doubt and share > number:
+            if line > _SEEN * background and share > number:
                 number, seen = share, True
                 sentence = (
                     f"hum at {m * base:g} Hz is {share:.2g} of mu{n} {symbol('W0')}; mains have "
@@ -207,24 +209,13 @@ def hum(reading: LockInReading, time: Float, force: Float) -> Check:
 
 
 def _line(time: Float, values: Float, frequency: float) -> tuple[float, float]:
-    """Amplitude of a line and its scatter from pieces; infinite where there are too few periods."""
+    """Amplitude of a line, and its background; infinite where there are too few periods."""
     span = float(time[-1] - time[0])
-    if time.size < 16 * _LINE_PIECES or span * frequency < _LINE_PIECES * _LINE_PERIODS:
+    few = time.size < _LINE_SAMPLES or span * frequency < _LINE_PERIODS
+    if few or frequency > 0.45 * (time.size - 1) / span:
         return 0.0, np.inf
-    if frequency > 0.45 * (time.size - 1) / span:
-        return 0.0, np.inf
-    phasors = []
-    # Steps and ramps at the edges of a pause are broad lines: a window keeps them out.
-    for piece in np.array_split(np.arange(time.size), _LINE_PIECES):
-        t, x = time[piece], values[piece]
-        u = 2 * np.pi * np.arange(t.size) / t.size
-        weight = (1 - np.cos(u)) / t.size
-        detrended = x - np.polynomial.Polynomial.fit(t, x, 1)(t)
-        phasors.append(2 * np.sum(weight * detrended * np.exp(-2j * np.pi * frequency * t)))
-    mean = np.mean(phasors)
-    # A network wanders: the pieces need not agree in phase as the mean does.
-    scatter = np.sqrt(np.mean(np.abs(phasors - mean) ** 2) / (_LINE_PIECES - 1))
-    return float(abs(mean)), float(scatter)
+    line = strongest_line(time, values, between=(frequency, frequency))
+    return line.amplitude, line.background
 
 
 class _Cycle(NamedTuple):
