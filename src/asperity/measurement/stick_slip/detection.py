@@ -18,8 +18,6 @@ _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
 _NEAR = 10
 #: Quantile, by time, of the slopes of rises that is the usual loading slope.
 _LOADING = 0.75
-#: Longest swing of the instrument back, over the usual duration of a fall.
-_SWING = 3.0
 #: In symmetrical noise half of the rises last longer than the falls next to them. An excess of this
 #: many standard deviations shows loading and slip.
 _ASYMMETRY = 3.0
@@ -307,9 +305,7 @@ def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, I
     """Join falls between which the force rises faster than the spring can load.
 
     The slider does not move backwards: a rise twice as fast as the loading around it is the
-    instrument's. Loading is as fast as the fastest rises but for a quarter
-    of the time. The instrument swings back in half its period, which a fall takes too: what rises
-    for longer than three usual falls begins in an impulse.
+    instrument's. Loading is as fast as the fastest rises but for a quarter of the time.
     """
     if peak.size < 3:
         return peak, trough
@@ -325,7 +321,7 @@ def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, I
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
     fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
     usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
-    apart = (rate <= 2 * usual) | (length > _SWING * np.median(trough - peak))
+    apart = rate <= 2 * usual
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]
 
 
