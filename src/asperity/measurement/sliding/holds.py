@@ -304,15 +304,6 @@ def _top(time: Float, friction: Float, quick: float) -> tuple[float, float, floa
     )
 
 
-def _inflation(residual: Float) -> float:
-    """Inflation of a variance by neighbours that resemble each other."""
-    power = float(residual @ residual)
-    if power <= 0:
-        return 1.0
-    share = float(residual[1:] @ residual[:-1]) / power
-    return (1 + min(max(share, 0.0), 0.95)) / (1 - min(max(share, 0.0), 0.95))
-
-
 def _smoothed(values: Float, wide: int) -> Float:
     return moving_mean(np.pad(values, wide // 2, mode="edge"), wide)[: values.size]
 
@@ -342,21 +333,16 @@ def _reload(
     if end - begin < 4:
         return np.nan, np.nan
     x = np.abs(displacement[again : again + end] - displacement[again])
-    slope, doubt = _line(x[begin:], mu[begin:end])
+    if not np.ptp(x[begin:]) > 0:
+        return np.nan, np.nan
+    line, rise = columns(x[begin:], 1), mu[begin:end]
+    fit = fit_trend(line, rise)
+    left = rise - line @ fit.beta
+    # The few slow waves of a residual may be weak by chance.
+    noise = max(fit.variance, float(left @ left) / (rise.size - 2))
+    slope, doubt = float(fit.beta[1]), float(np.sqrt(noise * fit.inverse[1, 1]))
     # A coarse displacement may have two values, and no bend.
-    if not np.isfinite([slope, creep]).all() or np.unique(x).size < 3:
+    if not np.isfinite(creep) or np.unique(x).size < 3:
         return slope, doubt
     start = float(np.polynomial.Polynomial.fit(x, mu[:end], 2).deriv()(0.0))
     return slope, float(np.hypot(doubt, start + creep - slope))
-
-
-def _line(x: Float, y: Float) -> tuple[float, float]:
-    """Slope of y over x, and its standard uncertainty in noise that neighbours share."""
-    away = x - x.mean()
-    power = float(away @ away)
-    if power <= 0:
-        return np.nan, np.nan
-    slope = slope_of(x, y)
-    residual = y - y.mean() - slope * away
-    spread = float(residual @ residual) / max(y.size - 2, 1) * _inflation(residual)
-    return slope, float(np.sqrt(spread / power))
