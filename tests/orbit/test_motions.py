@@ -8,6 +8,7 @@ give the same harmonics and, by complex steps in the start, the same multipliers
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import jax
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -16,7 +17,7 @@ from scipy.special import wrightomega
 import asperity as asp
 from asperity.errors import InputError
 from asperity.laws import get_law
-from asperity.loads import modulated, sampled
+from asperity.loads import Periodic, modulated, sampled
 from references.populations import population
 
 MU0, A, B, D0, V0, LAMBDA = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7e-7
@@ -271,6 +272,38 @@ def test_a_sampled_period_is_the_modulation_it_was_sampled_from():
     for one, other in zip(built.at(theta), read.at(theta), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-13)
     assert read.amplitude == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("count", [1, 8, 9, 300])
+def test_a_sum_of_few_and_of_many_harmonics_is_the_sum_of_its_terms(count):
+    theta, k = np.linspace(0, 7, 50)[:, None], np.arange(1, count + 1)
+    a, b = np.random.default_rng(count).normal(size=(2, count, 3)) / count
+    at = Periodic(load=tuple(zip(a, b, strict=True))).at(theta)
+    cos, sin = np.cos(k * theta), np.sin(k * theta)
+    np.testing.assert_allclose(at.w, 1 + cos @ a + sin @ b, atol=1e-12)
+    np.testing.assert_allclose(at.w_slope, (k * cos) @ b - (k * sin) @ a, atol=1e-10)
+
+
+def test_many_harmonics_are_the_passes_of_a_loop():
+    """Unrolled, hundreds of harmonics took minutes to compile; of a few, a loop is slower."""
+
+    def loops(count):
+        load = Periodic(load=((0.1, 0.0),) * count)
+        return jax.jit(load.at).lower(0.3).as_text().count("stablehlo.while")
+
+    assert (loops(3), loops(300)) == (0, 1)
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+@pytest.mark.parametrize("load", [Periodic(), sampled([3.0, 3.0, 3.0, 3.0])], ids=str)
+def test_a_constant_load_is_steady_sliding(load, inertia):
+    drive = {"velocity": [1e-6, 2e-6], "frequency": 120.0, "inertia": inertia}
+    steady = asp.periodic_response(slider(True), modulation=load, **drive)
+    assert steady.converged.all()
+    np.testing.assert_allclose(steady.delta_mu, 0, atol=1e-15)
+    np.testing.assert_allclose(steady.mu1, 0, atol=1e-15)
+    expected = asp.periodic_response(slider(True), epsilon=0.0, **drive).multipliers
+    np.testing.assert_allclose(steady.multipliers, expected, rtol=1e-9)
 
 
 def test_slopes_are_derivatives():

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, Self, TypeAlias
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -139,9 +140,10 @@ class Periodic(Modulation):
     def formula(self) -> str:
         """What is modulated and how, as a text for provenance."""
         parts = {"w(t)": ("1", self.load), "shear/W0": ("", self.shear), "V(t)/V": ("1", self.pull)}
-        return ", ".join(
+        modulated = (
             f"{name} = {_written(mean, series)}" for name, (mean, series) in parts.items() if series
         )
+        return ", ".join(modulated) or "w(t) = 1"
 
     def scaled(self, share: ArrayLike) -> Periodic:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
@@ -149,14 +151,22 @@ class Periodic(Modulation):
         return Periodic(*(tuple((share * a, share * b) for a, b in s) for s in parts))
 
 
+@jax.jit
 def _sum(series: Series, theta: ArrayLike) -> tuple[Array, Array]:
     """Value and slope of a series."""
-    value = slope = jnp.zeros(jnp.shape(theta))
-    for k, (a, b) in enumerate(series, start=1):
+    parts = [part for pair in series for part in pair]
+    none = jnp.zeros(jnp.broadcast_shapes(jnp.shape(theta), *map(jnp.shape, parts)))
+    if not series:
+        return none, none
+    a, b = (jnp.stack(jnp.broadcast_arrays(*some)) for some in (parts[::2], parts[1::2]))
+
+    def with_term(sums: tuple[Array, Array], term: tuple[Array, ...]) -> tuple[Any, None]:
+        (value, slope), (k, a, b) = sums, term
         cos, sin = jnp.cos(k * theta), jnp.sin(k * theta)
-        value = value + a * cos + b * sin
-        slope = slope + k * (b * cos - a * sin)
-    return value, slope
+        return (value + (a * cos + b * sin), slope + k * (b * cos - a * sin)), None
+
+    terms = (jnp.arange(1, len(series) + 1), a, b)
+    return jax.lax.scan(with_term, (none, none), terms, unroll=_UNROLLED)[0]
 
 
 def _written(mean: str, series: Series) -> str:
@@ -174,6 +184,10 @@ def _written(mean: str, series: Series) -> str:
 #: Numbers of phases, over the period and over that of the highest harmonic, at which the load is
 #: checked to be positive: a dip has the width of the highest harmonic's period.
 _PHASES, _PHASES_OF_HARMONIC = 720, 16
+
+#: Terms of a series that are compiled one by one, so that XLA fuses them with what they are used
+#: in. More terms are the passes of a loop: the time to compile does not grow with their number.
+_UNROLLED = 8
 
 #: Fourier coefficients of a sampled period below this share of the largest are left out.
 _NEGLIGIBLE = 1e-13

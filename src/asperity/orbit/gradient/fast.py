@@ -148,7 +148,7 @@ class FourierEquations(Equations):
 
     def cycle(self, problem: Problem) -> LoadCycle:
         """The load on the grid."""
-        return load_cycle(problem.load, self.nodes, self.grading)
+        return load_cycle(problem, self.nodes, self.grading)
 
     def orbits(
         self, problem: Problem, harmonics: int

@@ -122,7 +122,7 @@ class BalanceEquations(Equations):
 
     def cycle(self, problem: Problem) -> LoadCycle:
         """The load on the grid."""
-        return load_cycle(problem.load, self.nodes, self.grading)
+        return load_cycle(problem, self.nodes, self.grading)
 
     def prepare(self, parameters: Parameters, unknowns: BalanceUnknowns) -> tuple[Prepared, Array]:
         """Prepared arrays of the solver, and its steps."""

@@ -111,12 +111,12 @@ class LoadCycle(NamedTuple):
         return self.stretch / len(self.stretch)
 
 
-def load_cycle(load: Modulation, nodes: int, grading: float) -> LoadCycle:
+def load_cycle(problem: Problem, nodes: int, grading: float) -> LoadCycle:
     """The load cycle on a grid of `nodes` per period."""
     tau, integral = grid(nodes)
     theta = tau + grading * np.sin(tau)
-    at = load.at(jnp.asarray(theta)[:, None])
-    shape = (nodes, jax.tree.leaves(load)[0].shape[-1])
+    at = problem.load.at(jnp.asarray(theta)[:, None])
+    shape = (nodes, points_of(problem))
     at = jax.tree.map(lambda a: jnp.broadcast_to(a, shape) if jnp.ndim(a) else a, at)
     return LoadCycle(theta, 1 + grading * np.cos(tau), integral, at)
 
@@ -261,7 +261,7 @@ def fourier_orbit(
     FourierOrbit
         `error` holds the estimate; inf where the iteration does not contract.
     """
-    cycle = load_cycle(load, nodes, grading)
+    cycle = load_cycle(Problem(system, load), nodes, grading)
     # Of a load that is known to be even, half of the symmetric grid suffices.
     part = nodes // 2 if isinstance(load, Harmonic) else nodes
     at = jax.tree.map(lambda a: a[:part] if jnp.ndim(a) else a, cycle.at)
@@ -308,7 +308,7 @@ def fourier_observables(
     harmonics : int
         Their number.
     """
-    cycle = load_cycle(load, len(orbit.zero_mean[0]), orbit.grading)
+    cycle = load_cycle(Problem(system, load), len(orbit.zero_mean[0]), orbit.grading)
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
     states = together(orbit.mean, orbit.zero_mean)
     _, push = jax.linearize(rates_on(system, cycle), *states)

@@ -32,7 +32,7 @@ from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import solve_columns, value_and_jacobian
 from asperity.arrays import Bool, Complex, Float, Index
 from asperity.loads import Excitation
-from asperity.orbit.batches import run_chunks, take
+from asperity.orbit.batches import points_of, run_chunks, take
 from asperity.orbit.floquet import multiplier_gap
 from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.methods.balance import sticking_joint
@@ -52,7 +52,7 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
     theta = 2 * np.pi * np.arange(_NODES)[:, None] / _NODES
-    points = jnp.ones(jax.tree.leaves(problem)[0].shape[-1])
+    points = jnp.ones(points_of(problem))
     at = load.at(jnp.asarray(theta))
     at = at._replace(w=at.w * points)
     softening = _softening(problem, points)
