@@ -278,9 +278,13 @@ def sampled(
     Parameters
     ----------
     load : array, shape (samples,), optional
-        W at each sample; its mean counts as W0.
+        W at each sample, in any unit: only its ratio to its mean counts, and W0 is the load of the
+        slider. The `epsilon` of a response is the amplitude of the first harmonic over the mean,
+        not half the distance between the largest and the smallest sample. Without any variation
+        the load is constant.
     velocity : array, shape (samples,), optional
-        Pulling velocity; its mean counts as V.
+        Pulling velocity in any unit: only its ratio to its mean counts, and V is the argument of
+        the response.
     shear : array, shape (samples,), optional
         Force on the slider along the pulling direction, in addition to the spring's, over W0, of
         mean zero.
