@@ -75,6 +75,20 @@ def test_the_jump_of_the_free_molecular_model_is_no_solution():
     assert answer.solutions == ()
 
 
+def test_the_fraction_of_the_vacuum_determines_no_gap_and_no_radius():
+    """Where the gap is narrower than the mean free path, air without viscosity has no effect."""
+    thin = replace(LAYER, P0=2e3, gas_flow="free-molecular", R=0.2)
+    vacuum = float(effective_modulation(120.0, **SLIDER))
+    for find in (gap, patch_radius):
+        answer = find(vacuum, 120.0, **SLIDER, layer=replace(thin, h0=1e-7))
+        assert answer.solutions == ()
+        assert answer.result.endswith("m gives eps_eff/eps = 1.05483, which does not determine it")
+    answer = gap(vacuum, 120.0, **SLIDER, layer=thin)
+    first, last = (float(answer.result.split()[i]) for i in (3, 5))
+    assert first == 1e-8
+    assert last == pytest.approx(float(thin.mean_free_path), rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

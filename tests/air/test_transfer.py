@@ -105,7 +105,7 @@ def test_the_transfer_function_does_not_depend_on_the_units(a, b, c):
 
 
 def _simulate(frequency, eps, layer=LAYER, cells=60, periods=14):
-    """Mean of W/W0 and harmonics 1 and 2 of W/(eps W0) from the unlinearised equations, marched in time.
+    """Mean of W/W0, harmonics 1 and 2 of W/(eps W0): unlinearised equations marched in time.
 
     Isothermal Reynolds equation d(P h)/dt = (1/r) d/dr [r P h^3/(12 eta) dP/dr] in finite volumes,
     M h'' = W(h) + (pressure force) - W0 (1 + eps cos wt), W(h) = W0 exp((h0 - h)/lambda_z). No

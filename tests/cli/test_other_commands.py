@@ -42,6 +42,21 @@ def test_air_set_replaces_the_material(asperity) -> None:
     assert record["points"][0]["ratio"] == pytest.approx(0.48, abs=0.005)
 
 
+def test_air_has_the_models_of_the_leak(asperity) -> None:
+    call = ("air", *MATERIAL, "-f", "200 Hz", "--set", "P0=10 mbar")
+    pmma = materials.load("bureau2000")
+    layer = {"P0": 1000.0, "h0": pmma.h0, "eta": pmma.eta_air, "R": pmma.R}
+    machine = {"W0": pmma.W0, "M": pmma.M, "lambda_z": pmma.lambda_z}
+    for flow in ("continuum", "slip", "free-molecular"):
+        record = json.loads(asperity(*call, "--gas-flow", flow, "--json").stdout)
+        expected = air.AirLayer(**layer, gas_flow=flow)
+        ratio = air.effective_modulation(200.0, layer=expected, **machine)
+        assert (record["gas_flow"], record["points"][0]["ratio"]) == (flow, ratio)
+    refused(asperity(*call, "--gas-flow", "sip"), "--gas-flow must be", "'slip'")
+    vacuum = (*call[:-2], "--vacuum", "--gas-flow", "slip")
+    refused(asperity(*vacuum), "--gas-flow must have an air layer, got --vacuum;")
+
+
 @pytest.mark.parametrize(("sought", "name"), [("radius", "R"), ("gap", "h0")])
 def test_air_inverse_gives_the_fraction_back(asperity, sought: str, name: str) -> None:
     shown = asperity(

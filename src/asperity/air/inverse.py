@@ -42,7 +42,8 @@ class InverseResult:
     reachable_min, reachable_max : float
         Smallest and largest eps_eff/eps within the bracket.
     result : str
-        "found", or a sentence with the fractions in reach.
+        "found", or a sentence: which fractions can be reached, or between which values all give the
+        measured one.
     """
 
     solutions: tuple[float, ...]
@@ -151,17 +152,37 @@ def _invert(
     u = np.linspace(np.log(ends[0]), np.log(ends[1]), _SCAN)
     scan = log_fractions(u)
     knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
-    roots = _roots(log_fraction, np.array(knots), target)
+    flat = _flat(u, scan, target)
+    roots = [
+        root
+        for root in _roots(log_fraction, np.array(knots), target)
+        if not (flat and flat[0] <= root <= flat[1])
+    ]
     values = np.exp(np.append(scan, [log_fraction(k) for k in knots]))
     lowest, highest = float(values.min()), float(values.max())
     result = tuple(float(np.exp(r)) for r in roots)
     text = "found"
-    if not result:
+    if flat:
+        text = (
+            f"every {field} from {np.exp(flat[0]):.3g} to {np.exp(flat[1]):.3g} m gives "
+            f"eps_eff/eps = {wanted:g}, which does not determine it"
+        )
+    elif not result:
         text = (
             f"no {field} between {ends[0]:g} and {ends[1]:g} m gives eps_eff/eps = {wanted:g}; "
             f"there it ranges from {lowest:.6g} to {highest:.6g}"
         )
     return InverseResult(result, lowest, highest, text)
+
+
+def _flat(u: Float, scan: Float, target: float) -> tuple[float, float] | None:
+    """Ends of the scan's points that give the target to the last bits, if there are several.
+
+    A layer without an effect has the fraction of the vacuum: one that "free-molecular" leaves
+    without viscosity, or a patch so small that its stiffness is lost in round-off.
+    """
+    same = u[np.abs(scan - target) <= 2 * np.finfo(float).eps]
+    return (float(same[0]), float(same[-1])) if len(same) > 1 else None
 
 
 def _extrema(function: Callable[[float], float], u: Float, scan: Float) -> list[float]:

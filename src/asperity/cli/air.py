@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -42,6 +42,7 @@ Parameters: R, h0, P0, eta of the layer; W0, M, lambda_z of the slider.
 @material_option()
 @set_option('--set "R=2.5 cm"')
 @switch("--vacuum", "Without air between the surfaces.")
+@option("--gas-flow", "MODEL", "Leak at low pressure: continuum, slip or free-molecular.")
 @option("--inverse", "RATIO", "Find what gives this eps_eff/eps.")
 @option("--for sought", "radius|gap", "What --inverse looks for.")
 @output_options()
@@ -50,6 +51,7 @@ def air(
     material: str | None,
     settings: tuple[str, ...],
     vacuum: bool,
+    gas_flow: str | None,
     inverse: str | None,
     sought: str | None,
     output: Output,
@@ -60,7 +62,11 @@ def air(
     against the load, |gamma R| of the layer and its stiffness.
     """
     from asperity.air import AirLayer
+    from asperity.air.layer import GasFlow
 
+    flow: GasFlow = one_of(gas_flow or "continuum", get_args(GasFlow), "--gas-flow")
+    flows = gas_flow is None or not vacuum
+    require(flows, "--gas-flow", "have an air layer", "--vacuum", "leave one of them out")
     if sought is not None:
         one_of(sought, ("radius", "gap"), "--for")
     together = (inverse is None) == (sought is None)
@@ -85,7 +91,7 @@ def air(
     if not vacuum:
         # The layer must be complete, although the value of the sought parameter is not used.
         P0, h0, R, eta = (numbers.get(name, 1.0) for name in ("P0", "h0", "R", "eta"))
-        layer = AirLayer(P0=P0, h0=h0, eta=eta, R=R)
+        layer = AirLayer(P0=P0, h0=h0, eta=eta, R=R, gas_flow=flow)
     if inverse is None or layer is None:
         return _forward(hertz, layer, numbers, output)
     ratio = number(inverse, "--inverse", "dimensionless", "positive")
@@ -148,14 +154,14 @@ def _forward(
         "ratio": effective_modulation(hertz, layer=layer, **contact),
         "phase": modulation_phase(hertz, layer=layer, **contact),
     }
-    stiffness = {}
+    stiffness: dict[str, Any] = {}
     if layer is not None:
         omega = 2 * np.pi * np.array(hertz)
         dynamic = layer.dynamic_stiffness(omega)
         columns["squeeze"] = layer.squeeze(omega)
         columns["layer_stiffness"] = np.stack([dynamic.real, dynamic.imag], axis=1)
         head += ["|gamma R|", "spring (N/m)", "damping (N/m)"]
-        stiffness = {"air_stiffness": layer.stiffness}
+        stiffness = {"air_stiffness": layer.stiffness, "gas_flow": layer.gas_flow}
     points = [
         {"frequency": f, **{name: np.asarray(c)[i].tolist() for name, c in columns.items()}}
         for i, f in enumerate(hertz)
@@ -198,10 +204,11 @@ def _invert(
                 "solutions": list(result.solutions),
                 "reachable": [result.reachable_min, result.reachable_max],
                 "result": result.result,
+                "gas_flow": layer.gas_flow,
                 "parameters": {n: v for n, v in numbers.items() if n != unknown},
             },
             lambda: [Section("", lengths)],
         )
-    if not result.found:
+    if result.result != "found":
         say(result.result)
     return 0 if result.found else 1
