@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 
 from asperity.errors import Argument, InputError, closest, require, require_known
 from asperity.figures.style import new_figure
-from asperity.parameters.arguments import number
-from asperity.study import open_store
+from asperity.parameters.arguments import file_path, number
+from asperity.study.results import dataset_of
+from asperity.study.store.store import SweepStore
 from asperity.units import KINDS
 
 
@@ -42,12 +43,11 @@ def plot_slice(
     Raises
     ------
     InputError
-        If the store has no such output or axis.
+        If the store has no such output or axis, or a chunk of the slice is damaged.
     """
-    result = open_store(store)
-    outputs = [str(n) for n, v in result.data_vars.items() if x in v.dims or len(v.dims) > 0]
-    require_known(show, outputs, "show", "be an output")
-    part = result[show]
+    opened = SweepStore(file_path(store, "store"), mode="r")
+    require_known(show, list(opened.arrays), "show", "be an output")
+    part = dataset_of(opened)[show]
     dims = [str(d) for d in part.dims]
     for name, side in (("x", x), ("y", y)):
         if side is not None:
@@ -59,15 +59,18 @@ def plot_slice(
         advice = closest(name, others) if others else "leave it out"
         require(name in others, "at", "name another axis than x and y", f"'{name}'", advice)
     numbered = {d: d in part.indexes and part[d].dtype.kind in "if" for d in dims}
-    for dim in dims:
+    rows = {}
+    for axis, dim in enumerate(dims):
         if dim in chosen and numbered[dim]:
             position = _in_si(chosen[dim], part[dim].attrs.get("units", "1"), dim)
-            part = part.sel({dim: position}, method="nearest")
+            rows[axis] = int(np.argmin(np.abs(part[dim].values - position)))
         elif dim not in (x, y):
-            row, rows = _in_si(chosen.get(dim, 0), "1", dim), part.sizes[dim]
-            whole, advice = row in range(rows), "give the number of a row"
-            require(whole, "at", f"be a row from 0 to {rows - 1} of {dim}", f"{row:g}", advice)
-            part = part.isel({dim: int(row)})
+            row, count = _in_si(chosen.get(dim, 0), "1", dim), part.sizes[dim]
+            whole, advice = row in range(count), "give the number of a row"
+            require(whole, "at", f"be a row from 0 to {count - 1} of {dim}", f"{row:g}", advice)
+            rows[axis] = int(row)
+    values = opened.part(show, rows)
+    part = part.isel({dims[axis]: row for axis, row in rows.items()}).copy(data=values)
     for side in (x, y):
         if side is not None and not numbered[side]:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})

@@ -228,6 +228,42 @@ def test_damaged_chunks_alone_are_solved_again(tmp_path: Path, closed_form: Clos
     assert files_of(out) == whole
 
 
+@pytest.mark.parametrize("fault", ["bit", "cut", "empty", "missing"])
+@pytest.mark.parametrize("name", ["mu1", "status"])
+def test_a_damaged_chunk_is_not_read(
+    tmp_path: Path, closed_form: ClosedForm, name: str, fault: str
+) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    file = out / name / "c" / "0" / "1"
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    left = {"bit": content, "cut": content[: len(content) // 2], "empty": b""}
+    file.unlink()
+    if fault in left:
+        file.write_bytes(left[fault])
+    elif name == "status":
+        # Without this file the chunk is not done; its values are those of an interrupted run.
+        values = plot_slice(out, "mu1", x="epsilon").axes[0].lines[0].get_ydata()
+        assert np.isnan(values[10:]).all()
+        assert np.isfinite(values[:10]).all()
+        return
+    readers = (
+        open_store, summary_statistics, lambda store: plot_slice(store, "mu1", x="epsilon"),
+        lambda store: plot_slice(store, "mu1", x="epsilon", y="K"),
+        lambda store: export_store(store, tmp_path / "s.nc"),
+    )  # fmt: skip
+    for reader in readers:
+        with pytest.raises(
+            InputError, match=r"must be whole, got 's\.zarr', whose chunk 1 is miss"
+        ):
+            reader(out)
+    assert store_status(out).chunks_damaged == 1
+    # Another part of the store is whole.
+    curve = plot_slice(out, "mu1", x="epsilon", at={"K": 2.0}).axes[0].lines[0]
+    assert np.array_equal(curve.get_ydata()[:10], 2 * curve.get_xdata()[:10])
+
+
 def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -> None:
     out = tmp_path / "s.zarr"
     # A lock of another process of this machine: locks of one process do not exclude each other

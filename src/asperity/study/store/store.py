@@ -7,7 +7,7 @@ array ``status`` says so; this number is written when the data of the chunk are 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from glob import glob
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import zarr
 
+from asperity.arrays import Float
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.outputs.written import to_disk
@@ -108,27 +109,29 @@ class SweepStore:
         except OSError:
             return False
 
-    def states(self) -> Iterator[tuple[int, int, bool]]:
-        """Chunks that are done, with their failed points, and whether they are sound."""
-        for chunk in range(self.grid.chunk_count):
+    def states(self, chunks: Iterable[int] | None = None) -> Iterator[tuple[int, int, bool]]:
+        """Of all chunks or of `chunks` those that are done: failed points, and if sound."""
+        for chunk in range(self.grid.chunk_count) if chunks is None else chunks:
             # A chunk that a driver is writing may appear damaged once.
             for _ in range(2):
+                # Of a chunk that is not done there is no such file.
+                done = self._file("status", chunk).exists()
                 failed = self.failed_in(chunk)
-                sound = failed == NOT_DONE or self.is_sound(chunk)
+                sound = not done or self.is_sound(chunk)
                 if sound:
                     break
-            if failed != NOT_DONE:
+            if done:
                 yield chunk, failed, sound
 
-    def done(self) -> Iterator[int]:
-        """Chunks that are done.
+    def done(self, chunks: Iterable[int] | None = None) -> Iterator[int]:
+        """Of all chunks or of `chunks` those that are done.
 
         Raises
         ------
         InputError
             If the files of a chunk do not agree with its checksum.
         """
-        for chunk, _, sound in self.states():
+        for chunk, _, sound in self.states(chunks):
             if not sound:
                 raise _damaged(self.path, f"chunk {chunk}")
             yield chunk
@@ -176,6 +179,35 @@ class SweepStore:
         """The variables of a chunk as arrays of its shape."""
         slices = self.grid.slices(chunk)
         return {n: self.arrays[n][slices] for n in names or tuple(self.arrays)}
+
+    def part(self, name: str, rows: Mapping[int, int]) -> Float:
+        """An output at rows of some axes, along the other axes; NaN in chunks that are not done.
+
+        Parameters
+        ----------
+        name : str
+        rows : mapping of int to int
+            Row by number of the axis. Only the chunks of these rows are read.
+
+        Raises
+        ------
+        InputError
+            As for `done`.
+        """
+        grid, others = self.grid, [a for a in range(len(self.grid.shape)) if a not in rows]
+        values: Float = np.full([grid.shape[axis] for axis in others], np.nan)
+        place: list[Any] = [slice(None)] * len(grid.shape)
+        for axis, row in rows.items():
+            place[axis] = row // grid.chunks[axis]
+        numbers = np.arange(grid.chunk_count).reshape(grid.chunk_shape)[tuple(place)]
+        for chunk in self.done(np.ravel(numbers).tolist()):
+            slices = grid.slices(chunk)
+            inside: list[Any] = [slice(None)] * len(slices)
+            for axis, row in rows.items():
+                inside[axis] = row - slices[axis].start
+            answers = self.read(chunk, (name,))[name][tuple(inside)]
+            values[tuple(slices[axis] for axis in others)] = answers
+        return values
 
     def _file(self, name: str, chunk: int) -> Path:
         return chunk_file(self.path, name, self.grid.place(chunk))
