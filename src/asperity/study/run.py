@@ -124,6 +124,11 @@ def run_sweep(
             require_disk(missing, path.parent, "out", f"{store.grid.points:,} points",
                          "choose another disk or fewer outputs")  # fmt: skip
             pool_workers = stack.enter_context(pool)
+            with _writing(path):
+                # With --retry-failed the versions may differ from the first run's; each run
+                # records its own.
+                runs = [*store.root.runs, _started(pool_workers)]
+                store.update_attributes(runs=runs, numerics=numerics())
         except InputError:
             # A run that is refused leaves no new store.
             if fresh:
@@ -133,7 +138,7 @@ def run_sweep(
             str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
             str(plan.folder.resolve()), numerics(),
         )  # fmt: skip
-        return _run(store, lock, pool_workers, job, progress, log)
+        return _run(store, lock, pool_workers, job, runs, progress, log)
 
 
 def _remove_refused(path: Path, kind: object, error: object, trace: object) -> None:
@@ -227,6 +232,7 @@ def _run(
     lock: StoreLock,
     workers: Workers,
     job: Job,
+    runs: list[dict[str, Any]],
     progress: Callable[[SweepProgress], None] | None,
     log: Callable[[str], None],
 ) -> SweepProgress:
@@ -234,9 +240,6 @@ def _run(
     counts = SweepProgress(store.path, total=grid.points, chunk_total=grid.chunk_count)
     if not job.retry:
         counts.stored = round(store.share_done() * grid.points)
-    runs = [*store.root.runs, _started(workers)]
-    # With --retry-failed the versions may differ from the first run's; each run records its own.
-    store.update_attributes(runs=runs, numerics=numerics())
     refreshed = time.monotonic()
 
     def tick(now: SweepProgress) -> None:

@@ -209,6 +209,32 @@ def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm
     assert files_of(out) == before
 
 
+@pytest.mark.parametrize("of_store", [True, False])
+def test_a_disk_that_is_full_at_the_start_is_a_sentence_and_leaves_no_store(
+    tmp_path: Path, closed_form: ClosedForm, of_store: bool
+) -> None:
+    """The record of the run, and the lock, are the first files after those of the plan."""
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    module, name = (store, "write_root") if of_store else (os, "pwrite")
+    sentence = "out must .*disk is full|out must .*no space left on device"
+    out = tmp_path / "s.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, name, full)
+        with pytest.raises(InputError, match=sentence):
+            run(out)
+    assert not list(tmp_path.iterdir())
+    run(out)
+    before = files_of(out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, name, full)
+        with pytest.raises(InputError, match=sentence):
+            run(out)
+    assert files_of(out) == before
+
+
 def test_damaged_chunks_alone_are_solved_again(tmp_path: Path, closed_form: ClosedForm) -> None:
     """One of six chunks stays."""
     out = tmp_path / "s.zarr"

@@ -64,7 +64,8 @@ def store_lock(store: Path) -> Iterator[StoreLock]:
         If another driver has it, or the file cannot be written.
     """
     path, token = lock_file(store), uuid.uuid4().hex
-    descriptor = _locked(path)
+    with _sentence(path):
+        descriptor = _locked(path)
     record = {
         "token": token,
         "host": socket.gethostname(),
@@ -72,24 +73,32 @@ def store_lock(store: Path) -> Iterator[StoreLock]:
         "since": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
     }
     try:
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, json.dumps(record).encode(), 0)
+        with _sentence(path):
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, json.dumps(record).encode(), 0)
         yield StoreLock(token, descriptor)
     finally:
-        if current_token(store) == token:
+        # Without a token in it the file is the one that could not be written.
+        if current_token(store) in (token, ""):
             path.unlink(missing_ok=True)
         os.close(descriptor)
+
+
+@contextmanager
+def _sentence(path: Path) -> Iterator[None]:
+    """Raise an `InputError` in place of an error of the file system."""
+    try:
+        yield
+    except OSError as error:
+        rule = "lie in a folder that can be written"
+        got = f"'{path}' ({(error.strerror or str(error)).lower()})"
+        raise InputError("out", rule, got, "choose another folder") from None
 
 
 def _locked(path: Path) -> int:
     """Descriptor of the lock file, with the lock."""
     while True:
-        try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            rule = "lie in a folder that can be written"
-            got = f"'{path}' ({(error.strerror or str(error)).lower()})"
-            raise InputError("out", rule, got, "choose another folder") from None
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         holder = _holder_of(path)
         held = _is_held(descriptor, holder, exclusive=True)
         # The last holder may have removed the file between the opening and the locking.
