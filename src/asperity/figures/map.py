@@ -22,8 +22,8 @@ from scipy.ndimage import distance_transform_edt
 
 from asperity.arrays import Float
 from asperity.figures.style import new_figure
-from asperity.parameters import DRIVE, INTERFACE, MACHINE, OUTPUTS
 from asperity.parameters.arguments import typed
+from asperity.study.points import known_quantities
 from asperity.units import display_unit
 
 #: Line of each kind of bifurcation.
@@ -163,12 +163,14 @@ def axis_unit(side: xarray.DataArray) -> tuple[float, str]:
 
 def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
     """Meaning, symbol and unit of a quantity."""
-    known: Any = {**OUTPUTS, **INTERFACE, **DRIVE, **MACHINE}.get(str(side.name))
+    known: Any = known_quantities().get(str(side.name))
     # Matplotlib has no names for these bars.
     letters = "" if known is None else re.sub(r"\\[lr]vert ?", "|", known.symbol)
     symbol = f" ${letters}$" if letters else ""
     meaning = re.split(r": | \(|, ", side.attrs.get("long_name", str(side.name)))[0]
-    return f"{meaning}{symbol}" + (f" ({unit[1]})" if unit[1] not in ("", "1") else "")
+    meaning = re.sub(r"\b((?:F/)?[VW])0\b", r"$\1_0$", meaning)
+    name = "rad" if getattr(known, "angle", False) else unit[1].replace("*", " ")
+    return f"{meaning}{symbol}" + (f" ({name})" if name not in ("", "1") else "")
 
 
 def _write_numbers(axis: Axis, ratio: float) -> None:

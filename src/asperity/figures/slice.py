@@ -12,6 +12,7 @@ from cmcrameri import cm
 from matplotlib.figure import Figure
 
 from asperity.errors import Argument, InputError, closest, require, require_known
+from asperity.figures.map import axis_unit, label
 from asperity.figures.style import new_figure
 from asperity.parameters.arguments import file_path, number
 from asperity.study.results import dataset_of
@@ -74,21 +75,26 @@ def plot_slice(
     for side in (x, y):
         if side is not None and not numbered[side]:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})
-            part[side].attrs["long_name"] = f"row of {side}"
+            part[side].attrs |= {"long_name": f"row of {side}", "units": "1"}
     # Titles name the position on the other axes; a pure number needs no unit.
     part = part.drop_vars([n for n, c in part.coords.items() if c.ndim == 0 and n not in dims])
-    for array in (part, *part.coords.values()):
-        array.attrs = {n: v for n, v in array.attrs.items() if v != "1"}
+    units = {side: axis_unit(part[side]) for side in (x, y) if side is not None}
+    labels = {side: label(part[side], unit) for side, unit in units.items()}
+    shown = label(part, (1.0, part.attrs["units"]))
+    part = part.assign_coords({side: part[side] / unit[0] for side, unit in units.items()})
     options: dict[str, Any] = {"xscale": _scale(part[x].values)}
     figure = new_figure(4.4, 3.4)
     axis = figure.subplots()
     if y is None:
         part.plot.line(x=x, ax=axis, **options)
+        axis.set_ylabel(shown)
     else:
         options |= {"yscale": _scale(part[y].values), "rasterized": True, "cmap": cm.batlow}
         if part.min() < 0 < part.max():
             options |= {"cmap": cm.vik, "center": 0.0}
-        part.plot.pcolormesh(x=x, y=y, ax=axis, **options)
+        part.plot.pcolormesh(x=x, y=y, ax=axis, cbar_kwargs={"label": shown}, **options)
+        axis.set_ylabel(labels[y])
+    axis.set_xlabel(labels[x])
     return figure
 
 

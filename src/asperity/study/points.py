@@ -19,8 +19,9 @@ from asperity.arrays import Bool, Float, Index
 from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads.modulation import no_contact
+from asperity.operating_point import known_parameters
 from asperity.orbit.outcome import Outcome, sentence
-from asperity.parameters import Parameter, point_parameters
+from asperity.parameters import OUTPUTS, Output, Parameter, point_parameters
 from asperity.parameters.arguments import shown
 
 #: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
@@ -123,6 +124,12 @@ RATIOS: Mapping[str, Ratio] = MappingProxyType(
         ),
     }
 )
+
+
+def known_quantities() -> dict[str, Parameter | Output]:
+    """What an axis may vary, of any registered law, and what a map or a slice may show."""
+    ratios = {name: ratio.parameter for name, ratio in RATIOS.items()}
+    return {**known_parameters(), **ratios, **OUTPUTS}
 
 
 class SweepOutcome(IntEnum):

@@ -1,11 +1,15 @@
 """Tracing on planes whose boundary is a formula, and pictures of maps."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray
 
-from asperity.figures.map import KIND_LINES, axis_unit, draw_map, keys
+from asperity.figures.map import KIND_LINES, axis_unit, draw_map, keys, label
 from asperity.figures.style import style
+from asperity.operating_point import known_parameters
+from asperity.parameters import OUTPUTS
 from asperity.study.map import SHOWN
 from asperity.study.map.boundary import trace_boundary
 
@@ -185,3 +189,18 @@ def test_axes_are_labelled_in_readable_units() -> None:
         figure = draw_map(planted())
     assert figure.axes[0].get_ylabel() == "stiffness of the pulling spring $K$ (N/mm)"
     assert figure.axes[0].get_ylim() == (100.0, 300.0)
+
+
+def test_every_number_of_a_map_is_labelled_with_its_symbol_and_unit() -> None:
+    shown = {name: OUTPUTS[name] for name in SHOWN}
+    for name, quantity in (known_parameters() | shown).items():
+        if quantity.symbol:
+            text = label(
+                xarray.DataArray([1.0], name=name, attrs=quantity.attributes), (1.0, "unit")
+            )
+            assert re.sub(r"\\[lr]vert ?", "|", quantity.symbol) in text.split("$")[-2]
+    rate = xarray.DataArray([1.0], name="growth_rate", attrs=OUTPUTS["growth_rate"].attributes)
+    expected = r"growth rate of the leading mode $f\max\ln|m|$ (1/s)"
+    assert label(rate, (1.0, "1/s")) == expected
+    angle = xarray.DataArray([1.0], name="tilt", attrs=known_parameters()["tilt"].attributes)
+    assert label(angle, axis_unit(angle)).endswith(r"$\chi$ (rad)")

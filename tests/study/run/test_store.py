@@ -548,6 +548,12 @@ def test_a_plane_and_a_curve(tmp_path: Path, closed_form: ClosedForm) -> None:
     (mesh,) = plane.axes[0].collections
     drawn = np.ma.filled(mesh.get_array(), np.nan).reshape(values.shape)
     assert np.array_equal(drawn, values, equal_nan=True)
+    labels = [plane.axes[0].get_xlabel(), plane.axes[0].get_ylabel(), plane.axes[1].get_ylabel()]
+    assert labels == [
+        r"relative amplitude of the load on the contacts $\varepsilon$",
+        "stiffness of the pulling spring $K$ (N/m)",
+        r"first harmonic of $F/W_0$ $\mu_1$",
+    ]
     curve = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"K": 2.1})
     assert np.array_equal(curve.axes[0].lines[0].get_ydata(), values[1], equal_nan=True)
     same = plot_slice(tmp_path / "s.zarr", "mu1", x="epsilon", at={"K": "2.1e-6 N/um"})
