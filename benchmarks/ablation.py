@@ -65,6 +65,7 @@ STAGES = (
         constant=(series, "NODES", series.NODES[:-1]),
     ),
     Stage("averaged limit", _finished_by("collocation"), _without("collocation")),
+    Stage("transients", _finished_by("transient"), _without("transient")),
     Stage("branch following", _finished_by("branch following"), _without("branch following")),
     Stage(
         f"the same on {MESHES[1].intervals} intervals",

@@ -72,7 +72,7 @@ def test_orbits_with_slip_events_are_the_final_periods_of_transients(monkeypatch
     values = DIRECT(at(epsilon=strong), known)
     assert (values.outcome == Outcome.CONVERGED).all()
     assert known.known.all()
-    monkeypatch.setattr(direct, "settled_orbits", lambda *given, **_: (None, given[3][:0]))
+    monkeypatch.setattr(direct, "settled_orbits", lambda *given, **_: (None, given[1][:0]))
     left = np.flatnonzero(DIRECT(at(epsilon=strong)).outcome != Outcome.CONVERGED)
     # Or else this tests nothing.
     assert left.size

@@ -345,6 +345,34 @@ def test_impossible_modulations_are_refused(build, said):
         build()
 
 
+def test_an_orbit_whose_branch_is_lost_is_that_on_which_the_motion_settles():
+    """Near the resonance of mass and spring; following its branch ended after minutes."""
+    mu0, a, b, length, v0 = 0.7387356623, 0.00703358068, 0.0146487103, 8.18735677e-7, 1e-6
+    stiffness, mass, load, eta = 367667.66, 0.52086995, 1.03718515, 22.1435
+    pull, frequency, epsilon = 8.36269e-5, 90.92317, 0.0641268
+    law = get_law("ruina-slip")(mu0=mu0, A=a, B=b, D0=length, V0=v0)
+    response = asp.periodic_response(
+        asp.Slider(law, spring=stiffness, load=load, mass=mass), velocity=pull, epsilon=epsilon,
+        frequency=frequency, inertia=True, radiation_damping=eta,
+    )  # fmt: skip
+    assert response.stable
+
+    def rates(t, y):
+        force, log_v, phi = y
+        w, v = 1 + epsilon * np.cos(2 * np.pi * frequency * t), pull * np.exp(log_v)
+        friction = mu0 + a * np.log(v / v0) + b * phi
+        excess = load * (force - w * friction) - eta * v
+        change = -v / length * (np.log(v / v0) + phi)
+        return [stiffness / load * (pull - v), excess / (mass * v), change]
+
+    span, start = (0, 1 / frequency), response.start
+    run = solve_ivp(rates, span, start, "Radau", rtol=1e-9, atol=1e-11, dense_output=True)
+    np.testing.assert_allclose(run.y[:, -1], start, atol=1e-9)
+    spectrum = np.fft.rfft(run.sol(np.arange(SAMPLES) / SAMPLES / frequency)[0]) / SAMPLES
+    assert response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-8)
+    np.testing.assert_allclose(response.harmonics[:2], 2 * spectrum[1:3], rtol=1e-6)
+
+
 def test_inertia_needs_a_mass_and_damping_a_value():
     drive = {"velocity": 1e-6, "epsilon": 0.1, "frequency": 120.0}
     with pytest.raises(InputError, match=r"slider\.mass must be positive, got 0 kg; give the mass"):

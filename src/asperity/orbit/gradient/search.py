@@ -9,7 +9,7 @@ milliseconds a point. Fits call the direct search at the same points again and a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated, NamedTuple
@@ -19,24 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.floquet import AGREEMENT, sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.equations import collocated, mean_and_harmonics
-from asperity.orbit.mesh.mesh import Orbit, scheme_for
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import ACCEPTED, FIRST_MESH, refined_orbit, remeshed
 from asperity.orbit.methods.collocation import orbits_from_averaged_limit
 from asperity.orbit.methods.series import NODES, follows_steady_sliding, series_orbits
+from asperity.orbit.methods.settled import settled_orbits
 from asperity.orbit.observables import response_gap
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.orbit.solution import SearchOptions
 from asperity.parameters.arguments import at_least, typed
-from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
-from asperity.transients.dense_output import DenseOutput
-from asperity.transients.inputs import checked_integration, first_checkpoint
 
 #: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
 MESHES = (216, 648, 1944)
@@ -333,7 +330,7 @@ def search_orbits(
     rows = left()
     hopeless = every and (result.outcome == Outcome.OUT_OF_RANGE).any()
     if len(rows) and motions and not hopeless:
-        settled, periodic = settled_orbits(equations, parameters, problem, rows, every=every)
+        settled, periodic = settled_orbits(problem, rows, every=every)
         if len(periodic) >= (len(rows) if every else 1):
             follow(settled, periodic)
     return result
@@ -344,126 +341,3 @@ def _numbers(problem: Problem, orbit: Orbit, harmonics: int) -> Complex:
     with np.errstate(all="ignore"):
         mean, phasors = mean_and_harmonics(collocated(problem, orbit), orbit, harmonics)
     return np.concatenate([mean[None], phasors])
-
-
-# Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses
-# whose phase changes with every parameter. Newton's method from a smooth guess does not find such
-# an orbit, and continuation takes seconds. A transient comes close to a stable orbit in a few
-# periods, and every orbit that can be measured is stable.
-
-#: Number of periods of a transient, and the largest number of its steps. After 6 periods a
-#: transient with a multiplier of -0.8 is still too far from the orbit; more than 12 find no others.
-_PERIODS, _MOST_STEPS = 12, 4000
-#: Number of periods over which the modulation rises; after a sudden start the slider may run away.
-_RISE = 2
-#: Tolerance of a step; Newton's method corrects the remaining error.
-_TOLERANCE = 1e-6
-#: Largest change of a state over the last period of a transient that counts as periodic. The state
-#: of a contact that sticks all the time grows as log(t): over the last of 12 periods by 0.09.
-_SETTLED = 0.05
-
-
-def settled_orbits(
-    equations: ParametrisedProblem,
-    parameters: Mapping[str, Float],
-    problem: Problem,
-    index: Index,
-    *,
-    every: bool = False,
-) -> tuple[Orbit, Index]:
-    """Initial guesses for Newton's method: the last period of transients from steady sliding.
-
-    Parameters
-    ----------
-    equations : ParametrisedProblem
-    parameters : mapping of str to array, shape (points,)
-    problem : Problem
-        Problem of these parameters.
-    index : array of int
-    every : bool
-        Whether to stop at the first transient that does not become periodic.
-
-    Returns
-    -------
-    orbit : Orbit
-        Orbits of all points, on meshes that are finest where the integrator's steps were shortest.
-    index : array of int
-        Points whose transient becomes periodic.
-    """
-    points, size = len(parameters["V"]), problem.system.size
-    orbit = Orbit.empty(scheme_for(problem.system), size, FIRST_MESH, points)
-    if equations.coefficients is not None:
-        return orbit, index[:0]
-    rows = []
-    for i in index:
-        period = _last_period(equations, {n: float(v[i]) for n, v in parameters.items()})
-        if period is not None:
-            put(orbit, np.array([i]), _on_mesh(take(problem, np.array([i])), period))
-            rows.append(i)
-        elif every:
-            break
-    return orbit, np.array(rows, int)
-
-
-def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> DenseOutput | None:
-    """The last period of a transient, over the phase from its beginning; None if not periodic."""
-    slider = jax.tree.map(float, equations.problem(values).system.slider)
-    period = 1 / values["frequency"]
-    programme = Programme(
-        Modulate(
-            (_RISE + _PERIODS) * period,
-            values["epsilon"],
-            values["frequency"],
-            rise=_RISE * period,
-        ),
-        load=values["W0"],
-        velocity=values["V"],
-    )
-    integration = checked_integration(
-        slider,
-        programme,
-        inertia=equations.massive,
-        radiation_damping=values.get("eta") or None,
-        rtol=_TOLERANCE,
-        method="implicit",
-        most_steps=_MOST_STEPS,
-    )
-    if type(integration.motion) is not equations.motion:
-        # The transient has other states, which allow slip to reverse.
-        return None
-    integration.checkpoint = first_checkpoint(integration.motion, programme, "steady")
-    parts = []
-    for part in integration.segment_parts():
-        if part.termination is not None:
-            return None
-        if part.checkpoint.segment == len(programme.segments) - 1:
-            parts.append(part.dense_output)
-    whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)))
-    start = (_PERIODS - 1) * period
-    # The last component is the displacement, which is no state of the equations.
-    one, other = whole.evaluate(np.array([start, _PERIODS * period]))[:-1].T
-    if not np.abs(other - one).max() < _SETTLED:
-        return None
-    last = slice(int(np.searchsorted(whole.begin, start, side="right")) - 1, None)
-    radian = 1 / (2 * np.pi * values["frequency"])
-    return DenseOutput(
-        (whole.begin[last] - start) / radian,
-        whole.length[last] / radian,
-        whole.coefficients[:, :-1, last],
-    )
-
-
-def _on_mesh(problem: Problem, period: DenseOutput) -> Orbit:
-    """One orbit with as many intervals in each of the integrator's steps."""
-    scheme = scheme_for(problem.system)
-    begin = np.append(np.maximum(period.begin, 0.0), 2 * np.pi)
-    places = np.linspace(0, len(begin) - 1, FIRST_MESH + 1)
-    mesh = np.interp(places, np.arange(len(begin)), begin)
-    stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
-    nodes = period.evaluate(mesh[:-1])
-    inner = period.evaluate(stages.ravel()).reshape(len(nodes), *stages.shape)
-    at = excitation_at(problem.load, stages[..., None])
-    values = values_at(problem.system, at, np.zeros_like(nodes[:, :1]), inner[..., None])
-    return Orbit(
-        mesh[:, None], nodes[:, :1], (nodes - nodes[:, :1])[..., None], values.rates, scheme
-    )
