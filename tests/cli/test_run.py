@@ -1,6 +1,7 @@
 """`asperity run`: files, exit codes, and Ctrl-C in a real process."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -42,7 +43,9 @@ def protocol(tmp_path) -> Path:
     return path
 
 
-def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
+def test_a_run_with_text_and_picture(asperity, protocol, tmp_path, monkeypatch) -> None:
+    # No lines of progress, however slow the machine is.
+    monkeypatch.setattr("asperity.cli.progress._IN_LOG", math.inf)
     out = tmp_path / "run.nc"
     result = asperity(
         "run", protocol, "--out", out, "--csv", "--plot", out.with_suffix(".png"), "--json"

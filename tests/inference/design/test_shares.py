@@ -163,3 +163,11 @@ def test_a_rival_that_gives_the_same_readings_has_no_misfit(shift):
         assert 0 <= criterion.value(n) < 1e-9
         np.testing.assert_allclose(criterion.gradient(n), 0, atol=1e-9)
         np.testing.assert_allclose(criterion.exchanged(n), 0, atol=1e-9)
+
+
+def test_a_criterion_of_singular_information_is_minus_infinity():
+    """Readings that all have the derivatives (1, 1, 1) determine no parameter."""
+    information = np.ones((1, 1, 3, 3))
+    criterion = Determinant(information, np.zeros((1, 3, 3)), [0])
+    assert criterion.value(np.array([1e12])) == -np.inf
+    assert criterion.exchanged(np.array([1e12])) == -np.inf

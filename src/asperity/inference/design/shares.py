@@ -75,12 +75,13 @@ class Determinant:
         return float(self._log_ratio(self.total(n)).mean())
 
     def _log_ratio(self, total: Float) -> Float:
-        """Ln det M - ln det M22, over the leading axes."""
-        whole = np.linalg.slogdet(total)[1]
+        """Ln det M - ln det M22, over the leading axes; minus infinity if M is singular."""
+        whole = np.asarray(np.linalg.slogdet(total)[1])
         if not self.others:
-            return np.asarray(whole)
-        block = total[..., self.others, :][..., self.others]
-        return np.asarray(whole - np.linalg.slogdet(block)[1])
+            return whole
+        others = np.linalg.slogdet(total[..., self.others, :][..., self.others])[1]
+        singular = np.isneginf(whole) | np.isneginf(others)
+        return np.subtract(whole, others, out=np.full_like(whole, -np.inf), where=~singular)
 
     def gradient(self, n: Float) -> Float:
         """Tr(M^-1 M_i) less the same for the block of the other parameters, mean over the draws."""
