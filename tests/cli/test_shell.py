@@ -140,6 +140,39 @@ main(["materials"])
 """
 
 
+#: A sweep with worker processes that gets the signal while it solves.
+STOPPED = """
+import os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from asperity.cli.main import main
+import asperity.study.run as module
+begin = module.solve_chunks
+def solve_chunks(*arguments):
+    threading.Timer(0.5, os.kill, (os.getpid(), int(sys.argv[1]))).start()
+    begin(*arguments)
+module.solve_chunks = solve_chunks
+main(["sweep", sys.argv[2], "--out", sys.argv[3], "--workers", "1"])
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_sweep_is_one_sentence_and_leaves_no_lock(tmp_path, number) -> None:
+    plan, out = tmp_path / "plan.toml", tmp_path / "s.zarr"
+    plan.write_text(
+        'law = "rice-ruina"\nmaterial = "bureau2000"\n'
+        '[parameters]\nV = "1 um/s"\nK = "0.2 N/um"\n'
+        "[axes.epsilon]\nfrom = 0.01\nto = 0.5\ncount = 2000\n"
+        '[axes.frequency]\nfrom = "1 Hz"\nto = "200 Hz"\ncount = 2000\n'
+    )
+    done = python("-c", STOPPED, str(int(number)), str(plan), str(out))
+    assert done.returncode == 130
+    (line,) = done.stderr.split("\n\n")[-1].strip().splitlines()
+    assert line.startswith("asperity: interrupted with ")
+    assert line.endswith("the same command goes on from there")
+    assert out.is_dir()
+    assert not out.with_name("s.zarr.lock").exists()
+
+
 def test_ctrl_c_leaves_at_once_without_a_traceback() -> None:
     done = python("-c", LATE)
     assert done.returncode == 130

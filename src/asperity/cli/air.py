@@ -64,7 +64,7 @@ def air(
     from asperity.air import AirLayer
     from asperity.air.layer import GasFlow
 
-    flow: GasFlow = one_of(gas_flow or "continuum", get_args(GasFlow), "--gas-flow")
+    flow: Any = one_of(gas_flow or "continuum", get_args(GasFlow), "--gas-flow")
     flows = gas_flow is None or not vacuum
     require(flows, "--gas-flow", "have an air layer", "--vacuum", "leave one of them out")
     if sought is not None:

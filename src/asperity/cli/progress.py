@@ -115,7 +115,9 @@ def ending_at_once() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
-    """Raise `KeyboardInterrupt` on Ctrl-C, for work that has files to clean up.
+    """Raise `KeyboardInterrupt` on Ctrl-C or SIGTERM, for work that has files to clean up.
+
+    Batch systems send SIGTERM before they kill a job.
 
     Yields
     ------
@@ -133,7 +135,7 @@ def interruptible() -> Iterator[Callable[[], None]]:
         if pressed:
             raise KeyboardInterrupt
 
-    with _handling(note):
+    with _handling(note), _handling(note, signal.SIGTERM):
         yield check
 
 
@@ -144,14 +146,15 @@ def _leave(signum: int, frame: Any) -> None:
 
 
 @contextmanager
-def _handling(handler: Handler) -> Iterator[None]:
+def _handling(handler: Handler, number: int = signal.SIGINT) -> Iterator[None]:
     # Batch systems and nohup ignore Ctrl-C; only the main thread may set handlers.
-    ours = signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _leave)
+    defaults = (signal.default_int_handler, _leave, signal.SIG_DFL)
+    ours = signal.getsignal(number) in defaults
     if not ours or threading.current_thread() is not threading.main_thread():
         yield
         return
-    previous = signal.signal(signal.SIGINT, handler)
+    previous = signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
+        signal.signal(number, previous)

@@ -61,17 +61,17 @@ def plot_slice(
         require(name in others, "at", "name another axis than x and y", f"'{name}'", advice)
     numbered = {d: d in part.indexes and part[d].dtype.kind in "if" for d in dims}
     rows = {}
-    for axis, dim in enumerate(dims):
+    for i, dim in enumerate(dims):
         if dim in chosen and numbered[dim]:
             position = _in_si(chosen[dim], part[dim].attrs.get("units", "1"), dim)
-            rows[axis] = int(np.argmin(np.abs(part[dim].values - position)))
+            rows[i] = int(np.argmin(np.abs(part[dim].values - position)))
         elif dim not in (x, y):
             row, count = _in_si(chosen.get(dim, 0), "1", dim), part.sizes[dim]
             whole, advice = row in range(count), "give the number of a row"
             require(whole, "at", f"be a row from 0 to {count - 1} of {dim}", f"{row:g}", advice)
-            rows[axis] = int(row)
+            rows[i] = int(row)
     values = opened.part(show, rows)
-    part = part.isel({dims[axis]: row for axis, row in rows.items()}).copy(data=values)
+    part = part.isel({dims[i]: row for i, row in rows.items()}).copy(data=values)
     for side in (x, y):
         if side is not None and not numbered[side]:
             part = part.assign_coords({side: (side, range(part.sizes[side]))})
