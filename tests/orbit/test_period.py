@@ -47,3 +47,17 @@ def test_no_age_where_the_law_has_none():
     slider = asp.Slider(material.law("amontons"), spring=material.K, load=material.W0)
     response = asp.periodic_response(slider, velocity=V, epsilon=EPSILON, frequency=F, waveform=64)
     assert over_a_period(response).age is None
+
+
+@pytest.mark.parametrize(
+    ("epsilon", "samples", "got"),
+    [(EPSILON, 0, "1 points of 0"), ([EPSILON, EPSILON / 2], 64, "2 points of 64")],
+)
+def test_a_period_needs_one_point_and_a_waveform(epsilon, samples, got):
+    material = asp.materials.load("bureau2000")
+    slider = asp.Slider(material.law("rice-ruina"), spring=material.K, load=material.W0)
+    response = asp.periodic_response(
+        slider, velocity=V, epsilon=epsilon, frequency=F, waveform=samples, methods=("fourier",)
+    )
+    with pytest.raises(asp.InputError, match=f"of one point, with a waveform, got {got} samples"):
+        over_a_period(response)

@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from asperity.arrays import Float
+from asperity.errors import require
 from asperity.laws import Law, LinkerDieterich
 from asperity.loads import Harmonic
 from asperity.orbit.response import PeriodicResponse
@@ -56,6 +57,11 @@ def over_a_period(response: PeriodicResponse) -> Period:
     response : PeriodicResponse
         Response of a single point, with a waveform.
 
+    Raises
+    ------
+    InputError
+        If the response has several points or no waveform.
+
     Notes
     -----
     The slider's velocity is that of the pulling point less the rate of the spring's stretch,
@@ -63,6 +69,10 @@ def over_a_period(response: PeriodicResponse) -> Period:
     what accelerates the slider and what it radiates; the state is the one at which the law carries
     that force at that slip velocity.
     """
+    samples, points = response.waveform.shape[-1], np.size(response.outcome)
+    rule, got = "be of one point, with a waveform", f"{points} points of {samples} samples"
+    advice = "solve one point, and ask for a waveform of 256 samples"
+    require(points == 1 and samples > 0, "response", rule, got, advice)
     motion, slider = response.motion, response.slider
     V, omega = float(np.ravel(motion.V)[0]), float(np.ravel(motion.omega)[0])
     K, W0, M = (float(np.ravel(getattr(slider, n))[0]) for n in ("K", "W0", "M"))
