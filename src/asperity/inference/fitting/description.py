@@ -202,9 +202,7 @@ def _ends(
         wider = float(stdtrit(at.freedom[i], (1 + level) / 2) / ndtri((1 + level) / 2))
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
-            ends.append(
-                _open_beyond_range(objective.unknowns[i], at, i, along.interval(level, wider))
-            )
+            ends.append(along.interval(level, wider))
             if along.lowest[1] < at.chi2 - _LOWER:
                 break
         elif at.missing[i] or at.stopped:
@@ -219,20 +217,12 @@ def _normal(unknown: Unknown, at: Parabola, i: int, sd: float, level: float) -> 
     """An interval of the normal approximation, which contains the estimate."""
     u = float(at.u[i])
     begin, end = bounded_interval(float(at.unbounded[i]), sd, level, *unknown.bounds)
-    return _open_beyond_range(unknown, at, i, (min(begin, u), max(end, u)))
-
-
-def _open_beyond_range(unknown: Unknown, at: Parabola, i: int, interval: Interval) -> Interval:
-    """The interval, whose ends outside the search range of the parameter are open.
-
-    The data do not bound such a side: chi-squared hardly rises there, and the bound of the search
-    decides where the interval ends.
-    """
-    begin, end = interval
+    begin, end = min(begin, u), max(end, u)
     if unknown.nuisance:
         return begin, end
+    # An end outside the search range is open: the data do not bound such a side.
     low, high = unknown.bounds
-    first, last = unknown.range_about(float(at.u[i]), float(at.sd[i]))
+    first, last = unknown.range_about(u, float(at.sd[i]))
     return low if -math.inf < begin < first else begin, high if math.inf > end > last else end
 
 

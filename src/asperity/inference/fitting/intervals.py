@@ -368,7 +368,8 @@ class Profile:
     def interval(self, level: float, wider: float = 1.0) -> Interval:
         """Ends of the confidence interval of a coverage.
 
-        An end is infinite, or the bound, where the profile stays below the threshold.
+        An end is infinite, or the bound, where the profile stays below the threshold throughout
+        the search range of a parameter: the data do not bound such a side.
 
         Parameters
         ----------
@@ -382,11 +383,15 @@ class Profile:
         ProfileAtEdgeError
             If more evaluations than `most` had no solution.
         """
-        low, high = self.objective.unknowns[self.i].bounds
-        return self._end(level, wider, -1, low), self._end(level, wider, 1, high)
+        return self._end(level, wider, -1), self._end(level, wider, 1)
 
-    def _end(self, level: float, wider: float, sign: int, bound: float) -> float:
+    def _end(self, level: float, wider: float, sign: int) -> float:
         """The value at which the profile crosses the threshold on one side."""
+        unknown, begin = self.objective.unknowns[self.i], float(self.u[self.i])
+        bound = farthest = unknown.bounds[sign > 0]
+        if not unknown.nuisance:
+            farthest = unknown.range_about(begin, self.sd)[sign > 0]
+            farthest = sign * max(sign * farthest, sign * begin)
 
         def excess(x: float) -> float:
             value = self._excess(x, level, wider)
@@ -395,8 +400,8 @@ class Profile:
         width = 1.05 * wider * self.sd * math.sqrt(bounded_threshold(math.inf, level))
         for _ in range(_STEPS):
             inner, outer = self._bracket(excess, sign, width)
-            if sign * (outer - bound) >= 0:
-                outer = bound - sign * 1e-9 * self.sd
+            if sign * (outer - farthest) >= 0:
+                outer = farthest - sign * 1e-9 * self.sd
                 if excess(outer) <= 0:
                     return bound
             if excess(outer) >= 0:
@@ -409,7 +414,7 @@ class Profile:
                         return sign * math.inf
                     self.objective.use_search(True)
                     self._unsolved.clear()
-                    return self._end(level, wider, sign, bound)
+                    return self._end(level, wider, sign)
                 return end
             width = max(width, min(2 * width, _LONGEST))
         return sign * math.inf
