@@ -200,7 +200,7 @@ def test_every_number_of_a_map_is_labelled_with_its_symbol_and_unit() -> None:
             )
             assert re.sub(r"\\[lr]vert ?", "|", quantity.symbol) in text.split("$")[-2]
     rate = xarray.DataArray([1.0], name="growth_rate", attrs=OUTPUTS["growth_rate"].attributes)
-    expected = r"growth rate of the leading mode $f\max\ln|m|$ (1/s)"
+    expected = r"growth rate of the leading mode $f\,\max\ln|m|$ (1/s)"
     assert label(rate, (1.0, "1/s")) == expected
     angle = xarray.DataArray([1.0], name="tilt", attrs=known_parameters()["tilt"].attributes)
     assert label(angle, axis_unit(angle)).endswith(r"$\chi$ (rad)")
