@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Complex, Float
+from asperity.arrays import Complex, Float, Index
 from asperity.lock_in.normal_equations import Basis, BlockSums
 
 #: Lines averaged around a harmonic and next to zero frequency.
@@ -23,6 +23,8 @@ _NEXT_TO_ZERO = 6
 _ABOVE_ZERO = 48
 #: With fewer lines than this, noise is assumed to be white.
 _FEWEST = 4
+#: Half lines for which powers of a phase are computed; others are products with coarser powers.
+_FINE = 16
 
 
 @dataclass(frozen=True)
@@ -122,14 +124,7 @@ def noise_around(
     lines = _free_lines(k, periods, blocks, 1 + (basis.degree > 0) + settles)
     if lines.size < 2 * _FEWEST:
         return white.astype(complex), max(samples - basis.linear - 1, 1.0)
-    # Lines lie at multiples of half a line from the harmonic: powers of one complex number take a
-    # tenth of the time of cosines and sines.
-    steps = np.rint(2 * (lines - k * periods)).astype(int)
-    furthest = int(np.abs(steps).max())
-    turn = np.exp(-1j * np.pi * at)
-    powers = np.cumprod(np.broadcast_to(turn, (furthest, at.size)), axis=0)[np.abs(steps) - 1]
-    np.conj(powers, out=powers, where=(steps < 0)[:, None])
-    turned = powers @ residual
+    turned = _at_lines(np.rint(2 * (lines - k * periods)).astype(np.intp), at, residual)
     near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
     spectrum = near.T @ near.conj() / (near.shape[0] * samples)
     if not k:
@@ -137,6 +132,21 @@ def noise_around(
         spectrum = spectrum * grown[:, None] * grown
     # Two numbers per line; half-integer lines carry no independent information.
     return spectrum, float(near.shape[0])
+
+
+def _at_lines(steps: Index, at: Float, residual: Complex) -> Complex:
+    """Sums of the residual times e^(-i pi step at), (lines, channels).
+
+    A step is half a line. Every step is a coarse one plus a fine one, so that a few powers of one
+    complex number and a product of matrices give all of them.
+    """
+    lowest = steps.min()
+    coarse, fine = np.divmod(steps - lowest, _FINE)
+    turn = np.exp(-1j * np.pi * at)
+    fines = np.cumprod([np.exp(-1j * np.pi * lowest * at), *(_FINE - 1) * [turn]], axis=0)
+    coarses = np.cumprod([np.ones_like(turn), *coarse.max() * [turn**_FINE]], axis=0)
+    sums = np.matmul(coarses, (fines * residual.T[:, None]).transpose(0, 2, 1))
+    return np.asarray(sums[:, coarse, fine].T)
 
 
 def _growth_below_lowest_line(lines: Float, turned: Complex) -> Float:

@@ -133,6 +133,21 @@ class Basis:
         turned[:, second:, first:second] = u[:, None, None] * rotation
         return turned
 
+    def to(self, other: Basis) -> Float:
+        """The matrix that transforms the columns into those of another window, (size, size).
+
+        Parameters
+        ----------
+        other : Basis
+            With the same frequency, harmonics and degree.
+        """
+        moved = self.shift(np.array([2 * self.centre - other.centre]))[0]
+        scale = np.ones(self.size)
+        ratio = self.half_width / other.half_width
+        scale[: self.drift] = ratio ** np.arange(self.drift)
+        scale[self.linear :] = ratio
+        return scale[:, None] * moved
+
 
 def inverted(normal: Float) -> Float:
     """Inverse of a symmetric positive definite matrix, (p, p); `InputError` if it is singular."""
@@ -175,6 +190,13 @@ class BlockSums:
     def totals(self) -> tuple[Float, Float]:
         """Normal equations of all blocks together, (size, size) and (size, channels)."""
         return self.gram.sum(0), self.moments.sum(0)
+
+    def after(self, first: int, basis: Basis) -> BlockSums:
+        """The blocks from number `first` on, with the columns of their own window."""
+        change = self.basis.to(basis)
+        gram = change @ self.gram[first:] @ change.T
+        moments = change @ self.moments[first:]
+        return BlockSums(basis, gram, moments, self.count[first:], self.middle[first:])
 
 
 def join(parts: list[BlockSums]) -> BlockSums:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Float, Index
-from asperity.lock_in.normal_equations import even_step, merged, sums
+from asperity.lock_in.normal_equations import BlockSums, even_step, merged, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 from asperity.measurement.series import neighbour_scatter
@@ -142,26 +142,35 @@ def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
     degree : int
         Degree of the drift.
     """
-    first, latest = 0, time.size // 2
-    late = settling_from(time[latest:], force[latest:], frequency, degree)
+    blocks = _blocks(time, force, frequency, degree)
+    if blocks is None:
+        return 0
+    edges = np.concatenate([[0], np.cumsum(blocks.count)]).astype(np.intp)
+
+    def settling_after(block: int) -> Settling | None:
+        own = window_basis(time[edges[block] :], blocks.basis.omega, blocks.basis.harmonics, degree)
+        return settling_of_mean(blocks.after(block, own))
+
+    first, latest = 0, int(np.searchsorted(edges, time.size // 2))
+    late = settling_after(latest)
     while first < latest:
-        settling = settling_from(time[first:], force[first:], frequency, degree)
+        settling = settling_after(first)
         if settling is None or late is None:
-            return first
+            break
         stop = first
         if settling.noise > _NOISIER * late.noise:
-            stop += time.size // _STEPS
+            stop = min(first + blocks.count.size // _STEPS, latest)
         elif settling.present:
-            span = float(time[-1] - time[first])
-            doubt = _FORGOTTEN * np.sqrt(settling.noise / (time.size - first))
+            begin, span = time[edges[first]], float(time[-1] - time[edges[first]])
+            doubt = _FORGOTTEN * np.sqrt(settling.noise / (time.size - edges[first]))
             bias = abs(settling.amplitude) * settling.longest / span
-            until = time[first] + settling.longest * np.log(max(bias / doubt, 1.0))
-            forgotten = int(np.searchsorted(time, until))
+            until = begin + settling.longest * np.log(max(bias / doubt, 1.0))
+            forgotten = int(np.searchsorted(time[edges[:-1]], until))
             stop = forgotten if forgotten <= latest else first
         if stop == first:
-            return first
+            break
         first = stop
-    return latest
+    return int(edges[first])
 
 
 def settling_from(time: Float, force: Float, frequency: float, degree: int) -> Settling | None:
@@ -175,13 +184,19 @@ def settling_from(time: Float, force: Float, frequency: float, degree: int) -> S
     degree : int
         Degree of the drift.
     """
+    blocks = _blocks(time, force, frequency, degree)
+    return None if blocks is None else settling_of_mean(blocks)
+
+
+def _blocks(time: Float, force: Float, frequency: float, degree: int) -> BlockSums | None:
+    """Sums of a force in blocks, for its settling; None with too few samples for one."""
     per_period = 1 / (frequency * float(np.median(np.diff(time[: 1 << 14]))))
     harmonics = int(min(_HARMONICS, _RESOLVED * per_period))
     if time.size < 64 or not harmonics:
         return None
     basis = window_basis(time, 2 * np.pi * frequency, harmonics, degree)
     step = even_step(time, basis.omega * harmonics)
-    return settling_of_mean(sums(basis, time, [force], blocks=_MOST_BLOCKS, step=step))
+    return sums(basis, time, [force], blocks=_MOST_BLOCKS, step=step)
 
 
 def clean_run(first: int, stop: int, defects: Index) -> tuple[int, int]:
