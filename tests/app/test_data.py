@@ -660,16 +660,6 @@ def test_velocities_are_given_where_no_channel_has_the_motion(visit, barriers, s
         field.press("Enter")
     card.get_by_text("Step 1 at 2 s, 1 µm/s to 10 µm/s").wait_for()
     assert barriers(page) == []
-    # Without them a fit is refused, as nothing says how the drive moves.
-    fit = page.locator("section.fit")
-    for label in ("A", "B", "D0"):
-        fit.get_by_label(label, exact=True).check()
-    fit.get_by_role("button", name="Fit", exact=True).click()
-    table = fit.get_by_role("region", name="Parameters")
-    table.wait_for()
-    rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
-    estimates = {name: number(rows[name]) * (1e-9 if name == "D0" else 1) for name in PLANTED}
-    assert estimates == pytest.approx(PLANTED, rel=0.03)
     again = visit("#" + page.url.split("#", 1)[1])
     again.locator(".sentence", has_text="2 velocity steps").wait_for()
     again.locator("summary", has_text="Channels").click()
