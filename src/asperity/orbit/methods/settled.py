@@ -34,8 +34,7 @@ _PERIODS, _MOST_STEPS = 12, 4000
 _RISE = 2
 #: Tolerance of a step; Newton's method corrects the remaining error.
 _TOLERANCE = 1e-6
-#: Largest change of a state over the last period of a transient that counts as periodic. The state
-#: of a contact that sticks all the time grows as log(t): over the last of 12 periods by 0.09.
+#: Largest distance of a state from its orbit at the end of a transient that counts as periodic.
 _SETTLED = 0.05
 
 
@@ -130,8 +129,12 @@ def _last_period(point: Problem) -> DenseOutput | None:
     whole = DenseOutput(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True)))
     start = (_PERIODS - 1) * period
     # The last component is the displacement, which is no state of the equations.
-    one, other = whole.evaluate(np.array([start, _PERIODS * period]))[:-1].T
-    if not np.abs(other - one).max() < _SETTLED:
+    ends = whole.evaluate(period * np.arange(_PERIODS - 2, _PERIODS + 1))[:-1]
+    before, change = np.diff(ends).T
+    # If the change goes on by the same ratio in every period, this is the distance that is left to
+    # the orbit. Changes of less than a thousandth may be errors of the integrator.
+    ratio = before @ change / (before @ before + _TOLERANCE)
+    if not np.abs(change * ratio).max() < _SETTLED * (1 - ratio):
         return None
     last = slice(int(np.searchsorted(whole.begin, start, side="right")) - 1, None)
     return DenseOutput(
