@@ -75,11 +75,15 @@ def test_any_start_ends_with_numbers_or_a_reason(law):
 
 @pytest.mark.parametrize(
     ("law", "options"),
-    [
-        ("rice-ruina", {"radiation_damping": 1e3}),
-        ("elasto-plastic", {"inertia": True}), ("regularised", {"inertia": True}),
-    ],
-)  # fmt: skip
+    population(
+        [
+            ("rice-ruina", {"radiation_damping": 1e3}),
+            ("elasto-plastic", {"inertia": True}),
+            ("regularised", {"inertia": True}),
+        ],
+        short=2,
+    ),
+)
 def test_any_start_with_inertia_or_damping_ends_with_numbers_or_a_reason(law, options):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD, **options).states[0]
