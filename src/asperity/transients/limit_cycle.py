@@ -246,7 +246,7 @@ class _Orbit:
 
     @classmethod
     def of(cls, run: _Run, begin: float, end: float) -> _Orbit:
-        """With derivatives to all parameters of the equations."""
+        """With derivatives by all parameters of the equations."""
         motion = run.parts[0].system.motion
         names = tuple(equation_parameters(motion))
         first, last = run.states(np.array([begin, end]))[:-1].T

@@ -344,7 +344,7 @@ class LockInTerm(DataTerm):
     def predicted(
         self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
     ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
-        """Prediction, its derivatives to the free parameters, and the outcome of every row.
+        """Prediction, its derivatives by the free parameters, and the outcome of every row.
 
         Parameters
         ----------
