@@ -17,7 +17,7 @@ from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
 from asperity.orbit import response_function
-from asperity.outputs.tables import Section, as_html
+from asperity.outputs.sections import Section, as_html
 
 
 @pytest.fixture(scope="module")

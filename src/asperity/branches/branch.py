@@ -17,8 +17,8 @@ from asperity.slider.named import equations_as_text
 if TYPE_CHECKING:
     import xarray
 
+    from asperity.branches.bifurcations import BranchFollower, BranchOrbit
     from asperity.branches.parameters import ContinuedParameter
-    from asperity.branches.steps import BranchFollower, BranchOrbit
     from asperity.orbit.mesh.arclength import ContinuationPoint
     from asperity.slider.problem import Problem
 

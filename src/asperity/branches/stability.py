@@ -20,20 +20,20 @@ from numpy.typing import NDArray
 
 from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.branches.parameters import (
-    ContinuedParameter,
-    fixed_parameters,
-    line_through,
-    moving_parameter,
-    one_problem,
-)
-from asperity.branches.steps import (
+from asperity.branches.bifurcations import (
     BranchFollower,
     BranchOrbit,
     Kind,
     ParameterBranch,
     criterion,
     kind_of,
+)
+from asperity.branches.parameters import (
+    ContinuedParameter,
+    fixed_parameters,
+    line_through,
+    moving_parameter,
+    one_problem,
 )
 from asperity.errors import require
 from asperity.loads import Modulation

@@ -14,7 +14,7 @@ from asperity.errors import symbol, symbols
 
 if TYPE_CHECKING:
     from asperity.inference import Design
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
 _EPILOG = """\b
 Examples:
@@ -68,7 +68,7 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
 
 def _sections(result: Design) -> list[Section]:
     """A design as sections of text."""
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 

@@ -73,7 +73,7 @@ def map(
     from asperity.laws import get_law
     from asperity.operating_point import offered_numbers, require_given_influence
     from asperity.outputs import output_files, require_netcdf
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.parameters.parameter import count_text
     from asperity.study.map import SHOWN, write_map

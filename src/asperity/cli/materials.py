@@ -35,7 +35,7 @@ def materials(name: str | None, cite: bool, output: Output) -> None:
     NAME is a material, or the path of your TOML file.
     """
     from asperity import materials as known
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     if cite:
         keys = known.available_citations() if name is None else (known.load(name).source,)

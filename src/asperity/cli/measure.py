@@ -411,7 +411,7 @@ def _campaign(
         write_thresholds,
     )
     from asperity.outputs import output_files, written_file
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters.parameter import count_text
 
     question = rows_of.question

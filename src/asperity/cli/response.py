@@ -15,7 +15,7 @@ from asperity.errors import require, symbol
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.questions.point import Point
 
 _EPILOG = """\b
@@ -201,7 +201,7 @@ def _sections(
 ) -> list[Section]:
     """Inputs with their sources, and outputs: rows of name, value, unit and meaning."""
     from asperity.laws import get_law
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
@@ -226,7 +226,7 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     from asperity.cli.progress import bar
     from asperity.laws import get_law
     from asperity.operating_point import material_of, sourced_numbers
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters.parameter import count_text
     from asperity.study.table import run_table
 

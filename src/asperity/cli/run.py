@@ -167,7 +167,7 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
 
 
 def _report(wanted: Protocol, done: RunSummary, files: list[Path], output: Output) -> None:
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     duration = wanted.programme.duration
     rows = (

@@ -37,7 +37,7 @@ def samples(name: str | None, out: Path | None, seed: int | None, output: Output
     from asperity import samples as known
     from asperity.operating_point import known_parameters
     from asperity.outputs import output_file
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import DRIVE
     from asperity.recording.writers import check_path, write
     from asperity.units import format_si

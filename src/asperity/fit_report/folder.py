@@ -29,8 +29,8 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.laws.registry import symbols_of
 from asperity.materials import cited_works
-from asperity.outputs.tables import as_html, html_page, html_table
-from asperity.outputs.written import written_folder
+from asperity.outputs.atomic import written_folder
+from asperity.outputs.sections import as_html, html_page, html_table
 from asperity.parameters import NAMES, Names, law_parameters, point_parameters
 from asperity.parameters.arguments import typed
 

@@ -22,7 +22,7 @@ from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
-from asperity.outputs.tables import Section, two_digits
+from asperity.outputs.sections import Section, two_digits
 from asperity.units import quantity_text
 
 

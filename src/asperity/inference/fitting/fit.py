@@ -51,7 +51,7 @@ from asperity.inference.runs.assembly import (
 )
 from asperity.inference.runs.blocks import coarser
 from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined

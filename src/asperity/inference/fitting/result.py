@@ -17,7 +17,7 @@ from asperity.inference.runs.levels import LevelChange, level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
-from asperity.outputs.tables import rounded, two_digits
+from asperity.outputs.sections import rounded, two_digits
 from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit

@@ -17,7 +17,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, enumerated, require, symbol
 from asperity.inference.runs.blocks import checked_rate
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import STIFFNESS, RecordedRun
 from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of

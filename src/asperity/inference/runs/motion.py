@@ -20,15 +20,15 @@ from jax import Array
 
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
-from asperity.inference.runs.noise import innovations
-from asperity.inference.runs.reading import GAIN, Reading
-from asperity.inference.runs.steps import (
+from asperity.inference.runs.gauge import GAIN, Reading
+from asperity.inference.runs.integration import (
     Curve,
     Free,
     arranged,
     integrated,
     with_values,
 )
+from asperity.inference.runs.noise import innovations
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening

@@ -28,7 +28,7 @@ from asperity.algebra.runge_kutta import rodas_5p
 from asperity.algebra.small_systems import apply, inverse_points
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, shifted
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.slider.motion import Motion
 from asperity.slider.named import slider_from
 
