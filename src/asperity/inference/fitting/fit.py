@@ -417,7 +417,7 @@ def _objective(
             priors,
             mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
             or table is not None,
-            beside_table=table is not None,
+            with_table=table is not None,
         )
         # Its prior makes it free.
         named = [name for name in named if name.partition("[")[0] != GAIN]
@@ -450,7 +450,7 @@ def _objective(
             recordings,
             law,
             {n: v for n, v in constants.items() if np.ndim(v) == 0},
-            beside_table=table is not None,
+            with_table=table is not None,
             shared_stiffness=shared,
             fixed_stiffness=fixed.get("K"),
             start=begun,
