@@ -75,7 +75,7 @@ def write_report(
         Converged.
     posterior : Posterior, optional
     names : {"friction", "geophysics"}
-        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        Names of parameters on the page and in warnings. Numbers in files keep the names of
         friction.
 
     Raises
@@ -222,7 +222,7 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     comparison : Comparison
         With one converged fit at least.
     names : {"friction", "geophysics"}
-        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        Names of parameters on the page and in warnings. Numbers in files keep the names of
         friction.
 
     Raises

@@ -224,7 +224,7 @@ def fit(
     warnings += unusual_numbers(result, recordings)
     if not recordings:
         other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
-        return replace(result, warnings=(*warnings, *result.warnings, *filter(None, [other])))
+        return replace(result, sentences=(*warnings, *result.sentences, *filter(None, [other])))
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
@@ -243,7 +243,7 @@ def fit(
             seed=seed,
         )
         warnings += contradicted_stiffness(result, freed, recordings, given)
-    return replace(result, warnings=(*warnings, *result.warnings))
+    return replace(result, sentences=(*warnings, *result.sentences))
 
 
 class _Given(NamedTuple):
