@@ -52,7 +52,7 @@ _SHOWN = "growth_rate"
 )
 @switch("--log-x", "Points along x at equal ratios.")
 @switch("--log-y", "Points along y at equal ratios.")
-@switch("--resume", "Go on with an interrupted map.")
+@switch("--resume", "Continue an interrupted map.")
 def map(
     x: str,
     y: str,

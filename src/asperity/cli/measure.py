@@ -177,7 +177,7 @@ in place of numbers; 2: bad input.
     "K, V, M or W0 of each file: a table with a column file, or a pattern of the files' names "
     'like "run_k{K N/m}_v{V um/s}".',
 )
-@switch("--resume", "Go on with an interrupted table.")
+@switch("--resume", "Continue an interrupted table.")
 @option("--jobs", "N", "Processes of a table; as many as cores if not given.", Count(1))
 @option(
     "--thresholds",
@@ -210,9 +210,9 @@ def measure(
 ) -> int:
     """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
 
-    What the recording is, is recognised from its load and velocity. RECORDINGS are files of a
-    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. Several are
-    measured into one table with --out.
+    The kind of the recording is recognised from its load and velocity. RECORDINGS are files of a
+    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. With --out, several
+    recordings are measured into one table.
     """
     from asperity.questions.recording import Measurement as Question
 

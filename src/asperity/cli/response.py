@@ -69,7 +69,7 @@ _JSON = (
 )
 @option("--table", "CSV", "Solve every row of a table.", Path)
 @option("--out", "CSV", "Where the table with its results goes.", Path)
-@switch("--resume", "Go on with an interrupted table.")
+@switch("--resume", "Continue an interrupted table.")
 def response(
     point: Point,
     output: Output,
