@@ -28,7 +28,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import shown
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 
 if TYPE_CHECKING:
     from asperity.materials import Material

@@ -8,7 +8,7 @@ import asperity as asp
 from asperity.laws import registered
 from asperity.loads import Hold, Modulate, Programme, Slide
 from asperity.operating_point import numbers_for, sourced_numbers
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients import step_size
 from asperity.transients.events import _SENTENCES
 from references.populations import population

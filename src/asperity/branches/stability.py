@@ -40,7 +40,7 @@ from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equations_as_text
+from asperity.slider.parameters import equations_as_text
 from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:

@@ -366,7 +366,7 @@ def _cycles(
         import numpy as np
 
         from asperity.experiment import stick_slip_response
-        from asperity.slider.named import slider_from
+        from asperity.slider.parameters import slider_from
 
         machines = {
             k: (series.K, series.W0, series.mass(values.get("M", np.nan)))

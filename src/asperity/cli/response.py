@@ -165,7 +165,7 @@ def _stick_slip(point: Point, output: Output) -> int:
     from asperity.laws import Law, get_law
     from asperity.operating_point import point_numbers
     from asperity.parameters import MODULATION, canonical_name, point_parameters
-    from asperity.slider.named import slider_from
+    from asperity.slider.parameters import slider_from
 
     output.require_picture()
     law: type[Law] = get_law(point.law) if point.law else Law

@@ -30,7 +30,7 @@ from asperity.algebra.small_systems import value_and_jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation
 from asperity.slider import Motion
-from asperity.slider.named import equation_parameters, with_value
+from asperity.slider.parameters import equation_parameters, with_value
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.implicit import STAGES

@@ -33,7 +33,7 @@ from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening
 from asperity.slider.motion import Motion
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.slider.problem import equation_of_motion
 
 #: Programs have room for so many steps, and for at least so many for each piece of the drive: after

@@ -37,7 +37,7 @@ from asperity.orbit import (
     response_function,
 )
 from asperity.parameters import law_parameters
-from asperity.slider.named import law_from
+from asperity.slider.parameters import law_from
 
 #: Largest number of rows whose orbits are remembered, about ten kilobytes each.
 _REMEMBERED = 2048
