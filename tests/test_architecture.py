@@ -237,7 +237,7 @@ def test_a_planted_cycle_is_detected(tmp_path: Path) -> None:
     ("room", "line", "target"),
     [
         ("laws", "from asperity.slider import Slider", "slider"),
-        ("laws", "import asperity.materials.record", "materials"),
+        ("laws", "import asperity.materials.material", "materials"),
         ("laws", "from asperity import orbit", "orbit"),
         ("loads", "def f():\n    from asperity.laws import get_law", "laws"),
         ("air", "from asperity.laws.law import Law", "laws"),

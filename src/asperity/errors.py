@@ -9,6 +9,7 @@ A solve that fails is not an error: it is reported in the result.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -146,6 +147,20 @@ def naming(
 def symbol(name: str) -> str:
     """The name of a parameter in the user's set of names, for a message."""
     return _naming.get().symbols(name)
+
+
+#: A parameter in a text: its name between control characters, which no file or user can write.
+_NAMED = re.compile("\x0e(.*?)\x0f")
+
+
+def named(name: str) -> str:
+    """A parameter in a text that is worded later, by `worded`."""
+    return f"\x0e{name}\x0f"
+
+
+def worded(text: str) -> str:
+    """A text in which each parameter has its name in the user's set of names."""
+    return _NAMED.sub(lambda parameter: symbol(parameter[1]), text)
 
 
 def symbols(names: Iterable[str]) -> str:

@@ -28,7 +28,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import shown
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -127,7 +127,7 @@ def numbers_for(
     among : mapping of str to Parameter, optional
         Parameters that count; by default all of a point with this law.
     needed : tuple of str
-        Those that must be there, besides the ones without a default.
+        Parameters that must be given, in addition to those without a default.
     place : str
         Table of a file that states them, as of `sourced_numbers`.
 

@@ -1,4 +1,4 @@
-"""The page, served from a thread of this process, and ways to ask it and to open it."""
+"""The page, served from a thread of this process; fixtures that send requests or open it."""
 
 import http.client
 import json
@@ -14,7 +14,7 @@ for name in ("starlette", "uvicorn", "latex2mathml"):
 
 @pytest.fixture(scope="session")
 def server():
-    """A running server; `server.port` is where."""
+    """A running server at `server.port`."""
     from asperity.app.server import listen, server_on
 
     listening = listen(0)
@@ -30,7 +30,7 @@ def server():
     listening.close()
 
 
-class Asked:
+class Answer:
     """An answer of the server."""
 
     def __init__(self, response):
@@ -63,7 +63,7 @@ def ask(server):
         target = path if path.startswith("/") else f"/api/{path}"
         try:
             connection.request(method or ("GET" if body is None else "POST"), target, content, sent)
-            return Asked(connection.getresponse())
+            return Answer(connection.getresponse())
         finally:
             connection.close()
 
@@ -97,7 +97,7 @@ def raw(server):
 
 @pytest.fixture
 def barriers():
-    """What axe finds on a page that was opened with ``bypass_csp``: axe is a script in the page."""
+    """Barriers to access that axe finds on a page, opened with ``bypass_csp`` to let axe run."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
     def of(page):
@@ -109,7 +109,7 @@ def barriers():
 
 @pytest.fixture
 def visit(chromium, server):
-    """Open a view of the page; a request to anywhere else, or a script that fails, is an error."""
+    """Open a view of the page; a request to another host or a failing script is an error."""
     opened, fetched, failed = [], [], []
     origin = f"http://127.0.0.1:{server.port}"
 
@@ -128,5 +128,5 @@ def visit(chromium, server):
         page.close()
     allowed = (f"{origin}/", "data:image/", f"blob:{origin}/")
     assert [url for url in fetched if not url.startswith(allowed)] == []
-    # A refused request is a matter of the page, which says why; Chromium notes it too.
+    # The page itself shows why a request is refused; Chromium reports it as well.
     assert [text for text in failed if "status of 400" not in text] == []

@@ -22,7 +22,7 @@ from asperity.cli.main import main
 from asperity.errors import Argument, InputError, naming, symbol
 from asperity.inference.answers import read_data
 from asperity.laws.registry import symbols_of
-from asperity.outputs.tables import Section
+from asperity.outputs.sections import Section
 from asperity.questions import fit as questions
 from references.spring_slider import spring_slider
 

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity import Slider, materials, periodic_response
-from asperity.errors import InputError
+from asperity.errors import InputError, named
 from asperity.fit_report import bands, write_comparison, write_report
 from asperity.fit_report.folder import document
 from asperity.fit_report.pictures import run_figure
@@ -17,7 +17,7 @@ from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
 from asperity.orbit import response_function
-from asperity.outputs.tables import Section, as_html
+from asperity.outputs.sections import Section, as_html
 
 
 @pytest.fixture(scope="module")
@@ -139,14 +139,17 @@ def test_recordings_are_shown_with_the_motion(tmp_path):
     late = replace(run, origin=3e4)
     figure = run_figure(late, {"rice-ruina": late.friction})
     assert figure.axes[0].lines[0].get_xdata()[0] == 3e4
-    # Names are those of the screen, and files keep theirs.
-    compared = judge({"rice-ruina": own, "the same": own})
-    write_report(tmp_path / "faults", own, names="geophysics")
+    # The page has the chosen names, in warnings too; numbers in files have those of friction.
+    warned = replace(own, sentences=(f"{named('D0')} is at its bound",))
+    assert warned.warnings == ("D0 is at its bound",)
+    compared = judge({"rice-ruina": warned, "the same": warned})
+    write_report(tmp_path / "faults", warned, names="geophysics")
     write_comparison(tmp_path / "other laws", compared, "geophysics")
     for folder in ("faults", "other laws"):
         page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
         assert "<td>D_c</td>" in page
         assert "<td>D0</td>" not in page
+        assert "D_c is at its bound" in page
     assert '"D0"' in (tmp_path / "faults" / "fit.json").read_text(encoding="utf-8")
     # A stiffness under a stress is none of a material, whose springs are in N/m.
     material = (tmp_path / "fit" / "material.toml").read_text(encoding="utf-8")

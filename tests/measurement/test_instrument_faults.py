@@ -171,10 +171,10 @@ def test_a_force_made_from_friction_is_named_and_a_mean_load_suspected(clean, se
 
     right, wrong = measured(force / load), measured(force / 7.0)
     for measurement in (right, wrong):
-        sentence = by_name(measurement, "made force").sentence
+        sentence = by_name(measurement, "computed force").sentence
         assert "the force was made from friction x load ('mu x load')" in sentence
-    assert by_name(right, "made force").verdict == "ok"
-    assert by_name(wrong, "made force").verdict == "suspicious"
+    assert by_name(right, "computed force").verdict == "ok"
+    assert by_name(wrong, "computed force").verdict == "suspicious"
     # The truth is 2e-3; division by the mean load gives epsilon times the mean friction.
     assert right.reading.phasor(1).amplitude == pytest.approx(2e-3, rel=0.05)
     assert wrong.reading.phasor(1).amplitude > 0.05

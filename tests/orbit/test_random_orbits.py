@@ -17,7 +17,7 @@ from asperity.laws import Law, parameter, registered
 from asperity.loads import modulated
 from asperity.operating_point import numbers_for, sourced_numbers
 from asperity.orbit import Outcome
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from references.populations import population
 
 MU0, A, B, D0, V0, K, W0, V, FREQUENCY = 0.5, 0.013, 0.026, 4e-7, 1e-6, 4e5, 7.0, 2e-6, 60.0

@@ -5,7 +5,7 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.orbit import Outcome
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 
 NUMBERS = {
     "mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6, "V1": 1e-8, "V2": 1e-4,

@@ -27,30 +27,30 @@ def points(stiffness, frequency, epsilon):
 
 
 @pytest.mark.parametrize(
-    ("lost", "share", "said"),
+    ("outcome", "share", "epsilon"),
     [
         (Outcome.NO_ORBIT, 0.5, 0.2),
         (Outcome.NO_ORBIT, 1.001, 0.4),
         (Outcome.NOT_RESOLVED, 3e-8, 0.4),
     ],
 )
-def test_failed_points_with_large_growth_are_too_unstable(lost, share, said):
+def test_failed_points_with_large_growth_are_too_unstable(outcome, share, epsilon):
     # D0/V = 4 ms and a period of 10 s: far below Kc disturbances grow by far more than e^15.
     problem = points(np.array([2.0, 2.0, 0.1]) * KC, 0.1, 0.4)
     solution = Solution.empty(2, 3, OPTIONS)
     rows = np.array([2, 0])
-    solution.outcome[rows], solution.detail[rows] = lost, share
+    solution.outcome[rows], solution.detail[rows] = outcome, share
     solution.outcome[1] = Outcome.CONVERGED
     mark_too_unstable(problem, solution)
-    assert solution.outcome.tolist() == [lost, Outcome.CONVERGED, Outcome.SENSITIVE]
-    assert solution.detail[2] == pytest.approx(said, rel=1e-12)
+    assert solution.outcome.tolist() == [outcome, Outcome.CONVERGED, Outcome.SENSITIVE]
+    assert solution.detail[2] == pytest.approx(epsilon, rel=1e-12)
     assert solution.detail[0] == share
 
 
 def test_a_branch_close_to_arriving_may_exceed_the_runaway_limit_a_little():
     fastest = RUNAWAY + np.array([0.2, 0.2, 0.9, -0.1])
-    still = continues(np.array([0.995, 0.9, 0.995, 0.9]), fastest)
-    assert still.tolist() == [True, False, False, True]
+    continued = continues(np.array([0.995, 0.9, 0.995, 0.9]), fastest)
+    assert continued.tolist() == [True, False, False, True]
 
 
 class Stub(Method):

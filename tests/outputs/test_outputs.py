@@ -19,7 +19,7 @@ from asperity.outputs import (
     written_file,
 )
 from asperity.outputs.json import json_content, parsed_json
-from asperity.outputs.tables import aligned, rounded
+from asperity.outputs.sections import aligned, rounded
 
 
 def a_folder(path: Path) -> None:

@@ -29,7 +29,7 @@ from asperity.parameters import (
     symbol_of,
 )
 from asperity.slider import equation_of_motion
-from asperity.slider.named import equation_parameters, value_of, with_value
+from asperity.slider.parameters import equation_parameters, value_of, with_value
 from asperity.slider.problem import Problem
 from asperity.units import KINDS
 

@@ -8,8 +8,8 @@ import asperity as asp
 from asperity.laws import registered
 from asperity.loads import Hold, Modulate, Programme, Slide
 from asperity.operating_point import numbers_for, sourced_numbers
-from asperity.slider.named import slider_from
-from asperity.transients import steps
+from asperity.slider.parameters import slider_from
+from asperity.transients import step_size
 from asperity.transients.events import _SENTENCES
 from references.populations import population
 
@@ -145,12 +145,14 @@ def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
 
     def attempts(error, factor):
         def attempt(t, Y, h, memory):
-            return steps.TrialStep(Y, jnp.asarray(error), jnp.asarray(factor), memory, False, (Y,))
+            return step_size.TrialStep(
+                Y, jnp.asarray(error), jnp.asarray(factor), memory, False, (Y,)
+            )
 
         zero, Y = jnp.zeros(()), jnp.zeros(2)
         limits = 0.999999, 6.0
         return jax.jit(
-            lambda h: steps.run_steps(
+            lambda h: step_size.run_steps(
                 system, jnp.ones(()), zero, Y, h, jnp.ones(()), attempt, zero, limits
             )
         )
@@ -158,9 +160,9 @@ def test_compiled_steps_return_after_a_limited_number_of_trials(monkeypatch):
     # Shortened by a tenth only, it takes longer than a chunk to vanish.
     slow = attempts(2.0, 1.0)(jnp.asarray(1e308))
     assert int(slow.taken) == 0
-    assert int(slow.rejected) <= steps._TRIALS
+    assert int(slow.rejected) <= step_size._TRIALS
     for lost in (attempts(jnp.nan, jnp.nan)(jnp.nan), attempts(jnp.nan, 1.0)(jnp.asarray(jnp.nan))):
-        assert int(lost.status) == steps.UNDERFLOW
+        assert int(lost.status) == step_size.UNDERFLOW
 
 
 @pytest.mark.parametrize(

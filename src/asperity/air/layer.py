@@ -242,7 +242,7 @@ def _profile(rho: Float, s: Float) -> Complex:
     y = 0.25j * np.minimum(s, 1.0) ** 2
     terms = [y**k / factorial(k) ** 2 for k in range(11)]
     top = sum(t * (1 - rho ** (2 * k)) for k, t in enumerate(terms))
-    # jve carries e^{-|Im|}: what it leaves out of the quotient is e^{-s (1 - rho)/sqrt 2}.
+    # jve is scaled by e^{-|Im|}: the quotient lacks the factor e^{-s (1 - rho)/sqrt 2}.
     z = (1 - 1j) / np.sqrt(2) * np.maximum(s, 1.0)
     bare = jve(0, rho * z) / jve(0, z) * np.exp(np.abs(z.imag) * (rho - 1))
     return np.where(s < 1, top / sum(terms), 1 - bare)

@@ -14,7 +14,7 @@ from asperity.laws import registered
 from asperity.parameters import DRIVE
 from asperity.parameters.arguments import at_least, typed
 from asperity.slider import Slider
-from asperity.slider.named import slider_values
+from asperity.slider.parameters import slider_values
 
 
 class Page:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from asperity.errors import InputError, printable, require
 from asperity.outputs import free_disk, size_text
-from asperity.outputs.written import held_folder
+from asperity.outputs.atomic import held_folder
 
 #: Largest file (bytes), and all files together.
 LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3

@@ -12,13 +12,13 @@ from asperity.arrays import Bool, Complex, Float
 from asperity.orbit.floquet import from_logs
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion
-from asperity.slider.named import equations_as_text
+from asperity.slider.parameters import equations_as_text
 
 if TYPE_CHECKING:
     import xarray
 
+    from asperity.branches.bifurcations import BranchFollower, BranchOrbit
     from asperity.branches.parameters import ContinuedParameter
-    from asperity.branches.steps import BranchFollower, BranchOrbit
     from asperity.orbit.mesh.arclength import ContinuationPoint
     from asperity.slider.problem import Problem
 

@@ -19,6 +19,14 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.arrays import Float
+from asperity.branches.bifurcations import (
+    INTERVALS,
+    BranchFollower,
+    BranchOrbit,
+    LocatedBifurcation,
+    ParameterBranch,
+    criterion,
+)
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
 from asperity.branches.parameters import (
     ContinuedParameter,
@@ -26,14 +34,6 @@ from asperity.branches.parameters import (
     line_through,
     moving_parameter,
     one_problem,
-)
-from asperity.branches.steps import (
-    INTERVALS,
-    BranchFollower,
-    BranchOrbit,
-    LocatedBifurcation,
-    ParameterBranch,
-    criterion,
 )
 from asperity.errors import InputError, require
 from asperity.loads import Excitation, Modulation

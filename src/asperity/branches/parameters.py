@@ -17,7 +17,7 @@ from asperity.orbit.mesh.arclength import ParameterLine, still
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number
 from asperity.slider import Slider
-from asperity.slider.named import equation_parameters, equation_values, with_value
+from asperity.slider.parameters import equation_parameters, equation_values, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.

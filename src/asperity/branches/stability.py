@@ -20,14 +20,7 @@ from numpy.typing import NDArray
 
 from asperity.algebra.continuation import STEPS, STUCK, Attempt, Curves, StepControl, follow
 from asperity.arrays import Bool, Complex, Float, Index
-from asperity.branches.parameters import (
-    ContinuedParameter,
-    fixed_parameters,
-    line_through,
-    moving_parameter,
-    one_problem,
-)
-from asperity.branches.steps import (
+from asperity.branches.bifurcations import (
     BranchFollower,
     BranchOrbit,
     Kind,
@@ -35,12 +28,19 @@ from asperity.branches.steps import (
     criterion,
     kind_of,
 )
+from asperity.branches.parameters import (
+    ContinuedParameter,
+    fixed_parameters,
+    line_through,
+    moving_parameter,
+    one_problem,
+)
 from asperity.errors import require
 from asperity.loads import Modulation
 from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equations_as_text
+from asperity.slider.parameters import equations_as_text
 from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:

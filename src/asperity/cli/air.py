@@ -145,7 +145,7 @@ def _forward(
     import numpy as np
 
     from asperity.air import effective_modulation, modulation_phase
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.units import format_si
 
     contact = _contact(numbers)
@@ -188,7 +188,7 @@ def _invert(
     output: Output,
 ) -> int:
     from asperity.air import gap, patch_radius
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.units import format_si
 
     solve: Any

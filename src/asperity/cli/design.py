@@ -14,7 +14,7 @@ from asperity.errors import symbol, symbols
 
 if TYPE_CHECKING:
     from asperity.inference import Design
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
 _EPILOG = """\b
 Examples:
@@ -44,8 +44,8 @@ line by line, examples/load_on_age.toml is one.
 def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int:
     """Operating points that measure parameters or exclude a law best.
 
-    Points, expected standard errors, and how many times fewer readings they are than an even grid
-    of the same interval.
+    The answer has the points, the expected standard errors, and the number of readings of an even
+    grid with the same interval, in multiples of the design's.
     """
     from asperity import inference
     from asperity.cli.progress import bar
@@ -68,7 +68,7 @@ def design(plan: Path, simulate: int, table: Path | None, output: Output) -> int
 
 def _sections(result: Design) -> list[Section]:
     """A design as sections of text."""
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
@@ -98,10 +98,10 @@ def _sections(result: Design) -> list[Section]:
     lines = [
         f"{fewer} times fewer readings than an even grid for the same {what} ({grid}; "
         f"{result.grid_usable[0]} of {result.grid_usable[1]} usable)",
-        f"efficiency at least {result.efficiency:.3f}, of the whole readings "
+        f"efficiency at least {result.efficiency:.3f}, with whole numbers of readings "
         f"{result.efficiency_whole:.3f}",
         f"{result.candidates} of {result.combinations} combinations can be used",
-        *(f"  {count} not: {reason}" for reason, count in result.left_out.items()),
+        *(f"  {count} cannot: {reason}" for reason, count in result.left_out.items()),
     ]
     if plan.rival is not None:
         values = "; ".join(f"{symbol(n)} = {v:.4g}" for n, v in (result.rival_values or {}).items())

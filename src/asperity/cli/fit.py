@@ -54,14 +54,15 @@ given. eps_ratio is the share of epsilon that the contacts carry.
 \b
 Holds: one slide-hold-slide test a row: hold_time, healing (static friction less
 the level of sliding), V, K over the normal load (N/m with a column W0), and
-healing_err, the standard uncertainty; without it one error for all holds is
-estimated from what the law leaves. In SI, or with units in the heading: K (1/um).
+healing_err, the standard uncertainty; without it an error common to all holds is
+estimated from the residuals. In SI, or with units in the heading: K (1/um).
 
 \b
 Recording: any file that 'asperity measure' reads, with friction (or force and
-load) and the displacement or velocity of the load point. It is compared with the
-motion through the whole of it; its stiffness K is free, its noise autoregressive.
-More than 20,000 samples are compared as means over blocks (--fit-rate).
+load) and the displacement or velocity of the load point. One computed motion is
+compared with the whole recording; the stiffness K is free, the noise is
+autoregressive. More than 20,000 samples are compared as means over blocks
+(--fit-rate).
 """
 
 #: Options of the sampling, with their defaults.
@@ -93,7 +94,7 @@ _FIRST = (
     option("--window", "START:END", "Seconds of a recording to fit."),
     _field("free"),
     option("--fix fixed", "NAME=VALUE", 'Fix a number, like "D0=5 um"; repeatable.', multiple=True),
-    option("--start", "NAME=VALUE", "Start value of a free one; repeatable.", multiple=True),
+    option("--start", "NAME=VALUE", "Start value of a free parameter; repeatable.", multiple=True),
     _field("material"),
     option(
         "--prior",
@@ -190,7 +191,7 @@ def _question_options(*further: Decorator) -> Decorator:
         for name, text in (
             ("chains", "Chains."),
             ("draws", "Draws of each chain."),
-            ("seed", "Of the draws."),
+            ("seed", "Seed of the draws."),
         )
     ),
     option("--out", "NC", "Where the draws go, for ArviZ.", Path),
@@ -292,8 +293,8 @@ Examples:
       --material bureau2000 --free lambda,alpha,eps_ratio,A,B
 
 \b
-Each law takes those of the free parameters that it has. A law is excluded if
-chi-squared has a probability below 0.001 while that of another law has not, or
+For each law those free parameters count that it has. A law is excluded if
+chi-squared has a probability below 0.001 and that of another law has not, or
 if its AICc exceeds the lowest by 10 or more.
 """
 

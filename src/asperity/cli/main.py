@@ -14,8 +14,8 @@ import click
 from asperity._version import __version__
 from asperity.cli.shell import Shell
 
-# Set before NumPy is imported. Matrices are small here: the threads of a BLAS spend their time on
-# waiting for each other, and beside other work a recording takes several times as long to be read.
+# Set before NumPy is imported. Matrices are small here: the threads of a BLAS mostly wait for each
+# other, and on a busy machine reading a recording takes several times as long with them.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Set before JAX looks for accelerators, which takes seconds and most of their memory.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

@@ -52,7 +52,7 @@ _SHOWN = "growth_rate"
 )
 @switch("--log-x", "Points along x at equal ratios.")
 @switch("--log-y", "Points along y at equal ratios.")
-@switch("--resume", "Go on with an interrupted map.")
+@switch("--resume", "Continue an interrupted map.")
 def map(
     x: str,
     y: str,
@@ -73,7 +73,7 @@ def map(
     from asperity.laws import get_law
     from asperity.operating_point import offered_numbers, require_given_influence
     from asperity.outputs import output_files, require_netcdf
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.parameters.parameter import count_text
     from asperity.study.map import SHOWN, write_map

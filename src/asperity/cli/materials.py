@@ -30,12 +30,12 @@ a fit), assumed (not in the paper).
 @switch("--cite", "Print the source as BibTeX.")
 @output_options()
 def materials(name: str | None, cite: bool, output: Output) -> None:
-    """List the materials, or every number of one.
+    """List the materials, or every number of a material.
 
     NAME is a material, or the path of your TOML file.
     """
     from asperity import materials as known
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     if cite:
         keys = known.available_citations() if name is None else (known.load(name).source,)

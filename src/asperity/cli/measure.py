@@ -177,7 +177,7 @@ in place of numbers; 2: bad input.
     "K, V, M or W0 of each file: a table with a column file, or a pattern of the files' names "
     'like "run_k{K N/m}_v{V um/s}".',
 )
-@switch("--resume", "Go on with an interrupted table.")
+@switch("--resume", "Continue an interrupted table.")
 @option("--jobs", "N", "Processes of a table; as many as cores if not given.", Count(1))
 @option(
     "--thresholds",
@@ -210,9 +210,9 @@ def measure(
 ) -> int:
     """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
 
-    What the recording is, is recognised from its load and velocity. RECORDINGS are files of a
-    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. Several are
-    measured into one table with --out.
+    The kind of the recording is recognised from its load and velocity. RECORDINGS are files of a
+    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. With --out, several
+    recordings are measured into one table.
     """
     from asperity.questions.recording import Measurement as Question
 
@@ -366,7 +366,7 @@ def _cycles(
         import numpy as np
 
         from asperity.experiment import stick_slip_response
-        from asperity.slider.named import slider_from
+        from asperity.slider.parameters import slider_from
 
         machines = {
             k: (series.K, series.W0, series.mass(values.get("M", np.nan)))
@@ -411,7 +411,7 @@ def _campaign(
         write_thresholds,
     )
     from asperity.outputs import output_files, written_file
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters.parameter import count_text
 
     question = rows_of.question

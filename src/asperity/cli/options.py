@@ -181,8 +181,8 @@ _OUTPUT = (
     option(
         "--names",
         "|".join(NAMES),
-        "Names on screen, in figures and options: A, B, D0, K/W0, or geophysics: a, b, D_c, "
-        "k/sigma_n.",
+        "Names on screen, in figures and options: A, B, D0, K/W0 (friction), or a, b, D_c, "
+        "k/sigma_n (geophysics).",
         default=NAMES[0],
         is_eager=True,
         callback=lambda context, option, names: _chosen(context, one_of(names, NAMES, "--names")),

@@ -14,7 +14,7 @@ from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.ledger import RecipeResult
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
 _EPILOG = """\b
 Example:
@@ -84,7 +84,7 @@ def recipe(
 
 def _section(result: RecipeResult) -> Section:
     """Computed and published numbers in a table."""
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     rows = []
     for name, r in result.numbers.items():

@@ -14,12 +14,12 @@ from typing import Any
 import click
 
 #: Seconds before a bar appears, between its updates, and between lines of a log.
-_SILENT, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
+_DELAY, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
 
 
 @contextmanager
-def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callable[..., None]]:
-    """A function of the work done, all work, and a label, which shows progress.
+def bar(unit: str, task: str = "", *, raising: bool = True) -> Iterator[Callable[..., None]]:
+    """Show progress within a block.
 
     A short job prints nothing. Within the block, Ctrl-C raises `KeyboardInterrupt`.
 
@@ -27,17 +27,22 @@ def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callabl
     ----------
     unit : str
         Unit of the work.
-    doing : str
-        Label of calls without a label.
+    task : str
+        Name of the work, shown where a call gives no label.
     raising : bool
         False for work without files to clean up: Ctrl-C then ends the process at once.
+
+    Yields
+    ------
+    callable
+        To be called with the work done so far, all work and, optionally, a label.
     """
     shown = _on_terminal(unit) if sys.stderr.isatty() else _in_log(unit)
     with shown as show, interruptible() if raising else nullcontext(lambda: None) as check:
 
         def update(done: int, total: int, label: str = "") -> None:
             check()
-            show(done, total, label or doing)
+            show(done, total, label or task)
 
         yield update
 
@@ -49,7 +54,7 @@ def _on_terminal(unit: str) -> Iterator[Callable[[int, int, str], None]]:
     with tqdm(
         unit=unit,
         file=sys.stderr,
-        delay=_SILENT,
+        delay=_DELAY,
         mininterval=_ON_TERMINAL,
         leave=False,
         dynamic_ncols=True,
@@ -85,9 +90,9 @@ def _in_log(unit: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 @contextmanager
-def waiting(doing: str) -> Iterator[None]:
-    """Print on a terminal what is done, if it takes long; for work without parts to count."""
-    timer = threading.Timer(_SILENT, click.echo, [f"asperity: {doing} ..."], {"err": True})
+def waiting(task: str) -> Iterator[None]:
+    """Print the name of a task on a terminal if it takes long; for tasks without parts to count."""
+    timer = threading.Timer(_DELAY, click.echo, [f"asperity: {task} ..."], {"err": True})
     if sys.stderr.isatty():
         timer.start()
     try:

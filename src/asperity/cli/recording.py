@@ -58,7 +58,7 @@ _OPTIONS = (
         "Unit of a column that the file leaves open, like Fn=N; repeatable.",
         multiple=True,
     ),
-    option("--area", "VALUE", 'Makes stresses forces, like "25 cm^2".'),
+    option("--area", "VALUE", 'Area that turns stresses into forces, like "25 cm^2".'),
     option("--rate", "VALUE", 'Samples per second, like "10 kHz", in place of times.'),
     option(
         "--channel channels",
@@ -67,9 +67,9 @@ _OPTIONS = (
         multiple=True,
     ),
     option("--recipe", "TOML", "Reduction file: columns, units and channels.", Path),
-    option("--group", "NAME", "Group of an HDF5, MATLAB or TDMS file of several."),
+    option("--group", "NAME", "Group in an HDF5, MATLAB or TDMS file with several groups."),
     option("--format", "NAME", "Format of the file, or name of a reader."),
-    option("--delimiter", "SIGN", "Of a text: a character, tab or blank."),
+    option("--delimiter", "SIGN", "Delimiter of a text: a character, tab or blank."),
     option("--decimal", "SIGN", "Decimal mark of a text: . or ,"),
 )
 #: Options with the name of their field of the source.

@@ -15,7 +15,7 @@ from asperity.parameters import NAMES, Names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
 #: Key of the chosen set of names in click's context.
 CHOSEN_NAMES = "asperity.names"
@@ -59,7 +59,7 @@ class Output:
         """
         from asperity.laws import get_law
         from asperity.outputs import json
-        from asperity.outputs.tables import as_text
+        from asperity.outputs.sections import as_text
         from asperity.parameters.table import plain_names
 
         if self.as_json:

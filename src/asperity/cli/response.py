@@ -15,7 +15,7 @@ from asperity.errors import require, symbol
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.questions.point import Point
 
 _EPILOG = """\b
@@ -69,7 +69,7 @@ _JSON = (
 )
 @option("--table", "CSV", "Solve every row of a table.", Path)
 @option("--out", "CSV", "Where the table with its results goes.", Path)
-@switch("--resume", "Go on with an interrupted table.")
+@switch("--resume", "Continue an interrupted table.")
 def response(
     point: Point,
     output: Output,
@@ -165,7 +165,7 @@ def _stick_slip(point: Point, output: Output) -> int:
     from asperity.laws import Law, get_law
     from asperity.operating_point import point_numbers
     from asperity.parameters import MODULATION, canonical_name, point_parameters
-    from asperity.slider.named import slider_from
+    from asperity.slider.parameters import slider_from
 
     output.require_picture()
     law: type[Law] = get_law(point.law) if point.law else Law
@@ -201,7 +201,7 @@ def _sections(
 ) -> list[Section]:
     """Inputs with their sources, and outputs: rows of name, value, unit and meaning."""
     from asperity.laws import get_law
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
@@ -226,7 +226,7 @@ def _table(table: Path, out: Path, point: Point, resume: bool, output: Output) -
     from asperity.cli.progress import bar
     from asperity.laws import get_law
     from asperity.operating_point import material_of, sourced_numbers
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters.parameter import count_text
     from asperity.study.table import run_table
 

@@ -50,12 +50,15 @@ Exit code 0: done; 1: the motion ended before the programme, with the reason;
 @click.argument("protocol", type=Path)
 @option("--out", "NC", "Where the motion goes.", Path, required=True)
 @output_options(plot=True)
-@switch("--csv as_csv", "Write it as text too, next to --out.")
+@switch("--csv as_csv", "Write the motion as text too, next to --out.")
 @option(
-    "--record", "FILE", "Record it with the protocol's tribometer: .csv, .txt, .h5 or .tdms.", Path
+    "--record",
+    "FILE",
+    "Record the motion with the protocol's tribometer: .csv, .txt, .h5 or .tdms.",
+    Path,
 )
 @law_option("Make a law of your own known to the protocol: module:Name or file.py:Name.")
-@switch("--resume", "Go on with an interrupted run.")
+@switch("--resume", "Continue an interrupted run.")
 def run(
     protocol: Path,
     out: Path,
@@ -167,7 +170,7 @@ def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | N
 
 
 def _report(wanted: Protocol, done: RunSummary, files: list[Path], output: Output) -> None:
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     duration = wanted.programme.duration
     rows = (

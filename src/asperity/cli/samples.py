@@ -26,18 +26,19 @@ Examples:
     "File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
     click.Path(path_type=Path),
 )
-@option("--seed", None, "Of the noise; 0 by default.", Count())
+@option("--seed", None, "Seed of the noise; 0 by default.", Count())
 @output_options()
 def samples(name: str | None, out: Path | None, seed: int | None, output: Output) -> None:
     """List the sample recordings, or make one of them.
 
-    NAME is one of the list. Law and numbers of the simulated slider are printed, V as it is at the
-    start: what a fit of the recording should give back, as far as gauges and recorder let it.
+    NAME is a name of the list. The law and the numbers of the simulated slider are printed, with V
+    at the start. A fit of the recording should find these numbers, apart from the effects of gauges
+    and recorder.
     """
     from asperity import samples as known
     from asperity.operating_point import known_parameters
     from asperity.outputs import output_file
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.parameters import DRIVE
     from asperity.recording.writers import check_path, write
     from asperity.units import format_si

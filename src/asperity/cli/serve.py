@@ -26,7 +26,7 @@ an environment.
 @option(
     "--port",
     "NUMBER",
-    "Port to listen on; 0 for any that is free.",
+    "Port to listen on; 0 for any free port.",
     Count(),
     default=8765,
     show_default=True,

@@ -15,7 +15,7 @@ from asperity.cli.report import Output, save_figure, say
 from asperity.errors import InputError, require
 
 if TYPE_CHECKING:
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
     from asperity.study.engine import SweepProgress
 
 _PERIODS = ((86_400 * 365.25, "years"), (86_400, "days"), (3600, "h"), (60, "min"))
@@ -32,7 +32,7 @@ def _time_text(seconds: float) -> str:
 
 
 def _section(*rows: tuple[str, ...], head: tuple[str, ...] = ()) -> list[Section]:
-    from asperity.outputs.tables import Section
+    from asperity.outputs.sections import Section
 
     return [Section("", head=head, rows=rows)]
 

@@ -9,16 +9,16 @@ from asperity.experiment.amplitudes import (
     amplitude_motion as amplitude_motion,
     amplitude_series as amplitude_series,
 )
-from asperity.experiment.loading import (
-    ElasticLength as ElasticLength,
-    elastic_length as elastic_length,
-    loading_recording as loading_recording,
-)
-from asperity.experiment.memory import (
+from asperity.experiment.holds_and_steps import (
     Holds as Holds,
     VelocityStepResponse as VelocityStepResponse,
     hold_response as hold_response,
     step_response as step_response,
+)
+from asperity.experiment.loading import (
+    ElasticLength as ElasticLength,
+    elastic_length as elastic_length,
+    loading_recording as loading_recording,
 )
 from asperity.experiment.motion import (
     DISPLACEMENT as DISPLACEMENT,
@@ -26,7 +26,7 @@ from asperity.experiment.motion import (
     FORCE as FORCE,
     LOAD as LOAD,
 )
-from asperity.experiment.recipes import (
+from asperity.experiment.programmes import (
     SlideHoldSlide as SlideHoldSlide,
     VelocitySteps as VelocitySteps,
     slide_hold_slide as slide_hold_slide,

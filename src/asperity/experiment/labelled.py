@@ -15,7 +15,7 @@ from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import Slider
-from asperity.slider.named import slider_values
+from asperity.slider.parameters import slider_values
 
 if TYPE_CHECKING:
     import xarray

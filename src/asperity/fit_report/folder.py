@@ -29,8 +29,8 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.laws.registry import symbols_of
 from asperity.materials import cited_works
-from asperity.outputs.tables import as_html, html_page, html_table
-from asperity.outputs.written import written_folder
+from asperity.outputs.atomic import written_folder
+from asperity.outputs.sections import as_html, html_page, html_table
 from asperity.parameters import NAMES, Names, law_parameters, point_parameters
 from asperity.parameters.arguments import typed
 
@@ -75,7 +75,7 @@ def write_report(
         Converged.
     posterior : Posterior, optional
     names : {"friction", "geophysics"}
-        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        Names of parameters on the page and in warnings. Numbers in files keep the names of
         friction.
 
     Raises
@@ -222,7 +222,7 @@ def write_comparison(folder: Path, comparison: Comparison, names: Names = NAMES[
     comparison : Comparison
         With one converged fit at least.
     names : {"friction", "geophysics"}
-        Names of parameters on the page. Warnings keep the names of the fit, files the names of
+        Names of parameters on the page and in warnings. Numbers in files keep the names of
         friction.
 
     Raises

@@ -22,7 +22,7 @@ from asperity.inference.objective import DataTerm, Residuals
 from asperity.laws import Law
 from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 from asperity.parameters.arguments import typed
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 
 REGULAR = "regular stick-slip"

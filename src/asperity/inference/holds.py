@@ -27,7 +27,7 @@ from asperity.laws import Law
 from asperity.parameters import law_parameters, obeying
 from asperity.parameters.arguments import typed
 from asperity.parameters.columns import read_headed_columns
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients.hold_and_step import hold
 
 #: The column that identifies a table of holds.

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from asperity.errors import symbol, symbols
+from asperity.errors import symbol, symbols, worded
 from asperity.inference.comparison.compare import Comparison, laws_table
 from asperity.inference.fitting.result import (
     MISFIT,
@@ -22,7 +22,7 @@ from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
-from asperity.outputs.tables import Section, two_digits
+from asperity.outputs.sections import Section, two_digits
 from asperity.units import quantity_text
 
 
@@ -199,7 +199,7 @@ def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[
     """
     head, rows = laws_table(comparison, reasons=reasons)
     warnings = {
-        name: [w for w in j.fit.warnings if w not in j.fit.because.values()]
+        name: [worded(w) for w in j.fit.sentences if w not in j.fit.because.values()]
         for name, j in comparison.laws.items()
     }
     # A warning of every law is about the data, and is given once.

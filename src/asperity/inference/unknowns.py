@@ -50,12 +50,12 @@ _FARTHEST = 1e6
 _LOGARITHMIC, _LINEAR = 10.0, 3.0
 #: The range includes at least this many standard deviations about an estimate.
 _REACH = 10.0
-#: Parameters that cannot be free: a change of V0 is equivalent to changes of others.
+#: Parameters that cannot be free: a change of V0 is equivalent to changes of other parameters.
 REFERENCES = ("V0",)
 
 
 class UnfittableLawError(InputError):
-    """A law that cannot be fitted for want of numbers or samples; a comparison leaves it out."""
+    """A law for which numbers or samples are missing; a comparison leaves it out."""
 
 
 @typed
@@ -192,11 +192,9 @@ def require_fittable(law: type[Law], free: Sequence[str]) -> None:
     fittable = {n: p for n, p in known.items() if p.place != "drive" and n not in others}
     for name in free:
         if name in REFERENCES:
-            rule, got = (
-                "be parameters that data can determine",
-                f"'{symbol(name)}': a change of it is",
-            )
-            raise InputError("free", rule, f"{got} one of mu0", "free mu0 instead")
+            rule, got = "be parameters that data can determine", f"'{symbol(name)}'"
+            advice = "free mu0 instead, which has the same effect"
+            raise InputError("free", rule, got, advice)
         if name not in fittable:
             rule = f"be parameters of {law.name}"
             raise InputError("free", rule, f"'{symbol(name)}'", suggestion(name, fittable))
@@ -297,7 +295,7 @@ def require_free_names(
 ) -> None:
     """Refuse starts and priors of parameters that are not free, and of unknown names or runs.
 
-    A gain has a prior, but no start; delays and initial states have their own.
+    A gain may have a prior, but no start. Delays and initial states have neither from the user.
 
     Raises
     ------

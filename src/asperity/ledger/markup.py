@@ -50,7 +50,7 @@ def _greek(name: re.Match[str]) -> str:
 
 @typed
 def rich(text: str) -> str:
-    """Escape a plain text and set eps_eff, 1e-3 and mu1 in signs and subscripts."""
+    """Escape a plain text, and set Greek letters, indices and powers as in eps_eff and 1e-3."""
     shown = _GREEK.sub(_greek, escape(str(text), quote=False))
     for pattern, replacement in _RULES:
         shown = pattern.sub(replacement, shown)

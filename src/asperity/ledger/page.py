@@ -14,7 +14,7 @@ from asperity.ledger.markup import embedded_png, rich, table
 from asperity.ledger.points import RULE, CurveComparison
 from asperity.ledger.sentences import fill, names_in
 from asperity.materials import citation
-from asperity.outputs.tables import html_page
+from asperity.outputs.sections import html_page
 from asperity.parameters.arguments import one_of
 
 if TYPE_CHECKING:

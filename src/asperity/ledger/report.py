@@ -18,7 +18,7 @@ from asperity.ledger.points import CurveComparison, MeasuredPoints, check_names
 from asperity.materials import citation
 from asperity.outputs import write_table, written_folder
 from asperity.outputs.json import to_json
-from asperity.outputs.tables import aligned
+from asperity.outputs.sections import aligned
 from asperity.parameters.arguments import FilePath, typed
 from asperity.parameters.parameter import count_text
 

@@ -11,8 +11,8 @@ pass over the samples is needed.
 
 The frequency is that of the load. Its error turns the phase of every harmonic evenly through the
 window; it is a parameter of the fit to each harmonic, with the variance that the load gives it. A
-settling of a harmonic that does not end in the window cannot be told from a slow change of the
-response, or of the load's amplitude, and is not extrapolated.
+settling of a harmonic that does not end in the window cannot be distinguished from a slow change of
+the response or of the load's amplitude, and is not extrapolated.
 
 The likelihood (Student's t, because the noise is estimated from few lines) weighs the models
 without a settling and with each tau. The correction of the reading is the weighted mean, and its

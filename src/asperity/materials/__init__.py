@@ -1,6 +1,6 @@
 """Published numbers, one file a paper: ``materials.load("bureau2000")``.
 
-A material file is TOML; `asperity.materials.number` describes its numbers. Loading one loads
+A material file is TOML; `asperity.materials.Number` describes its numbers. Loading one loads
 pydantic, importing this package does not.
 """
 

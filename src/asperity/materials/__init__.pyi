@@ -5,9 +5,9 @@ from asperity.materials.bibliography import (
     citation as citation,
     cited_works as cited_works,
 )
-from asperity.materials.number import Number as Number
-from asperity.materials.record import (
+from asperity.materials.material import (
     Material as Material,
+    Number as Number,
     available as available,
     load as load,
     load_from as load_from,

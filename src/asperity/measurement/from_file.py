@@ -17,7 +17,7 @@ from asperity.recording.readers import read
 
 Read = TypeVar("Read")
 
-#: Slip events for each velocity step or hold above which these are read within stick-slip.
+#: Number of slip events per velocity step or hold, above which the recording is read as stick-slip.
 _EVENTS = 10
 
 
@@ -109,8 +109,8 @@ def answer_measurement(
     trace : Trace
     question : asperity.questions.recording.Measurement
     plain : bool
-        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
-        holds, slip events, or sliding that is steady.
+        Whether sliding at one velocity is measured in any case. If not, the recording must have
+        velocity steps, holds, slip events or steady sliding.
 
     Returns
     -------

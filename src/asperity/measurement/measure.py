@@ -268,7 +268,7 @@ def _measured(recording: _ModulatedRecording, part: LoadInterval | None) -> Meas
         checks.stick_slip(reading, time, reading.without_settling(time, force)),
         checks.load_harmonics(reading),
         checks.resolution(reading, steps),
-        *instrument.made_force(reading, samples, time, load, force),
+        *instrument.computed_force(reading, samples, time, load, force),
         instrument.held_samples(reading, load, force),
         instrument.flat_top(reading, time, load, force),
         instrument.mains(reading, samples, parts),

@@ -11,7 +11,7 @@ from asperity.errors import symbol
 from asperity.measurement.campaign import Row, modulated_rows, sliding_rows
 from asperity.measurement.record import modulated_record, sliding_record
 from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
-from asperity.outputs.tables import Section, rounded
+from asperity.outputs.sections import Section, rounded
 from asperity.parameters import Names
 
 if TYPE_CHECKING:

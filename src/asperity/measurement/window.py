@@ -13,12 +13,11 @@ from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 from asperity.measurement.series import neighbour_scatter
 
-#: Usual periods of a block of the envelope, largest number of blocks, number of blocks for which
-#: the blocks of a short recording are made shorter, down to one period, and fewest samples of a
-#: block.
-_PERIODS = 4
+#: Usual number of periods in a block of the envelope, and fewest samples of a block.
+_PERIODS, _SAMPLES = 4, 8
+#: Largest number of blocks. If there would be fewer blocks than the second number, blocks are made
+#: shorter, down to one period.
 _MOST_BLOCKS, _FEW_BLOCKS = 1000, 64
-_SAMPLES = 8
 #: A part is modulated if its amplitude exceeds this share of the largest amplitude.
 _ON = 0.005
 #: A stretch ends where the amplitude changes by more than this share.
@@ -30,9 +29,9 @@ _SCATTERS = 6.0
 _SMOOTH, _FEWEST = 0.015, 16
 #: Harmonics that are fitted together with a settling, up to this share of the sampling rate.
 _HARMONICS, _RESOLVED = 2, 0.45
-#: A settling is over where it biases the mean by less than this share of the mean's uncertainty.
-#: A part that is `_NOISIER` times as noisy as its later half loses its first piece of `_STEPS`: the
-#: ratio of two noises of twelve degrees of freedom exceeds 7 once in 1,000 times.
+#: A settling is over where it biases the mean by less than the first share of its uncertainty. A
+#: part whose noise is `_NOISIER` times that of its later half is shortened by its first of `_STEPS`
+#: pieces: the ratio of two noises of twelve degrees of freedom exceeds 7 once in 1,000 times.
 _FORGOTTEN, _NOISIER, _STEPS = 0.1, 7.0, 16
 #: The longest run without defects is read alone if it has at least this share of the stretch.
 _WORTH = 0.5
@@ -67,7 +66,7 @@ class LoadInterval(NamedTuple):
 def stretches(time: Float, load: Float, frequency: float) -> list[LoadInterval]:
     """Modulated and unmodulated parts of a load, in their order.
 
-    Blocks at the edge of a part, which hold some of both, belong to none.
+    A block that holds the edge of a part belongs to no part.
 
     Parameters
     ----------
@@ -128,11 +127,11 @@ def envelope(time: Float, load: Float, frequency: float) -> tuple[Float, Index]:
 
 
 def settled(time: Float, force: Float, frequency: float, degree: int) -> int:
-    """First sample at which the force has forgotten what was before this part of it.
+    """First sample of a part at which the settling from before the part no longer matters.
 
-    The beginning is left out until the settling has fallen below the uncertainty of the mean, if
-    that leaves half of the part. If it does not, only the beginning is left out in which one
-    exponential leaves more noise than there is in the later half; the reading models the rest.
+    The beginning is left out until the settling has fallen below the uncertainty of the mean, if at
+    least half of the part is left. Otherwise only that beginning is left out in which a fit with
+    one exponential has a larger residual than in the later half; the reading models the settling.
 
     Parameters
     ----------
@@ -200,7 +199,7 @@ def _blocks(time: Float, force: Float, frequency: float, degree: int) -> BlockSu
 
 
 def clean_run(first: int, stop: int, defects: Index) -> tuple[int, int]:
-    """The longest run of samples between defects, if it is long enough for a reading.
+    """The longest run of samples between defects if it is long enough, otherwise the stretch.
 
     Parameters
     ----------
@@ -247,7 +246,7 @@ def under_the_same_load(
     Returns
     -------
     (int, int)
-        A slice; empty if the next samples are under another load already.
+        A slice; empty if the samples next to the stretch are under another load.
     """
     length = max(1, (stop - first) // _BLOCKS)
     whole = (stop - first) // length

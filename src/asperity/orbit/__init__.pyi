@@ -9,12 +9,12 @@ from asperity.orbit.differentiable import (
 from asperity.orbit.gradient.parametrised import ResponseValues as ResponseValues
 from asperity.orbit.gradient.search import KnownOrbits as KnownOrbits
 from asperity.orbit.outcome import Outcome as Outcome
-from asperity.orbit.period import (
-    Period as Period,
-    over_a_period as over_a_period,
-)
 from asperity.orbit.periodic import (
     averaged_response as averaged_response,
     periodic_response as periodic_response,
 )
 from asperity.orbit.response import PeriodicResponse as PeriodicResponse
+from asperity.orbit.waveform import (
+    Period as Period,
+    over_a_period as over_a_period,
+)

@@ -75,8 +75,8 @@ def run_chunks(
     index : array of int
         The points to work on.
     chunk : int or tuple of int
-        Points per call. Of several numbers, falling, the last chunk has the smallest that holds
-        what is left; it is filled up with copies of its last point.
+        Points per call, or several such numbers in falling order. The last chunk has the smallest
+        size that holds the remaining points, and is filled up with copies of its last point.
 
     Yields
     ------

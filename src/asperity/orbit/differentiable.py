@@ -143,7 +143,7 @@ class ResponseFunction:
         every: bool = False,
         names: Collection[str] | None = None,
     ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
-        """Response, and its derivatives to the parameters at every point.
+        """Response, and its derivatives by the parameters at every point.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class ResponseFunction:
         values : ResponseValues
         derivatives : dict of str to ResponseValues
             For each parameter, with the shapes of `values`: the derivative of the response at each
-            point to the parameter at the same point. The derivative to a parameter that all points
+            point to the parameter at the same point. The derivative by a parameter that all points
             share is the sum over the points.
         """
         padded, points = self._padded(parameters)
@@ -447,7 +447,7 @@ def _values(
     wanted: Array | None,
     program: Program,
 ) -> ResponseValues:
-    """Response of converged orbits, with its derivatives to the parameters."""
+    """Response of converged orbits, with its derivatives by the parameters."""
     valid = program.equations.valid(parameters)
     count = program.harmonics, program.states if program.multipliers else 0
     points = valid.shape[0]

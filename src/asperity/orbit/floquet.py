@@ -1,10 +1,11 @@
-"""Floquet multipliers from a monodromy matrix or from its logarithm, where they overflow too.
+"""Floquet multipliers, and their logarithms where multipliers overflow.
 
-Sign and order: a perturbation of the orbit is multiplied by a multiplier each period of the
-modulation; they are sorted by falling modulus, and the orbit is stable if all moduli are below 1.
+A perturbation of the orbit along an eigenvector is multiplied by a multiplier in each period of the
+modulation. Multipliers are sorted by falling modulus; the orbit is stable if all moduli are below
+1.
 
-Orbits on meshes have monodromy matrices, products of transfer maps. On the grid of the fast method
-a periodic change of variables makes the linearised equations ones of constant coefficients L
+Orbits on meshes have monodromy matrices, which are products of transfer maps. On the grid of the
+fast method a periodic change of variables gives the linearised equations constant coefficients L
 (Floquet's theorem); the multipliers are exp(2 pi eig L).
 """
 
@@ -34,12 +35,12 @@ from asperity.arrays import Complex, Float
 #: phases, is then unknown, too.
 LARGEST_LOG = 709.0
 
-#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three
-#: times the intervals the error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
+#: Relative agreement of two meshes at which the finer mesh is accurate to 1e-8: with three times
+#: the intervals the error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
-#: Multipliers below this modulus are compared absolutely, because no experiment can measure them:
-#: for two multipliers, whose product Liouville's formula gives, and for more, where round-off of
-#: the large ones hides the small ones.
+#: Multipliers below this modulus are compared absolutely, because no experiment can measure them.
+#: The first number is for two multipliers, whose product Liouville's formula gives; the second for
+#: more than two, where round-off of large multipliers hides small ones.
 _VANISHING = (1e-12, 1e-6)
 _LOST_IN_ROUND_OFF = 1e-7
 

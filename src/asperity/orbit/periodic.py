@@ -77,11 +77,11 @@ def periodic_response(
     progress : callable, optional
         Called with the number of points finished so far and of all points.
     methods : tuple of str
-        Which to use of "fourier", the fast method (shooting with inertia on elastic asperities),
-        "series", for slow or weak modulation, and "collocation", the robust method with the methods
-        that follow branches to its initial guess. All by default.
+        Methods to use: "fourier", the fast method (shooting with inertia on elastic asperities);
+        "series", for slow or weak modulation; "collocation", the robust method, and the methods
+        that follow branches to initial guesses for it. All by default.
     workers : int, optional
-        Processes to use; by default one per core for 200,000 points or more, else this one alone.
+        Number of processes; by default one per core for 200,000 points or more, otherwise one.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def averaged_response(
     Returns
     -------
     PeriodicResponse
-        With `frequency` the one that stood in for infinity.
+        Its `frequency` is the finite frequency of the calculation.
 
     Raises
     ------

@@ -25,7 +25,7 @@ from asperity.parameters.parameter import (
     parameter_line,
 )
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equation_parameters, equation_values, equations_as_text
+from asperity.slider.parameters import equation_parameters, equation_values, equations_as_text
 
 if TYPE_CHECKING:
     import xarray

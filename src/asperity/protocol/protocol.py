@@ -23,7 +23,7 @@ from asperity.protocol.steps import PlannedStep, check_levels, plan
 from asperity.questions.experiment import Experiment, ProtocolError
 from asperity.questions.record import without_unit
 from asperity.slider import Slider
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients import Trajectory, transient
 from asperity.transients.inputs import (
     checked_integration,

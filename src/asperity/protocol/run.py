@@ -212,7 +212,7 @@ def run_protocol(
     resume : bool
         Whether to continue an interrupted run, if there is one.
     progress : callable, optional
-        Called now and then with the time reached and the end of the programme (s).
+        Called repeatedly with the time reached and the end of the programme (s).
     rows : int
         Rows of a block. The last bits of the numbers depend on this; a resumed run must have the
         same value.

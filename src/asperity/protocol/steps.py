@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError, closest, printable, require
-from asperity.experiment.recipes import SlideHoldSlide, VelocitySteps
+from asperity.experiment.programmes import SlideHoldSlide, VelocitySteps
 from asperity.loads import (
     Follow,
     Hold,

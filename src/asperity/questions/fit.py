@@ -144,8 +144,8 @@ class FitOptions(Estimation):
     gauge_order : int
         Order of the low-pass of the force gauge.
     fit_rate : float or str, optional
-        Means a second that stand for the samples of a recording, like "100 Hz", or "full"; by
-        default as many as it needs where it has more than 20,000 samples.
+        Number of means per second that replace the samples of a recording, like "100 Hz", or
+        "full" for all samples; by default chosen if there are more than 20,000 samples.
     stiffness_from : (float, float), optional
         Seconds of unloading and reloading of the one recording, outside the window, whose slope is
         the prior of K.

@@ -1,4 +1,4 @@
-"""A sweep from its plan to its store, and an estimate of what it takes from a sample of it."""
+"""A sweep from its plan to its store, and an estimate of its time and size from a few points."""
 
 from __future__ import annotations
 

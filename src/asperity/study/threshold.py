@@ -20,7 +20,7 @@ from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
 from asperity.parameters.arguments import at_least, broadcast_shape, number, typed
 from asperity.slider import Slider
-from asperity.slider.named import slider_values
+from asperity.slider.parameters import slider_values
 from asperity.study.crossings import STABILITY, find_crossings
 from asperity.study.points import POINT_BYTES, Answers, SweepOutcome
 from asperity.study.responses import answers_of_law, bifurcation_kinds

@@ -6,8 +6,8 @@ strength = mu_s - mu_d the spring force during a slip is
 
     F/W0 - mu_d = strength cos(omega t) + K V/(W0 omega) sin(omega t),
 
-and the slider rests when its velocity V - F'/K is zero again: at F/W0 = mu_d - strength, whatever V
-is. Strength that grows with the time of rest t as strength_1 + B ln(t/t_1) makes the drop grow with
+and the slider rests when its velocity V - F'/K is zero again: at F/W0 = mu_d - strength for every
+V. Strength that grows with the time of rest t as strength_1 + B ln(t/t_1) makes the drop grow with
 the logarithm of the recurrence. Heslot, Baumberger, Perrin, Caroli and Caroli, Phys. Rev. E 49,
 4973 (1994), measure both regimes; the formulas are derived here.
 

@@ -18,7 +18,7 @@ from jax import Array
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import TrialStep, one_kernel, run_steps
+from asperity.transients.step_size import TrialStep, one_kernel, run_steps
 
 _SAFETY = 0.9
 _LIMITS = 0.2, 6.0

@@ -26,7 +26,7 @@ from asperity.algebra.small_systems import solve_columns, spectral_radius, value
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.steps import TrialStep, one_kernel, run_steps
+from asperity.transients.step_size import TrialStep, one_kernel, run_steps
 
 STAGES = 5
 _SAFETY = 0.9

@@ -35,7 +35,7 @@ from jax import Array
 from asperity.arrays import Float
 from asperity.loads import Excitation, Programme, Slide
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equation_parameters
+from asperity.slider.parameters import equation_parameters
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.equations import MotionSamples, motion_samples
 from asperity.transients.inputs import checked_integration, steady_start
@@ -246,7 +246,7 @@ class _Orbit:
 
     @classmethod
     def of(cls, run: _Run, begin: float, end: float) -> _Orbit:
-        """With derivatives to all parameters of the equations."""
+        """With derivatives by all parameters of the equations."""
         motion = run.parts[0].system.motion
         names = tuple(equation_parameters(motion))
         first, last = run.states(np.array([begin, end]))[:-1].T

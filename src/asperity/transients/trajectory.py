@@ -18,7 +18,7 @@ from asperity.loads.programme.programme import BREAK
 from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
-from asperity.slider.named import equation_values, equations_as_text
+from asperity.slider.parameters import equation_values, equations_as_text
 from asperity.transients.events import Event, Termination
 from asperity.transients.integration import Checkpoint, Integration
 from asperity.units import to_si

@@ -1,13 +1,14 @@
-"""Variational equations: derivatives of a motion to its first states and to its parameters.
+"""Variational equations: derivatives of a motion with respect to initial states and parameters.
 
-Along a motion Y(t) with the rates f(Y, p) they are linear,
+Along a motion Y(t) with the rates f(Y, p) the derivatives D obey the linear equations
 
     dD/dt = f_Y D + f_p,
 
-with a column of D for each first state, D(0) = 1, and for each parameter, D(0) = 0. The equations
-are solved by Radau collocation with five stages on the steps of the motion. Where the implicit
-method took these steps, the results are the exact derivatives of the steps at fixed lengths;
-elsewhere their error is that of a method of order 9.
+with a column of D for each initial state, which begins as a column of the unit matrix, and for each
+parameter, which begins at 0. Only columns of parameters have the term f_p. The equations are solved
+by Radau collocation with five stages on the steps of the motion. Where the implicit method took
+these steps, the results are the exact derivatives of the steps at fixed lengths; elsewhere their
+error is that of a method of order 9.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
 (Springer, 1993), section I.14.
@@ -29,7 +30,7 @@ from asperity.algebra.small_systems import value_and_jacobian
 from asperity.arrays import Float
 from asperity.loads import Excitation
 from asperity.slider import Motion
-from asperity.slider.named import equation_parameters, with_value
+from asperity.slider.parameters import equation_parameters, with_value
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.implicit import STAGES
@@ -52,14 +53,15 @@ def variations(
     nodes : array, shape (steps + 1,)
         Times of the steps; the derivatives refer to the beginning of the first step.
     names : sequence of str
-        Parameters of the law or the machine, whose derivatives are in SI.
+        Parameters of the law or the machine, in SI.
 
     Returns
     -------
     at_end : array, shape (size, size + parameters)
-        Derivatives at the end of the last step. Columns are the first states, then the parameters.
+        Derivatives at the end of the last step. Columns are the initial states, then the
+        parameters.
     of_first_state : DenseOutput
-        The first row of such arrays at all times: of F/W0, wherever there is a mass.
+        The first row of such arrays at all times. With a mass the first state is F/W0.
     """
     scheme, size = radau_iia(STAGES), motion.size
     lengths = np.diff(nodes)
@@ -70,36 +72,37 @@ def variations(
     sides = sides.reshape(len(names), size, *times.shape).transpose(2, 3, 1, 0)
     sides = np.concatenate([jacobian, sides], axis=3)
     weights = lengths[:, None, None] * scheme.a
-    whole = STAGES * size
-    matrix = np.eye(whole) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
-        -1, whole, whole
+    unknowns = STAGES * size
+    matrix = np.eye(unknowns) - np.einsum("njk,nkrc->njrkc", weights, jacobian).reshape(
+        -1, unknowns, unknowns
     )
-    known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), whole, -1)
+    known = np.einsum("njk,nkrc->njrc", weights, sides).reshape(len(lengths), unknowns, -1)
     stages = np.linalg.solve(matrix, known).reshape(len(lengths), STAGES, size, -1)
-    rising = np.einsum("kj,njrc->knrc", scheme.monomials / scheme.c, stages)
-    here = np.eye(size, size + len(names))
-    # The rows for first states have no entries for the parameters.
-    only = np.concatenate([np.zeros((size, size)), np.ones((size, len(names)))], axis=1)
+    # Changes over each step by power of time: for unit derivatives at its beginning, and the
+    # contribution of the parameters.
+    powers = np.einsum("kj,njrc->knrc", scheme.monomials / scheme.c, stages)
+    derivatives = np.eye(size, size + len(names))
     first = np.empty((STAGES + 1, size + len(names), len(lengths)))
     for i in range(len(lengths)):
-        changes = rising[:, i, :, :size] @ here + rising[:, i] * only
-        first[0, :, i], first[1:, :, i] = here[0], changes[:, 0]
-        here = here + changes.sum(0)
-    return here, DenseOutput(nodes[:-1], lengths, first)
+        changes = powers[:, i, :, :size] @ derivatives
+        changes[..., size:] += powers[:, i, :, size:]
+        first[0, :, i], first[1:, :, i] = derivatives[0], changes[:, 0]
+        derivatives = derivatives + changes.sum(0)
+    return derivatives, DenseOutput(nodes[:-1], lengths, first)
 
 
 def _linearised(motion: Motion, names: Sequence[str], Y: Float) -> tuple[Float, Float]:
-    """Derivatives of the rates to states (size, size, n) and parameters (parameters, size, n)."""
+    """Derivatives of the rates by states (size, size, n) and parameters (parameters, size, n)."""
     count = Y.shape[1]
-    room = max(_FEWEST, 1 << (count - 1).bit_length())
-    Y = np.concatenate([Y, np.repeat(Y[:, -1:], room - count, axis=1)], axis=1)
+    padded = max(_FEWEST, 1 << (count - 1).bit_length())
+    Y = np.concatenate([Y, np.repeat(Y[:, -1:], padded - count, axis=1)], axis=1)
     jacobian, sides = _slopes(motion, _directions(jax.tree.structure(motion), tuple(names)), Y)
     return np.asarray(jacobian)[:, :, :count], np.stack(sides)[:, :, :count]
 
 
 @cache
 def _directions(structure: Any, names: tuple[str, ...]) -> list[Any]:
-    """Changes of an equation of motion of scalars by a unit of each parameter."""
+    """Derivative of an equation of motion of scalars with respect to each parameter."""
     none = jax.tree.unflatten(structure, [np.zeros(())] * structure.num_leaves)
     known = equation_parameters(none)
     return [with_value(Problem(none, None), known[name], 1.0).system for name in names]

@@ -113,7 +113,7 @@ def _parse_unit(unit: str) -> Any:
         raise _UnitError(", which is no unit")
     try:
         return _registry().parse_units(unit.replace("%", "percent"))
-    # pint's parser raises whatever its tokenizer meets: syntax, type, value and attribute errors.
+    # pint's parser may raise errors of many types: syntax, type, value and attribute errors.
     except Exception:
         raise _UnitError(f", and '{unit}' is no known unit") from None
 

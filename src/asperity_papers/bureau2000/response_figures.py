@@ -28,7 +28,7 @@ VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
 
 
 def curves_2(machine: Machine) -> list[FigureCurve]:
-    """Both velocities, with the mass and at the ends of the uncertainties; the computed layer."""
+    """Curves at both velocities, with inertia, at the ends of uncertainties, and of the layer."""
     eps, slow = machine.applied_amplitudes(), machine.velocities[0]
     layer = machine.borne(machine.numbers.frequency, machine.air_layer())
     return [
@@ -64,7 +64,7 @@ def velocity_axis(machine: Machine) -> Float:
 
 
 def curves_3(machine: Machine) -> list[FigureCurve]:
-    """One for each amplitude of the figure."""
+    """A curve for each amplitude of the figure."""
     V = velocity_axis(machine)
     amplitudes = machine.numbers["epsilon_figure3"].si_values or ()
     return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
@@ -78,25 +78,25 @@ figure_3 = CurveFigure("figure-03", curves_3)
 
 
 def curves_5(machine: Machine) -> list[FigureCurve]:
-    """In vacuum and in air, with the mass too, and under the layer's full disc.
+    """In vacuum and in air, without and with inertia, and with an air layer under the whole disc.
 
-    The share in vacuum is that of the appendix, 1/|1 - (omega/omega_0)^2|; in air it is divided by
-    2.5, the factor by which the paper's data collapse.
+    The share of the modulation that the contacts bear is 1/|1 - (omega/omega_0)^2| in vacuum, by
+    the appendix; in air it is divided by 2.5, the factor by which the paper's data collapse.
     """
     p, eps = machine.numbers, machine.applied_amplitudes()
     V, f = p.V_vacuum, p.frequency_vacuum
     vacuum, disc = (machine.borne(f, layer) for layer in (None, machine.air_layer()))
     shares = {VACUUM: vacuum, AIR: vacuum / p.collapse_divisor_200Hz}
-    still = [FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()]
-    moved = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in still]
-    return [*still, *moved, FigureCurve(FULL_DISC, EXT, V, eps, disc, f)]
+    curves = [FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()]
+    inertial = [replace(curve, name=f"{curve.name}, inertia", inertia=True) for curve in curves]
+    return [*curves, *inertial, FigureCurve(FULL_DISC, EXT, V, eps, disc, f)]
 
 
 #: Change of the mean in air and in vacuum, at 200 Hz.
 figure_5 = CurveFigure("figure-05", curves_5)
 
 
-# --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
+# --- Figures 4, 6 to 9, 11, 14 and 16: laws and their harmonics ----------------------------------
 
 
 #: Rice-Ruina: change of the mean against eps.
@@ -123,7 +123,7 @@ figure_8 = CurveFigure(
 
 
 def curves_9(machine: Machine) -> list[FigureCurve]:
-    """Two coefficients at both velocities, and Rice-Ruina."""
+    """Linker-Dieterich with two coefficients alpha and Rice-Ruina, at both velocities."""
     p = machine.numbers
     two = {f"alpha = {alpha:g}": (LD, {"alpha": alpha}) for alpha in (p.alpha, p.alpha_low)}
     return curves_of_laws(machine, {**two, "RR": (RR, {})})
@@ -145,15 +145,15 @@ def law_curves(machine: Machine) -> list[FigureCurve]:
     return curves_of_laws(machine, {"RR": (RR, {}), "LD": (LD, alpha), "EXT": (EXT, {})})
 
 
-#: The three laws on common axes, which the head of the report shows.
+#: The three laws on common axes, for the head of the report.
 law_figure = CurveFigure("figure-16", law_curves)
 
 
 def phase_curves(machine: Machine) -> list[FigureCurve]:
-    """Three laws, and the elasto-plastic one with the mass, at both velocities."""
+    """Three laws, and the elasto-plastic law with inertia, at both velocities."""
     eps = machine.borne_amplitudes()
-    moving = speed_curves(machine, EXT, eps, case="EXT, inertia", inertia=True)
-    return [*law_curves(machine), *moving]
+    inertial = speed_curves(machine, EXT, eps, case="EXT, inertia", inertia=True)
+    return [*law_curves(machine), *inertial]
 
 
 #: Phases against eps_eff, by law and velocity: the paper measures amplitudes with a lock-in

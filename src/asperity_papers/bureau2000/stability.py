@@ -41,7 +41,7 @@ def thresholds(machine: Machine, variant: str, V: Float, bracket: tuple[Float, F
     Returns
     -------
     array, shape (n,)
-        NaN where the multiplier does not cross 1 between them.
+        NaN where the multiplier does not cross 1 between the two amplitudes.
     """
     law, overrides = variants(machine)[variant]
     slider, frequency = machine.slider(law, **overrides), machine.numbers.frequency

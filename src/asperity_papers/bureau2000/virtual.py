@@ -46,7 +46,10 @@ NORMAL = 1.96
 
 
 class Read(NamedTuple):
-    """A number read off independent points: value, standard uncertainty, and the model's value."""
+    """A number read off measured points, its standard uncertainty, and its value in the model.
+
+    Differences and ratios treat the numbers as independent.
+    """
 
     value: float
     uncertainty: float
@@ -77,7 +80,7 @@ class RecoveredQuantity:
     value, uncertainty : float
         Standard uncertainty.
     true_value : float
-        Value of the model, or the one given to the machine. The readings do not use it.
+        Value in the model or in the simulated machine, which the readings do not use.
     stated : str
         What the text of the paper says about its own experiment.
     """
@@ -144,27 +147,25 @@ def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
 
 def over_amplitude(name: str, names: Sequence[str], readings: SimulatedPoints) -> VirtualFigure:
     """A figure of some series against eps."""
-    series = tuple(one for one in all_series() if one.name in names)
+    series = tuple(s for s in all_series() if s.name in names)
     eps = PRINTED.applied_amplitudes()
     curves = [
-        FigureCurve(one.name, EXT, one.velocity, eps, abs(one.transfer), one.frequency)
-        for one in series
+        FigureCurve(s.name, EXT, s.velocity, eps, abs(s.transfer), s.frequency) for s in series
     ]
-    return _figure(name, series, curves, pd.concat([readings[one.name] for one in series]))
+    return _figure(name, series, curves, pd.concat([readings[s.name] for s in series]))
 
 
 def over_velocity(readings: SimulatedPoints) -> VirtualFigure:
     """Mean against V for four amplitudes."""
-    at_120_hz = (one for one in all_series() if one.frequency == PRINTED.numbers.frequency)
-    series = tuple(sorted(at_120_hz, key=lambda one: one.velocity))
+    at_120_hz = (s for s in all_series() if s.frequency == PRINTED.numbers.frequency)
+    series = tuple(sorted(at_120_hz, key=lambda s: s.velocity))
     amplitudes = PRINTED.numbers["epsilon_figure3"].si_values or ()
     V, share = velocity_axis(PRINTED), abs(series[0].transfer)
     curves = [FigureCurve(f"eps = {e:g}", EXT, V, e, share) for e in amplitudes]
-    tables = [
-        rows
-        for one in (readings[series_.name] for series_ in series)
-        for rows in (_still(one), one[one["epsilon_set"].isin(amplitudes)])
-    ]
+    tables = []
+    for s in series:
+        rows = readings[s.name]
+        tables += [_unmodulated(rows), rows[rows["epsilon_set"].isin(amplitudes)]]
     return _figure("virtual-03", series, curves, pd.concat(tables, ignore_index=True))
 
 
@@ -193,8 +194,8 @@ def _figure(
 
 
 def _terms(series: tuple[Series, ...], points: pd.DataFrame) -> dict[str, Any]:
-    """Names for formulas of what is read off the points."""
-    shares = {one.name: abs(one.transfer) for one in series}
+    """Names of numbers that are read off the points, for formulas."""
+    shares = {s.name: abs(s.transfer) for s in series}
 
     def read(name: str, column: str, row: float = -1) -> Read:
         """A quantity of a series, by default at its largest amplitude."""
@@ -217,28 +218,28 @@ def _terms(series: tuple[Series, ...], points: pd.DataFrame) -> dict[str, Any]:
 
 @cache
 def recovered_words() -> dict[str, list[tuple[str, str, str]]]:
-    """Formula and words of each recovered number, and what the paper states of it, by figure."""
+    """Formula and words of each recovered number, and the paper's statement, by figure."""
     file = files(__package__).joinpath("recovered.toml")
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
-def _still(rows: pd.DataFrame) -> pd.DataFrame:
-    """One point of eps = 0: the mean of all F(0) of a series, and how they differ."""
+def _unmodulated(rows: pd.DataFrame) -> pd.DataFrame:
+    """A point at eps = 0: mean and scatter of all F(0) of a series."""
     F0 = rows["static_friction"]
     stated, scatter = float(np.sqrt(np.mean(rows["static_friction_stated"] ** 2))), F0.std()
-    one = dict.fromkeys(rows.columns, np.nan)
-    one |= {name: rows[name].iloc[0] for name in ("series", "V", "frequency", "seeds")}
-    one |= dict.fromkeys(("epsilon_set", "epsilon", "epsilon_eff"), 0.0)
+    point = dict.fromkeys(rows.columns, np.nan)
+    point |= {name: rows[name].iloc[0] for name in ("series", "V", "frequency", "seeds")}
+    point |= dict.fromkeys(("epsilon_set", "epsilon", "epsilon_eff"), 0.0)
     for name in ("mean_friction", "static_friction"):
-        one |= {name: F0.mean(), f"{name}_stated": stated, f"{name}_scatter": scatter}
-        one[f"{name}_uncertainty"] = max(stated, scatter)
-    return pd.DataFrame([one])
+        point |= {name: F0.mean(), f"{name}_stated": stated, f"{name}_scatter": scatter}
+        point[f"{name}_uncertainty"] = max(stated, scatter)
+    return pd.DataFrame([point])
 
 
 def _slope(rows: pd.DataFrame) -> Read:
-    """Slope over ln V of the readings, its uncertainty, and the same of the model.
+    """Slope of the readings over ln V, its uncertainty, and the slope of the model.
 
-    All velocities count alike, so that what is fitted does not depend on the noise.
+    All velocities have the same weight, so that both slopes are the same function of the points.
     """
     x = np.log(rows["V"].to_numpy())
     share = (x - x.mean()) / np.sum((x - x.mean()) ** 2)

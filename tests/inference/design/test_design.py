@@ -7,7 +7,7 @@ from asperity.cli.design import _sections
 from asperity.errors import InputError
 from asperity.inference import design, fit, table_of
 from asperity.inference.design.rival import RivalFit
-from asperity.outputs.tables import as_text
+from asperity.outputs.sections import as_text
 
 #: Settings that the elasto-plastic law leaves steady at 120 Hz, and two that it does not.
 PLAN = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of, trace_of
 
-from asperity.errors import InputError
+from asperity.errors import InputError, worded
 from asperity.inference import WindowEstimate, fit, fit_windows
 from asperity.inference.fitting.windows import disagreeing
 from asperity.inference.unknowns import unknown_of
@@ -53,7 +53,7 @@ def test_a_disturbance_outside_one_window_widens_the_interval(run):
 
 def test_a_warning_of_the_first_window_is_not_new_in_another(run, monkeypatch):
     single = fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
-    warned = [replace(single, warnings=w) for w in (("A s: b", "c"), ("A s: b", "d"))]
+    warned = [replace(single, sentences=w) for w in (("A s: b", "c"), ("A s: b", "d"))]
     monkeypatch.setattr("asperity.inference.fitting.windows.fit", lambda *_, **__: warned.pop(0))
     result = fit_in_windows(run, run.friction)
     assert result.new_warnings == ("window 0 to 120 s: d",)
@@ -70,4 +70,4 @@ def test_a_window_with_an_outlying_value_is_named():
     estimate = WindowEstimate("D0", "m", 1e-4, 2e-5, 1e-5, 1e-5, (8e-5, 1e-4), (6e-5, 2e-4), values)
     D0 = unknown_of(law_parameters(RiceRuina)["D0"], None, None, (1e-8, 1e-3))
     (sentence,) = disagreeing(D0, estimate, WINDOWS)
-    assert sentence.startswith("window 13 to 140 s: D0 is 9e-08 m")
+    assert worded(sentence).startswith("window 13 to 140 s: D0 is 9e-08 m")

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of, trace_of
 from scipy.signal import lfilter
 
-from asperity.errors import InputError
+from asperity.errors import InputError, worded
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
@@ -394,7 +394,7 @@ def test_values_outside_those_of_contacts_are_named(steps_fit):
     unusual = replace(steps_fit.parameters["D0"], value=0.006)
     changed = replace(steps_fit, parameters={**steps_fit.parameters, "D0": unusual})
     (warning,) = unusual_numbers(changed, [run])
-    assert warning.startswith("D0 of 0.006 m is outside")
+    assert worded(warning).startswith("D0 of 0.006 m is outside")
 
 
 def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():

@@ -18,15 +18,15 @@ V = 1e-5
 #: Samples of a waveform.
 SAMPLES = 4096
 MU = MU0 - (B - A) * np.log(V / V0)
-#: What every method promises of harmonics 1 and 2, relative.
+#: Relative accuracy of harmonics 1 and 2 that every method promises.
 PROMISED = 1e-9
 
 
 def respond(ageing, stiffness, epsilon, law=RiceRuina, methods=("series",)):
     """Response at V/(omega D0) = `ageing` and K/Kc = `stiffness`."""
-    own = {"lambda_": 7e-7} if law is ElastoPlastic else {}
+    elastic = {"lambda_": 7e-7} if law is ElastoPlastic else {}
     slider = asp.Slider(
-        law(mu0=MU0, A=A, B=B, D0=D0, V0=V0, **own), spring=np.multiply(stiffness, Kc), load=W0
+        law(mu0=MU0, A=A, B=B, D0=D0, V0=V0, **elastic), spring=np.multiply(stiffness, Kc), load=W0
     )
     frequency = V / (2 * np.pi * np.asarray(ageing) * D0)
     drive = {"velocity": V, "epsilon": epsilon, "frequency": frequency}
@@ -61,7 +61,7 @@ def test_an_integration_in_time_settles_on_the_same_orbit():
 
 
 def test_in_the_limit_friction_follows_the_steady_state():
-    """f = w mu_ss(v), v = 1 - f'/kappa, iterated: what is left is of the order of 1/ageing^2."""
+    """f = w mu_ss(v), v = 1 - f'/kappa, iterated: the error is of the order of 1/ageing^2."""
     ageing, stiffness, epsilon = 1e6, 3.0, 0.5
     theta = 2 * np.pi * np.arange(64) / 64
     w, f = 1 + epsilon * np.cos(theta), MU
@@ -73,8 +73,8 @@ def test_in_the_limit_friction_follows_the_steady_state():
     np.testing.assert_allclose(response.waveform[0, :: SAMPLES // 64], f, rtol=1e-10)
 
 
-# Fine meshes, and orbits at the end of a branch, are compared for one law. The finest one has a
-# point of `test_periodic`.
+# Fine meshes, and orbits at the end of a branch, are compared for one law. `test_periodic` has a
+# point on the finest mesh.
 @pytest.mark.parametrize(
     ("law", "seed", "softest", "largest"), [(RiceRuina, 8, 0, 0.9), (ElastoPlastic, 2, 0.5, 0.6)]
 )
@@ -194,7 +194,7 @@ def test_a_weak_modulation_near_resonance_has_the_linear_gain():
 
 
 def test_modulated_at_half_the_critical_period_the_fault_is_unstable():
-    """The monodromy matrix by another integrator, from the orbit's own first states."""
+    """The monodromy matrix by another integrator, by shooting for the orbit."""
     epsilon = 0.002
     response, a, b, mu = tides([4.6, 8.0], epsilon)
     for k, turns in enumerate((4.6, 8.0)):

@@ -19,7 +19,7 @@ from asperity.app.words import LABELS
 from asperity.errors import require_known
 from asperity.laws import registered
 from asperity.materials import Material
-from asperity.materials.record import packaged
+from asperity.materials.material import packaged
 from asperity.operating_point import known_parameters
 from asperity.outputs.json import to_json
 from asperity.parameters import (

@@ -22,7 +22,7 @@ from asperity.laws import get_law
 from asperity.loads import Hold, Programme, Slide
 from asperity.parameters import NAMES, Names, known_name, law_parameters
 from asperity.questions.recording import Measurement
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients import transient
 
 #: Tolerance, and largest number of steps, of a curve that follows a slider.

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from asperity.app.api import catalogue, recipes
+from asperity.app.api import as_code, catalogue
 from asperity.app.api.operating_point import (
     Name,
     OperatingPoint,
@@ -204,7 +204,7 @@ def _air(question: Explored, values: Mapping[str, float]) -> dict[str, Any] | No
 def text(question: Explored) -> dict[str, str]:
     """The same operating point as Python and as a command."""
     values = question.values()
-    return recipes.explore(question, values, epsilon_on_contacts(question, values))
+    return as_code.explore(question, values, epsilon_on_contacts(question, values))
 
 
 def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from asperity.app.words import in_labels
 from asperity.app.worker import limited
 from asperity.arrays import Float
 from asperity.errors import naming, require
-from asperity.outputs.tables import records
+from asperity.outputs.sections import records
 from asperity.parameters import Names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options

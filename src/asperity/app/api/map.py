@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, StrictBool
 
-from asperity.app.api import recipes
+from asperity.app.api import as_code
 from asperity.app.api.operating_point import Name, OperatingPoint, Value
 from asperity.app.endpoints import Answer, Job, Question
 from asperity.errors import require
@@ -83,7 +83,7 @@ def text(question: MapQuestion) -> dict[str, Any]:
     check(question)
     fixed = {name: number.value for name, number in question.fixed().items()}
     x, y = question.axes(question.count)
-    return recipes.plane(question, fixed, x, y, question.show)
+    return as_code.plane(question, fixed, x, y, question.show)
 
 
 def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from asperity.errors import require
 from asperity.laws import get_law
 from asperity.loads import Modulate, Programme, Slide
 from asperity.recording.extremes import thinned
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.transients import Trajectory, integrate_blocks
 
 #: Velocity before the motion over V; the step to V disturbs steady sliding.

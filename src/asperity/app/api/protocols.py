@@ -14,7 +14,7 @@ from typing import Any
 
 from asperity.errors import InputError, closest, require
 from asperity.laws import registered
-from asperity.materials.record import packaged
+from asperity.materials.material import packaged
 from asperity.outputs import size_text
 from asperity.parameters.toml_file import SyntaxMistakeError, parsed_toml
 from asperity.protocol import (

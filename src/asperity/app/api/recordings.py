@@ -18,7 +18,7 @@ from pydantic import field_validator
 
 from asperity.app.words import in_labels
 from asperity.errors import InputError, naming
-from asperity.outputs.tables import records
+from asperity.outputs.sections import records
 from asperity.parameters import NAMES, OUTPUTS, Names, display_name
 from asperity.parameters.columns import headings, sheet
 from asperity.questions import recording as questions

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.errors import InputError, enumerated, require, symbol, symbols
+from asperity.errors import InputError, enumerated, named, require, symbol, symbols, worded
 from asperity.inference.comparison.evidence import (
     DISFAVOURED,
     EXCLUDED,
@@ -103,7 +103,8 @@ class Comparison(Drawn):
         Whether exactly one law is not excluded, and describes the data.
     best : str
         Law with the lowest AICc; empty if no fit converged.
-    verdict : str
+    judgement : str
+        The verdict before `asperity.errors.worded`.
     left_out : tuple of str
         Rows that the verdict leaves out: no law describes them together with the other rows.
     not_compared : mapping of str to str
@@ -115,9 +116,14 @@ class Comparison(Drawn):
     laws: Mapping[str, Judged]
     decided: bool
     best: str
-    verdict: str
+    judgement: str
     left_out: tuple[str, ...] = ()
     not_compared: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> str:
+        """Which laws the data exclude, and why, in sentences."""
+        return worded(self.judgement)
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """The verdict, and the standing of each law."""
@@ -292,8 +298,8 @@ def compare(
         f" Not compared: {enumerated(list(not_compared))}, because a number is neither free nor "
         "given, or because there are too few samples."
     ) * bool(not_compared)
-    verdict = doubt + result.verdict + stretches + _with_free_stiffness(result) + lacking
-    result = replace(result, not_compared=not_compared, verdict=verdict)
+    judgement = doubt + result.judgement + stretches + _with_free_stiffness(result) + lacking
+    result = replace(result, not_compared=not_compared, judgement=judgement)
     return (
         _with_evidence(result, lambda laws: report(len(free_by_law) + laws)) if evidence else result
     )
@@ -364,7 +370,7 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
         f"No law describes {enumerated(rows)} together with the other rows; check that "
         f"measurement. With it, {which} are excluded. Without it: "
     )
-    return replace(rest, verdict=outliers + rest.verdict, left_out=tuple(rows))
+    return replace(rest, judgement=outliers + rest.judgement, left_out=tuple(rows))
 
 
 def _with_evidence(comparison: Comparison, report: Report) -> Comparison:
@@ -387,7 +393,7 @@ def _with_evidence(comparison: Comparison, report: Report) -> Comparison:
     return replace(
         comparison,
         laws=judged,
-        verdict=comparison.verdict + _second_opinion(judged, comparison.best),
+        judgement=comparison.judgement + _second_opinion(judged, comparison.best),
     )
 
 
@@ -574,7 +580,7 @@ def what_would_tell(first: Fit, second: Fit) -> str:
             farthest, row = float(apart[j]), a.row[j]
             sentence = (
                 "what would tell them apart best among points near the measured ones: "
-                f"{a.observable[j]} at {symbol('V')} = {points['V'][row]:.3g} m/s, "
+                f"{a.observable[j]} at {named('V')} = {points['V'][row]:.3g} m/s, "
                 f"eps = {points['epsilon'][row]:.3g}, f = {points['frequency'][row]:.4g} Hz, "
                 f"where they differ by {farthest:.2g} of its standard uncertainties"
             )

@@ -24,7 +24,7 @@ from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm, on_contacts
 from asperity.orbit import Outcome, periodic_response
 from asperity.parameters.rules import RULES
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 
 Progress = Callable[[int, int, str], None]
 

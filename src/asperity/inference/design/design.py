@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.arrays import Float
-from asperity.errors import InputError, symbol
+from asperity.errors import InputError, named
 from asperity.inference.comparison.evidence import EXCLUDED
 from asperity.inference.design.candidates import (
     Candidates,
@@ -44,6 +44,7 @@ from asperity.inference.design.shares import (
     whole_readings,
 )
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
+from asperity.inference.fitting.result import Warned
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.tables.term import LockInTerm
@@ -120,7 +121,7 @@ class ExpectedError:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Warned):
     """Operating points that answer a question best.
 
     Attributes
@@ -159,7 +160,8 @@ class Design:
     rival_values : mapping of str to float or None
         Parameters of the rival's best fit to the readings of the design.
     simulation : Simulated or None
-    warnings : tuple of str
+    sentences : tuple of str
+        As in `Warned`, which has the warnings.
     """
 
     plan: DesignPlan
@@ -183,7 +185,7 @@ class Design:
     probability_grid: float | None = None
     rival_values: Mapping[str, float] | None = None
     simulation: Simulated | None = None
-    warnings: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
         """The design as plain numbers and texts, for JSON; infinite numbers are None."""
@@ -533,7 +535,7 @@ class _Task:
             combinations=candidates.total,
             left_out=candidates.left_out,
             simulation=simulation,
-            warnings=tuple(warnings),
+            sentences=tuple(warnings),
             **numbers,
         )
 
@@ -567,7 +569,7 @@ class _Task:
                 unknown.name in (self.plan.question.measure or errors)
             ):
                 warnings.append(
-                    f"{symbol(unknown.name)} will not be determined by these readings: its "
+                    f"{named(unknown.name)} will not be determined by these readings: its "
                     f"standard error will be {error.se:.3g} {error.unit}".rstrip()
                 )
         if shares.efficiency < _TRUSTED:
@@ -670,7 +672,7 @@ def _surprises(simulation: Simulated, errors: Mapping[str, ExpectedError]) -> li
         se, error = errors[name].se, simulation.uncertainty[name]
         if abs(spread - se) > _SURPRISING * error + _LINEAR * se:
             warnings.append(
-                f"the simulated spread of {symbol(name)}, {spread:.3g}, is not the expected "
+                f"the simulated spread of {named(name)}, {spread:.3g}, is not the expected "
                 f"standard error {se:.3g}: predictions are not linear in it over so wide a range"
             )
     return warnings

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.arrays import Float
-from asperity.errors import Argument, enumerated, symbol
+from asperity.errors import Argument, enumerated, named
 from asperity.inference.fitting.intervals import (
     LEVELS,
     UNDETERMINED,
@@ -106,7 +106,7 @@ def described_fit(
             "periodic orbits, and was not reached again: this is the next minimum; leave out the "
             "rows of the slowest modulation and compare"
         )
-        return replace(result, warnings=(lost, *result.warnings))
+        return replace(result, sentences=(lost, *result.sentences))
     outliers, lower = _outliers(objective, at)
     while lower is not None:
         lower = Minimum(objective.ordered(lower.u), lower.chi2)
@@ -158,9 +158,10 @@ def described_fit(
         names = [objective.names[i] for i in sorted(profiled)]
         also = [n for n in names if n not in (*bent, *at_edge)]
         warnings.append(
-            f"chi-squared is no parabola in {enumerated([symbol(n) for n in bent])}: "
+            f"chi-squared is no parabola in {enumerated([named(n) for n in bent])}: "
             + (
-                f"intervals of {enumerated([*bent, *also])} are by profile likelihood"
+                f"intervals of {enumerated([named(n) for n in (*bent, *also)])} are by profile "
+                "likelihood"
                 f"{' but for those named before' if at_edge else ''}; take the intervals, not the "
                 "standard errors"
                 if profiled
@@ -173,8 +174,8 @@ def described_fit(
 
 def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
     """A sentence on intervals whose profile runs along the edge of the region with orbits."""
-    whole = enumerated([n for n in names if n in odd])
-    normal = enumerated([n for n in names if n not in odd])
+    whole = enumerated([named(n) for n in names if n in odd])
+    normal = enumerated([named(n) for n in names if n not in odd])
     ends = [
         f"intervals of {whole} are the whole range" if whole else "",
         f"intervals of {normal} are of the normal approximation, and may be too short"
@@ -284,7 +285,6 @@ def _fit_with(
         observables=_observables(at.data),
         residuals=at.data,
         optima=tuple(Optimum(value, objective.named(v)) for v, value in rivals),
-        warnings=(),
         objective=objective,
     )
 
@@ -327,7 +327,7 @@ def _contradicted(objective: Objective, at: Parabola) -> list[str]:
         apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
             warnings.append(
-                f"the prior of {symbol(unknown.name)}, {prior.mean:.4g} +- {prior.sd:.2g} "
+                f"the prior of {named(unknown.name)}, {prior.mean:.4g} +- {prior.sd:.2g} "
                 f"{unknown.parameter.unit}".rstrip()
                 + f", is contradicted by the data by {apart:.3g} standard deviations: one of them "
                 "is wrong, and the other parameters follow it; fit without it and compare"
@@ -491,11 +491,11 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
             warnings.append(
-                f"{symbol(name)} is at its bound {quantity_text(estimate.value, estimate.unit)}"
+                f"{named(name)} is at its bound {quantity_text(estimate.value, estimate.unit)}"
             )
     for other in fit.optima:
         at = ", ".join(
-            f"{symbol(n)} {quantity_text(other.values[n], p.unit)}"
+            f"{named(n)} {quantity_text(other.values[n], p.unit)}"
             for n, p in fit.parameters.items()
         )
         warnings.append(
@@ -503,7 +503,7 @@ def _with_warnings(fit: Fit, outliers: tuple[int, ...], warnings: list[str]) -> 
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(fit, warnings=tuple(warnings), because=because, outliers=outliers)
+    return replace(fit, sentences=tuple(warnings), because=because, outliers=outliers)
 
 
 def _outliers(objective: Objective, at: Parabola) -> tuple[tuple[int, ...], Minimum | None]:
@@ -556,17 +556,17 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     names = list(fit.parameters)
     i = names.index(name)
     partners = [
-        symbol(other)
+        named(other)
         for j, other in enumerate(names)
         if j != i and abs(fit.correlation[i, j]) > 0.98
     ]
     if partners:
         return (
-            f"{symbol(name)} is not determined by these data together with "
+            f"{named(name)} is not determined by these data together with "
             f"{enumerated(partners)}: they change the predictions in the same way; fix one of "
             "them, give a prior, or measure at points that distinguish them"
         )
     return (
-        f"{symbol(name)} is not determined by these data; fix it or give a prior: the intervals "
+        f"{named(name)} is not determined by these data; fix it or give a prior: the intervals "
         "of the other parameters hold only for values near the present one"
     )

@@ -51,7 +51,7 @@ from asperity.inference.runs.assembly import (
 )
 from asperity.inference.runs.blocks import coarser
 from asperity.inference.runs.cleaning import cleaned, with_wrong_samples
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.table import LockInTable, joined
@@ -224,7 +224,7 @@ def fit(
     warnings += unusual_numbers(result, recordings)
     if not recordings:
         other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
-        return replace(result, warnings=(*warnings, *result.warnings, *filter(None, [other])))
+        return replace(result, sentences=(*warnings, *result.sentences, *filter(None, [other])))
     given = numbers.fixed.get("K")
     shared = "K" in names and len(recordings) > 1
     if table is None and (given is not None or shared):
@@ -243,7 +243,7 @@ def fit(
             seed=seed,
         )
         warnings += contradicted_stiffness(result, freed, recordings, given)
-    return replace(result, warnings=(*warnings, *result.warnings))
+    return replace(result, sentences=(*warnings, *result.sentences))
 
 
 class _Given(NamedTuple):
@@ -417,7 +417,7 @@ def _objective(
             priors,
             mu0_given="mu0" in (*free, *fixed, *material_values(material, ["mu0"]))
             or table is not None,
-            beside_table=table is not None,
+            with_table=table is not None,
         )
         # Its prior makes it free.
         named = [name for name in named if name.partition("[")[0] != GAIN]
@@ -450,7 +450,7 @@ def _objective(
             recordings,
             law,
             {n: v for n, v in constants.items() if np.ndim(v) == 0},
-            beside_table=table is not None,
+            with_table=table is not None,
             shared_stiffness=shared,
             fixed_stiffness=fixed.get("K"),
             start=begun,

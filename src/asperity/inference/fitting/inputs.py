@@ -12,7 +12,7 @@ from asperity.errors import Argument, InputError, MistakesError, require, symbol
 from asperity.inference.cycles import AveragedCycle
 from asperity.inference.holds import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.unknowns import (

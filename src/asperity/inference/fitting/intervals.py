@@ -116,7 +116,7 @@ UNDETERMINED = 1.0
 _AT_BOUND = 1e-3
 #: A coordinate closer to a bound than this many standard deviations is stopped by the bound.
 _NEAR_BOUND = 0.1
-#: If chi-squared can still decrease by more (a third of a standard error), the minimum is none.
+#: If chi-squared can still decrease by more (a third of a standard error), the point is no minimum.
 _STOPPED = 0.1
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import require, symbol
+from asperity.errors import named, require
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.minima import minima_of
 from asperity.inference.fitting.result import Fit
@@ -51,7 +51,7 @@ def contradicted_stiffness(
     if not freed.converged or gain < _CONTRADICTED_AICC:
         return []
     moved = ", ".join(
-        f"{symbol(n)} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
+        f"{named(n)} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
         if n in fit.values and n in freed.values
     )
@@ -65,16 +65,16 @@ def contradicted_stiffness(
             stiffnesses.append(f"{measured}, {K.value / fit.values['K']:.3g} times it")
         elif not low <= (fixed := stiffness_in(run, given)) <= high:
             sentences.append(
-                f"the fixed {symbol('K')} of {fixed:.4g} {K.unit} is contradicted: {measured}; "
-                f"AICc falls by {gain:.3g} with {symbol('K')} free{moved}; "
-                f"leave {symbol('K')} free, or give it a prior"
+                f"the fixed {named('K')} of {fixed:.4g} {K.unit} is contradicted: {measured}; "
+                f"AICc falls by {gain:.3g} with {named('K')} free{moved}; "
+                f"leave {named('K')} free, or give it a prior"
             )
     if given is None:
         shared = fit.parameters["K"]
         sentences.append(
-            f"the {symbol('K')} of {shared.value:.4g} {shared.unit} that the recordings share is "
+            f"the {named('K')} of {shared.value:.4g} {shared.unit} that the recordings share is "
             f"contradicted: {', '.join(stiffnesses)}; AICc falls by {gain:.3g} with a "
-            f"{symbol('K')} for each{moved}; leave {symbol('K')} out of the free parameters, so "
+            f"{named('K')} for each{moved}; leave {named('K')} out of the free parameters, so "
             "that each has its own"
         )
     return sentences
@@ -110,7 +110,7 @@ def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun] = ()) -> list[str]:
         low, high = ranges[name]
         if not low <= value <= high:
             sentences.append(
-                f"{symbol(name)} of {value:.3g} {unit}".rstrip()
+                f"{named(name)} of {value:.3g} {unit}".rstrip()
                 + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: {advice}"
             )
     return sentences
@@ -157,10 +157,10 @@ def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | No
     if low <= K <= high:
         return ""
     law = [n for n in ("A", "B", "D0") if n in freed.values]
-    numbers = ", ".join(f"{symbol(n)} {freed.values[n]:.4g}" for n in law)
+    numbers = ", ".join(f"{named(n)} {freed.values[n]:.4g}" for n in law)
     return (
-        f"with {symbol('K')} free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a "
-        f"{symbol('K')} of {estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), "
+        f"with {named('K')} free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a "
+        f"{named('K')} of {estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), "
         f"{estimate.value / K:.3g} times the given {K:.4g} N/m"
         + (f", with {numbers}" if numbers else "")
         + ": either the given stiffness is wrong or the law; measure the stiffness, or give it a "

@@ -11,13 +11,14 @@ import numpy as np
 
 from asperity._version import __version__
 from asperity.arrays import Float
+from asperity.errors import worded
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.levels import LevelChange, level_change
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
-from asperity.outputs.tables import rounded, two_digits
+from asperity.outputs.sections import rounded, two_digits
 from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import display_unit
@@ -32,6 +33,23 @@ _ONE_LOAD = 1e-3
 MISFIT = 0.01
 #: Standard errors from which the sign of A - B is known.
 _KNOWN_SIGN = 2.0
+
+
+class Warned:
+    """A result whose warnings have the names of parameters in use where they are read.
+
+    Attributes
+    ----------
+    sentences : tuple of str
+        The warnings before `asperity.errors.worded`.
+    """
+
+    sentences: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings, a sentence each."""
+        return tuple(map(worded, self.sentences))
 
 
 @dataclass(frozen=True)
@@ -142,7 +160,7 @@ def with_error(value: float, error: float) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(Drawn):
+class Fit(Warned, Drawn):
     """A law fitted to data.
 
     Attributes
@@ -172,9 +190,10 @@ class Fit(Drawn):
         derivative with respect to the coordinates of the fit.
     optima : tuple of Optimum
         Other minima that the data do not exclude.
-    warnings : tuple of str
+    sentences : tuple of str
+        As in `Warned`, which has the warnings.
     because : mapping of str to str
-        The warning that says why a parameter is not determined, by its name.
+        The one of `sentences` that says why a parameter is not determined, by its name.
     outliers : tuple of int
         Rows of the table (from 0) that the law does not describe, while it describes all others; at
         most a tenth of the rows, or two if there are eight or more.
@@ -198,7 +217,7 @@ class Fit(Drawn):
     observables: Mapping[str, tuple[float, int]] = field(default_factory=dict)
     residuals: tuple[Residuals, ...] = ()
     optima: tuple[Optimum, ...] = ()
-    warnings: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()
     because: Mapping[str, str] = field(default_factory=dict)
     outliers: tuple[int, ...] = ()
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from asperity.errors import InputError, require, symbol
+from asperity.errors import InputError, named, require, worded
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import LEVELS, UNDETERMINED, Interval
-from asperity.inference.fitting.result import Fit
+from asperity.inference.fitting.result import Fit, Warned
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
 from asperity.outputs.json import plain
@@ -60,7 +60,7 @@ class WindowEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class WindowedFit:
+class WindowedFit(Warned):
     """Fits of one recording in several windows.
 
     Attributes
@@ -73,17 +73,21 @@ class WindowedFit:
         Parameters of the law and the machine, without nuisance parameters.
     undetermined : tuple of str
         Parameters that the windows do not determine, or on which they contradict each other.
-    warnings : tuple of str
-    new_warnings : tuple of str
-        Warnings that the fit in the first window does not have.
+    sentences : tuple of str
+        As in `Warned`, which has the warnings.
     """
 
     windows: tuple[tuple[float, float], ...]
     fits: tuple[Fit, ...]
     parameters: Mapping[str, WindowEstimate]
     undetermined: tuple[str, ...]
-    warnings: tuple[str, ...]
-    new_warnings: tuple[str, ...] = ()
+    sentences: tuple[str, ...]
+
+    @property
+    def new_warnings(self) -> tuple[str, ...]:
+        """Warnings that the fit in the first window does not have."""
+        known = [f"{_shown(w)}: {text}" for w in self.windows for text in self.fits[0].sentences]
+        return tuple(worded(text) for text in self.sentences if text not in known)
 
     def record(self) -> dict[str, Any]:
         """Plain numbers and texts, for JSON."""
@@ -91,8 +95,9 @@ class WindowedFit:
             name: {key: value for key, value in vars(p).items() if key != "name"}
             for name, p in self.parameters.items()
         }
-        whole = {name: value for name, value in vars(self).items() if name != "fits"}
-        return {name: plain(value) for name, value in (whole | {"parameters": parameters}).items()}
+        names = ("windows", "parameters", "undetermined", "warnings", "new_warnings")
+        whole = {name: getattr(self, name) for name in names} | {"parameters": parameters}
+        return {name: plain(value) for name, value in whole.items()}
 
 
 @typed
@@ -161,7 +166,7 @@ def fit_windows(
         fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
         advance(1)
     failed = [i for i, result in enumerate(fits) if not result.converged]
-    warnings = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
+    sentences = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
     usable = [result for result in fits if result.converged]
     estimates: dict[str, WindowEstimate] = {}
     undetermined = []
@@ -170,15 +175,10 @@ def fit_windows(
         far_off = disagreeing(unknown, estimates[unknown.name], spans)
         if far_off or not known:
             undetermined.append(unknown.name)
-        warnings += far_off
-    new = list(warnings)
+        sentences += far_off
     for span, result in zip(spans, fits, strict=True):
-        of_window = {w: f"{_shown(span)}: {w}" for w in result.warnings}
-        warnings += of_window.values()
-        new += [text for w, text in of_window.items() if w not in fits[0].warnings]
-    return WindowedFit(
-        spans, tuple(fits), estimates, tuple(undetermined), tuple(warnings), tuple(new)
-    )
+        sentences += [f"{_shown(span)}: {text}" for text in result.sentences]
+    return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(sentences))
 
 
 def _shown(span: tuple[float, float]) -> str:
@@ -206,7 +206,7 @@ def disagreeing(
     for span, value in zip(spans, over.values, strict=True):
         if abs(float(unknown.to_coordinate(value)) - mean) > _FAR_OFF * total:
             result.append(
-                f"{_shown(span)}: {symbol(over.name)} is {value:.4g} {over.unit}, far from the "
+                f"{_shown(span)}: {named(over.name)} is {value:.4g} {over.unit}, far from the "
                 "estimates of the other windows, and has a small weight; look at its fit first"
             )
     return result

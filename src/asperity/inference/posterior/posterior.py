@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.arrays import Bool, Float
-from asperity.errors import symbol
+from asperity.errors import named
 from asperity.inference.fitting.intervals import LEVELS, Interval
-from asperity.inference.fitting.result import Fit
+from asperity.inference.fitting.result import Fit, Warned
 from asperity.inference.posterior.density import Whitened
 from asperity.outputs.json import plain
 
@@ -82,7 +82,7 @@ class Marginal:
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(Warned):
     """Draws from the posterior of a fit.
 
     Attributes
@@ -103,7 +103,8 @@ class Posterior:
     seed : int
     prior : mapping
         Prior of each parameter, as plain numbers.
-    warnings : tuple of str
+    sentences : tuple of str
+        As in `Warned`, which has the warnings.
     """
 
     fit: Fit
@@ -117,7 +118,7 @@ class Posterior:
     failed: Bool
     seed: int
     prior: Mapping[str, Any]
-    warnings: tuple[str, ...]
+    sentences: tuple[str, ...]
 
     @property
     def converged(self) -> bool:
@@ -216,7 +217,7 @@ def posterior_of(
     kept.pop("z")
     return Posterior(
         fit=fit, parameters=marginals, draws=draws, seed=seed, prior=whitened.prior_record(),
-        warnings=tuple(_warnings(marginals, stats)), **kept,
+        sentences=tuple(_warnings(marginals, stats)), **kept,
     )  # fmt: skip
 
 
@@ -226,12 +227,12 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
     for name, p in marginals.items():
         if not p.r_hat <= _LARGEST_R_HAT:
             warnings.append(
-                f"chains disagree about {symbol(name)} (R-hat {p.r_hat:.3f}); sample more draws, "
+                f"chains disagree about {named(name)} (R-hat {p.r_hat:.3f}); sample more draws, "
                 "and look for more than one maximum"
             )
         elif min(p.ess_bulk, p.ess_tail) < _EFFECTIVE_DRAWS * chains:
             warnings.append(
-                f"draws of {symbol(name)} say as much as {p.ess_bulk:.0f} independent ones (in "
+                f"draws of {named(name)} say as much as {p.ess_bulk:.0f} independent ones (in "
                 f"the tails {p.ess_tail:.0f}), which is too few; sample more"
             )
     failed, lost = int(stats.failed.sum()), int((stats.diverging & ~stats.failed).sum())

@@ -17,7 +17,7 @@ import numpy as np
 from asperity.arrays import Float
 from asperity.errors import Argument, InputError, enumerated, require, symbol
 from asperity.inference.runs.blocks import checked_rate
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.inference.runs.run import STIFFNESS, RecordedRun
 from asperity.inference.runs.term import RunTerm, about_zero, cut_delays
 from asperity.inference.unknowns import Prior, UnfittableLawError, Unknown, unknown_of
@@ -153,7 +153,7 @@ def run_terms(
     law: type[Law],
     constants: Mapping[str, Any],
     *,
-    beside_table: bool,
+    with_table: bool,
     shared_stiffness: bool,
     fixed_stiffness: Any,
     start: Mapping[str, Any],
@@ -169,7 +169,7 @@ def run_terms(
     law : type of Law
     constants : mapping of str to float
         Parameters that are not free, except those of single runs.
-    beside_table : bool
+    with_table : bool
         Whether lock-in readings are fitted together with the runs and share their K.
     shared_stiffness : bool
         Whether K is one parameter of all runs, which the caller has freed.
@@ -187,7 +187,7 @@ def run_terms(
         raise InputError("runs", rule, ", ".join(twice), "give names, or each file once")
     terms, unknowns = [], []
     for run in runs:
-        suffix = f"[{run.name}]" if len(runs) > 1 or beside_table else ""
+        suffix = f"[{run.name}]" if len(runs) > 1 or with_table else ""
         nuisances = cut_delays(run, suffix)
         fixed = {name: value for name, value in constants.items() if name != "K"}
         if fixed_stiffness is not None:
@@ -340,7 +340,7 @@ def require_calibrated(
     priors: Mapping[str, Prior],
     *,
     mu0_given: bool,
-    beside_table: bool,
+    with_table: bool,
 ) -> None:
     """Refuse a gain without a prior, and a gain that a load change would falsely determine.
 
@@ -351,7 +351,7 @@ def require_calibrated(
     priors : mapping of str to Prior
     mu0_given : bool
         Whether mu0 is free, or fixed to a number that is not from the recording.
-    beside_table : bool
+    with_table : bool
         Whether lock-in readings are fitted together with the runs.
 
     Raises
@@ -359,7 +359,7 @@ def require_calibrated(
     InputError
     """
     given = [n for n in priors if n.partition("[")[0] == GAIN]
-    several = len(runs) > 1 or beside_table
+    several = len(runs) > 1 or with_table
     for name in free:
         holds = name.partition("[")[0] != GAIN or name in given or GAIN in given
         scaled = enumerated([symbol(n) for n in ("A", "B", "mu0", "K")])

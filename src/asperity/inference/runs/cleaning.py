@@ -106,7 +106,7 @@ def with_wrong_samples(run: RecordedRun, times: Sequence[float]) -> RecordedRun:
 def with_jumps(run: RecordedRun) -> RecordedRun:
     """The run with the times of jumps of its level; unchanged if the jumps are known already.
 
-    Jumps are not searched near gaps and changes of the drive, after which friction is quick.
+    No jump is searched near gaps, and near changes of the drive, where friction changes quickly.
 
     Parameters
     ----------

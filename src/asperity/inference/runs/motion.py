@@ -20,20 +20,20 @@ from jax import Array
 
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
-from asperity.inference.runs.noise import innovations
-from asperity.inference.runs.reading import GAIN, Reading
-from asperity.inference.runs.steps import (
+from asperity.inference.runs.gauge import GAIN, Reading
+from asperity.inference.runs.integration import (
     Curve,
     Free,
     arranged,
     integrated,
     with_values,
 )
+from asperity.inference.runs.noise import innovations
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.recording.defects.autoregression import Whitening
 from asperity.slider.motion import Motion
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.slider.problem import equation_of_motion
 
 #: Programs have room for so many steps, and for at least so many for each piece of the drive: after

@@ -331,9 +331,10 @@ def strange_friction(friction: Float) -> list[str]:
     rounded = coarsely_rounded(friction)
     if rounded is not None:
         sentences.append(
-            f"{rounded[0]:.0%} of the values of friction repeat the one before, and others differ "
-            f"from it by {rounded[1]:.2g}: it was rounded more coarsely than its noise, which may "
-            "change parameters by more than the intervals say; record or write more digits"
+            f"{rounded[0]:.0%} of the values of friction repeat the preceding value, and others "
+            f"differ from it by {rounded[1]:.2g}: friction was rounded more coarsely than its "
+            "noise, which may change parameters by more than the intervals say; record or write "
+            "more digits"
         )
     return sentences
 

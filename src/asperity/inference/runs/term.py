@@ -16,6 +16,7 @@ from asperity.errors import Argument
 from asperity.inference.objective import DataTerm, Residuals
 from asperity.inference.runs.cleaning import first_after_changes, most_wrong
 from asperity.inference.runs.drive import filled_up
+from asperity.inference.runs.gauge import reading_at
 from asperity.inference.runs.motion import (
     MOST_STEPS,
     RunArrays,
@@ -33,7 +34,6 @@ from asperity.inference.runs.noise import (
     whiteness,
     wrong_samples,
 )
-from asperity.inference.runs.reading import reading_at
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law

@@ -37,24 +37,24 @@ from asperity.orbit import (
     response_function,
 )
 from asperity.parameters import law_parameters
-from asperity.slider.named import law_from
+from asperity.slider.parameters import law_from
 
 #: Largest number of rows whose orbits are remembered, about ten kilobytes each.
 _REMEMBERED = 2048
 #: Root of the sum of the squared relative changes of the parameters, below which a known orbit is
-#: near (`KnownOrbits`): of 1,900 rows of six tables whose coarse orbit Newton's method did not
-#: reach from there, other initial guesses than transients found an orbit of 50.
+#: near (`KnownOrbits`). Newton's method from near orbits failed at 1,900 rows of six tables; for 50
+#: of these rows another initial guess, without a transient, led to an orbit.
 _NEAR = 0.1
 #: Smallest share of rows with an orbit in the coarse model: some rows may have slip events, whose
 #: orbits this model does not reach, even at the minimum.
 _LEAST_SHARE = 0.5
-#: Relative uncertainty with which chi-squared is smooth: from 12 starts for a table of slow
-#: modulation 8 minimisations reached the minimum, and none of 26 with the uncertainties as given.
+#: Relative uncertainty with which chi-squared is smooth: for a table of slow modulation 8 of 12
+#: minimisations reached the minimum with it, and none of 26 with the uncertainties of the table.
 _SMOOTHING = 0.3
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
-#: An uncertainty below this share of those of the other rows, absolute and relative to the reading,
-#: is named if the leverage of the reading exceeds the second number.
+#: A warning names a reading if its uncertainty, absolute and relative to the reading, is below the
+#: first share of those of the other rows, and its leverage exceeds the second number.
 _SMALL_ERROR, _DECISIVE = 0.1, 0.9
 #: Evaluations of an integral; fewer with searched orbits, which take a hundred times as long.
 _SAMPLES, _SEARCHED_SAMPLES = 1024, 80
@@ -320,7 +320,7 @@ class LockInTerm(DataTerm):
         sentences = []
         for name, values in table.values.items():
             size = table.values[f"mu{name[-1]}"] if name.startswith("phase") else np.abs(values)
-            # The error of a phase is one across the phasor.
+            # The error of a phase is an error across the phasor.
             error = table.errors[name] * (size if name.startswith("phase") else 1.0)
             known = np.isfinite(values) & (size > 0)
             if not known.any():
@@ -344,7 +344,7 @@ class LockInTerm(DataTerm):
     def predicted(
         self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
     ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
-        """Prediction, its derivatives to the free parameters, and the outcome of every row.
+        """Prediction, its derivatives by the free parameters, and the outcome of every row.
 
         Parameters
         ----------

@@ -187,7 +187,7 @@ class HarmonicSegment(ProgrammeSegment):
 
     @property
     def lowest_load(self) -> float:
-        """The lower end of the level, at the larger amplitude."""
+        """The smaller level of beginning and end, less the larger amplitude."""
         begin, rate = float(self.load1), float(self.load_rate)
         epsilon = max(abs(float(self.epsilon1)), abs(float(self.epsilon2)))
         return min(begin, begin + rate * float(self.duration)) * (1 - epsilon)
@@ -208,7 +208,7 @@ class HarmonicSegment(ProgrammeSegment):
 
     @property
     def fastest_pull(self) -> float:
-        """The faster end."""
+        """The larger velocity of beginning and end, with the modulation."""
         begin, rate = float(self.pull1), float(self.pull_rate)
         fastest = max(abs(begin), abs(begin + rate * float(self.duration)))
         return fastest * (1 + abs(float(self.epsilon_v)))
@@ -293,12 +293,12 @@ class PeriodicSegment(ProgrammeSegment):
 
     @property
     def lowest_load(self) -> float:
-        """Of 512 instants of a period."""
+        """The lowest load at 512 instants of a period."""
         return float(np.min(load_of(self, self._over_a_period())))
 
     @property
     def fastest_pull(self) -> float:
-        """Of 512 instants of a period."""
+        """The fastest pull at 512 instants of a period."""
         return float(np.max(np.abs(pull_of(self, self._over_a_period()))))
 
     @property

@@ -1,12 +1,12 @@
-"""Segments of constant pulling velocity.
+"""Segments of constant pulling velocity: where the velocity steps, and where the drive holds.
 
 Within a segment the displacement is a straight line, and a parabola while the motor changes its
-velocity; what is left is noise of known strength. The means of the displacement over short blocks
+velocity; the residual is noise of known strength. The means of the displacement over short blocks
 are cut into such pieces by optimal partitioning (Killick, Fearnhead and Eckley, J. Am. Stat. Assoc.
-107, 1590, 2012), which is exact for this model. Two things are not in it: a motor does not run
-evenly, and takes its time between velocities. Neighbours of nearly one velocity are therefore one
-segment, and short pieces between two segments are their transition. A cut lies where the lines on
-its two sides intersect.
+107, 1590, 2012), which is exact for this model. The model leaves out that a motor does not run
+evenly and needs time to change its velocity. Therefore neighbouring pieces of nearly the same
+velocity become one segment, and short pieces between two segments become a transition between them.
+A cut lies where the lines on its two sides intersect.
 """
 
 from __future__ import annotations
@@ -28,34 +28,33 @@ Piece = tuple[int, int]
 #: Number of blocks of equal time, of equal numbers of samples and of equal slip each; number of
 #: parts into which a block next to a change is divided.
 _BLOCKS, _PARTS = 300, 12
-#: Fewest means from which noise is estimated; parts of a recording, of which the quietest quarter
-#: gives the noise.
+#: Fewest means from which noise is estimated; number of parts of a recording, of which the quietest
+#: quarter gives the noise.
 _MEANS, _QUIET_PARTS = 96, 16
-#: A recorder is coarse if this share of its samples repeats the one before.
+#: A recorder is coarse if this share of its samples repeats the preceding sample.
 _COARSE = 0.2
 #: Multiple of the penalty of the Bayesian information criterion for a piece, as noise of a gauge is
 #: not white.
 _PENALTY = 2.0
-#: Neighbours whose velocities have a smaller ratio are one segment; below the second ratio it is
-#: doubtful that they are two.
+#: Neighbouring pieces whose velocities have a smaller ratio are one segment; with a ratio between
+#: the two numbers it is doubtful whether they are one segment or two.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
-#: Pieces between two segments are a transition if they last for less than this share of the time
-#: and the slip of both; for less than the second share, which is doubtful, if their velocity
-#: changes as in a ramp.
+#: Pieces between two segments are a transition if they take less than the first share of the time
+#: and the slip of both segments. If their velocity changes as in a ramp, the second share is the
+#: limit, and above the first share the transition is doubtful.
 _TRANSITION, _RAMP = 0.15, 0.5
 #: A piece whose velocity does not lie between those of its neighbours is an overshoot below this
 #: share.
 _OVERSHOOT = 0.05
-#: Lines that are intersected are so long that they differ by this multiple of the noise at their
-#: far ends.
+#: Two lines are intersected over lengths at whose ends they differ by this multiple of the noise.
 _LINE = 50.0
 #: Fewest samples of a piece.
 _FEWEST = 4
 #: A segment that moves by at most this multiple of the noise is at rest.
 _STILL = 6.0
-#: A gauge jumps between two parts of a segment if the displacement does by more than this multiple
-#: of the noise, as a spike of friction does. Of 482 segments of `benchmarks.hostile_sliding`, whose
-#: gauges do not jump, 9 seem to.
+#: A gauge jumps between two parts of a segment if the displacement changes there by more than this
+#: multiple of the noise. A spike of friction looks alike: in 9 of 482 segments of
+#: `benchmarks.hostile_sliding`, whose gauges do not jump, a jump is found.
 _JUMP = 10.0
 #: A segment slower than this share of its neighbours' velocity is a hold, unless it slides
 #: steadily.
@@ -66,16 +65,17 @@ _OTHER_VELOCITY = 0.05
 
 @dataclass(frozen=True)
 class Cut:
-    """Where a recording is cut: the time of the change, and the first sample after it.
+    """Where a recording is cut.
 
     Attributes
     ----------
     time : float
-        Seconds.
+        Time of the change of velocity (s).
     sample : int
+        The first sample after this time.
     doubt : float
-        Twice the standard uncertainty of the time (s) from the noise of the displacement; 0 where
-        the time was given.
+        Twice the standard uncertainty of the time (s) from the noise of the displacement; 0 for a
+        time from the user.
     """
 
     time: float
@@ -97,7 +97,7 @@ class Partition:
     doubts : tuple of str
         Sentences on other ways to cut this recording.
     rates : tuple of Rate
-        Velocities as measured, with their uncertainties; empty where the velocities are given, and
+        Measured velocities with their uncertainties; empty if the user gives the velocities, and
         without displacement.
     """
 
@@ -165,7 +165,7 @@ def require_cuts(time: Float, cuts: Sequence[float], label: str) -> None:
     Raises
     ------
     InputError
-        If one lies outside of the recording, or there are too few samples between two.
+        If a time lies outside of the recording, or there are too few samples between two times.
     """
     for at in cuts:
         if not time[0] < at < time[-1]:
@@ -229,9 +229,9 @@ def displacement_noise(time: Float, displacement: Float) -> float:
 def _motion(time: Float, displacement: Float) -> _Motion:
     """The noise of a displacement, from second differences of means over 1, 2, 4, ... samples.
 
-    Velocity does not touch them, and its changes hardly in the quietest parts of a recording.
-    Means over many samples scatter more than white noise has them if the noise of a gauge is
-    correlated, hums or wanders.
+    A constant velocity does not contribute to second differences, and a changing velocity hardly
+    does in the quietest parts of a recording. Means over many samples scatter more than with white
+    noise if the noise of a gauge is correlated, hums or wanders.
     """
     noise, slow, n = 0.0, 0.0, 1
     while n == 1 or n * _MEANS <= time.size:
@@ -257,15 +257,15 @@ def _motion(time: Float, displacement: Float) -> _Motion:
 def _pieces(motion: _Motion) -> list[Piece]:
     """Lines and parabolas: cut at coarse blocks first, then at finer blocks next to the changes.
 
-    Down to single samples: the mean of a block in which the velocity changes lies off the lines on
-    both sides. A coarse recorder stands still between its steps, and is cut at the first finer
-    blocks.
+    Blocks next to a change are divided down to single samples, because the mean of a block in which
+    the velocity changes lies off the lines on both sides. The record of a coarse recorder stands
+    still between its steps: its blocks are divided once.
     """
     edges = _blocks(motion)
     largest = float(np.diff(edges).max())
-    # As often as it takes to divide the largest block: in noise the changes move from time to time.
+    # The largest block is divided down to samples: noise may move a change to any block.
     finer = 1 if motion.step else int(np.ceil(np.log(largest) / np.log(_PARTS)))
-    # Elsewhere four blocks are one.
+    # Away from changes four blocks are merged into one.
     kept = np.append(edges[::4], edges[-1])
     for _ in range(finer):
         bounds = edges[_change_points(motion, edges)]
@@ -280,12 +280,12 @@ def _pieces(motion: _Motion) -> list[Piece]:
 
 
 def _blocks(motion: _Motion) -> Index:
-    """Samples that bound blocks, the number of samples among them."""
+    """First samples of the blocks, and the number of all samples."""
     n = motion.time.size
     m = max(1, n // 20_000)
     at = np.arange(n // m) * m
     means = motion.displacement[: at.size * m].reshape(-1, m).mean(axis=1)
-    # Noise moves neighbours too.
+    # Noise alone makes neighbouring means differ.
     moved = np.abs(np.diff(means)) - 3 * motion.noise * np.sqrt(2 / m)
     path = np.concatenate([[0.0], np.cumsum(np.maximum(moved, 0.0))])
     edges = [np.array([0, n])]
@@ -310,7 +310,7 @@ def _change_points(motion: _Motion, edges: Index) -> list[int]:
     best, last = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=np.intp)
     best[0] = 0.0
     starts = np.empty(0, dtype=np.intp)
-    # For each start: sums of w, wu, wu2, wu3, wu4, wy, wyu, wyu2, wy2, from its block on.
+    # For each start: sums of w, wu, wu2, wu3, wu4, wy, wyu, wyu2, wy2 over the blocks from it on.
     sums = np.empty((9, 0))
     for end in range(1, n + 1):
         starts = np.append(starts, end - 1)
@@ -356,13 +356,14 @@ def _velocity(motion: _Motion, piece: Piece) -> float:
 def _mean_velocity(motion: _Motion, parts: list[Piece], between: Piece) -> Rate:
     """Slope of the line through the parts of a segment that lie between two samples, m/s.
 
-    A motor or a gear that does not run evenly leaves a residual, which is slow noise. A gauge that
-    jumps from one part to the next has no share in the slope: its line goes on at another height.
+    A motor or a gear that does not run evenly leaves a residual, which is slow noise. A jump of the
+    gauge between two parts does not change the slope: the line continues at another height.
     """
     inside = [(max(a, between[0]), min(b, between[1])) for a, b in parts]
     inside = [part for part in inside if part[1] - part[0] >= _FEWEST] or parts
     t, x = (
-        np.concatenate([of[a:b] for a, b in inside]) for of in (motion.time, motion.displacement)
+        np.concatenate([values[a:b] for a, b in inside])
+        for values in (motion.time, motion.displacement)
     )
     since = t - t.mean()
     left = x - slope_of(t, x) * since
@@ -414,7 +415,8 @@ def _segments(
         ratios = np.array([_log_ratio(*pair) for pair in pairwise(rounded)])
         spans = np.array([_duration(motion, piece) for piece in pieces])
         both = np.stack([spans, spans * np.abs(speeds)])
-        # A motor or a contact does not move evenly: short parts of nearly one velocity are noise.
+        # Motors and contacts do not move evenly: a short part of nearly the same velocity as its
+        # neighbour belongs to the segment of this neighbour.
         sides = both[:, :-1], both[:, 1:]
         share = np.max(np.minimum(*sides) / np.maximum(np.maximum(*sides), 1e-300), axis=0)
         allowed = np.where(share < _TRANSITION, np.log(_CLEAR_RATIO), np.log(_RATIO))
@@ -453,7 +455,7 @@ def _segments(
 def _transition(
     motion: _Motion, pieces: list[Piece], speeds: list[float]
 ) -> tuple[int, int, float] | None:
-    """The pieces on the two sides of the shortest transition, and its share of them."""
+    """The pieces on the two sides of the shortest transition, and its share of time or slip."""
     spans = [_duration(motion, piece) for piece in pieces]
     slips = [abs(speed) * span for speed, span in zip(speeds, spans, strict=True)]
     still = [_still(motion, *each) for each in zip(pieces, speeds, strict=True)]
@@ -465,7 +467,7 @@ def _transition(
         span = float(motion.time[pieces[j][0]] - motion.time[pieces[i][1] - 1])
         if not inner or not (between or j == i + 2) or span >= shortest:
             continue
-        # A stop is no transition, however short.
+        # A stop, however short, is a hold and no transition.
         slowest = min(abs(low), abs(high))
         if any(still[k] and not _still(motion, pieces[k], slowest / 2) for k in inner):
             continue
@@ -476,10 +478,11 @@ def _transition(
             limit = _TRANSITION if kinds == ["settling"] else _OVERSHOOT
             if kinds == ["settling"]:
                 sides = [min(sides, key=lambda k: _log_ratio(speeds[k], speeds[i + 1]))]
-        of = sum if _log_ratio(low, high) < np.log(_RATIO) else min
+        # Two sides of nearly the same velocity are parts of one segment.
+        total = sum if _log_ratio(low, high) < np.log(_RATIO) else min
         moved = [slips[k] for k in sides if not still[k]]
-        share = span / of(spans[k] for k in sides)
-        share = max(share, sum(slips[k] for k in inner) / of(moved) if moved else np.inf)
+        share = span / total(spans[k] for k in sides)
+        share = max(share, sum(slips[k] for k in inner) / total(moved) if moved else np.inf)
         if share < limit:
             shortest, transition = span, (i, j, share)
     return transition
@@ -488,8 +491,8 @@ def _transition(
 def _course(motion: _Motion, piece: Piece, speed: float, ends: tuple[float, float]) -> str:
     """How the velocity of a piece between two segments changes.
 
-    "even": constant, and unlike those of both segments; "settling": it goes from one to the other;
-    empty where it cannot be decided.
+    "even" if it is constant and differs from the velocities of both segments, "settling" if it goes
+    from one of them to the other, empty if neither is certain.
     """
     change, uncertainty = _velocity_change(motion, piece)
     between = min(ends) <= speed <= max(ends)
@@ -501,7 +504,7 @@ def _course(motion: _Motion, piece: Piece, speed: float, ends: tuple[float, floa
 
 
 def _log_ratio(a: float, b: float) -> float:
-    """Log of the ratio of two speeds; infinite where they differ in direction, or one is zero."""
+    """Logarithm of the ratio of two velocities; infinite if their signs differ or one is zero."""
     if a == b:
         return 0.0
     return float(abs(np.log(a / b))) if a * b > 0 else np.inf
@@ -511,7 +514,7 @@ def _intersection(motion: _Motion, before: Piece, after: Piece) -> Cut:
     """Where the lines of displacement on the two sides of a cut intersect."""
     middles = [(piece[0] + piece[1]) // 2 for piece in (before, after)]
     step = abs(_velocity(motion, after) - _velocity(motion, before))
-    # A motor does not run evenly: the lines are as long as noise asks for.
+    # A motor does not run evenly: the lines are no longer than noise requires.
     long = _LINE * max(motion.slow_noise, motion.step) / max(step, 1e-300)
     time = motion.time
     first = int(np.searchsorted(time, time[before[1] - 1] - long))

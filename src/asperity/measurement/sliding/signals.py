@@ -66,7 +66,7 @@ class SlidingSignals:
     signs : tuple of Finding
         Load and shear that are read with the opposite sign.
     left_out : int
-        Samples within the window at which something is no number or time does not go on.
+        Number of samples within the window with a missing value or a time that does not increase.
     """
 
     time: Float

@@ -1,11 +1,13 @@
 """Velocity steps: change of steady friction, A - B, and the transient between.
 
-The levels before and after a step are extrapolated to the step through a trend over slip, the
-transient left out or fitted with two exponentials, which is what a spring-slider with one state
-variable does after a small step. How much is left out, how long the windows are and whether the
-trend has one slope or two is a choice that the data leave open in part: all choices are made, each
-with its uncertainty, their mean is weighted by precision, and their spread is part of the
-uncertainty.
+`asperity.measurement.sliding.segments` finds the steps; this module reads each of them. The levels
+of friction before and after a step are extrapolated to the step along a trend over slip. The
+transient is left out, or fitted with two exponentials, as a spring-slider with one state variable
+has them after a small step.
+
+The data do not fix how much is left out, how long the windows are and whether the trend has one
+slope or two. The step is therefore read with every choice. The result is the mean of these
+readings, weighted by precision, and their spread is part of its uncertainty.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ _LEFT_OUT = (1.0, 1.4, 2.0)
 _LONGEST_DECAY, _SETTLED = 0.125, 0.03
 #: Two slopes differ if noise alone has less than this probability of such a difference.
 _CHANCE = 0.05
-#: Decays of exponentials that are tried.
+#: Number of decays from which the two of the exponentials are chosen.
 _DECAYS = 14
 #: Largest share of the sliding before a step that is left out for an earlier transient.
 _MOST_CUT = 0.5
@@ -57,7 +59,7 @@ class StepChoice:
         Slip (m; s without displacement) after the step that was not used; 0 if the transient was
         fitted.
     window : float
-        Slip after the step that was looked at.
+        Slip after the step that was used or left out.
     """
 
     change: float
@@ -78,10 +80,10 @@ class VelocityStep:
     velocity_before, velocity_after : float
         m/s; NaN where no motion is recorded.
     change, uncertainty : float
-        Steady friction after less before, both at the step, and its standard uncertainty: noise
-        and choice together.
+        Steady friction after the step less that before, both extrapolated to the step, and the
+        standard uncertainty of this change from noise and choice together.
     noise_uncertainty, choice_uncertainty : float
-        Its parts: correlated noise and rounding, and the spread over trends and windows.
+        Parts of `uncertainty`: correlated noise and rounding; the spread over trends and windows.
     dof : float
         Degrees of freedom of the uncertainty.
     interval_95 : float
@@ -94,7 +96,7 @@ class VelocityStep:
         Extreme of friction after the step, in the direction of the velocity's change, less the
         level before; NaN without velocities.
     trend : str
-        "none", "one slope" or "two slopes": what the data chose.
+        "none", "one slope" or "two slopes", as the data require.
     slope_before, slope_after : float
         Trend over slip (1/m; 1/s without displacement).
     settling_slip : float
@@ -139,7 +141,7 @@ def read_step(
     first_settling: float = 0.0,
     recorded: float = 0.0,
 ) -> VelocityStep | None:
-    """Read one step; None if what has settled after it is too short.
+    """Read one step; None if too little of the sliding after it is free of the transient.
 
     Parameters
     ----------
@@ -148,11 +150,12 @@ def read_step(
     before, after : (array (n,), array (n,), Rate)
         Times, friction and velocity (m/s, NaN if unknown) of the segments on its two sides.
     degree : int
-        0 for levels without trend, 1 for a linear trend, 2 for one that is quadratic as well.
+        0 for levels without trend, 1 for a linear trend, 2 for a quadratic trend.
     first_settling : float
-        Slip at the beginning of the segment before the step that still holds an earlier transient.
+        Slip at the beginning of the segment before the step during which an earlier transient
+        decays.
     recorded : float
-        Step in which the recorder has the friction.
+        Step of the recorder in friction.
     """
     velocities = [side[2].value for side in (before, after)]
     known = all(np.isfinite(velocity) and velocity != 0 for velocity in velocities)
@@ -193,7 +196,7 @@ def read_step(
 
 
 def _windowed(side: _Side, low: float, high: float) -> _Side | None:
-    """Bin means of a part; None where there are no two samples, as next to a gap."""
+    """Bin means of a part; None if the part has fewer than two samples, as next to a gap."""
     inside = (side.slip >= low) & (side.slip <= high)
     if inside.sum() < 2:
         return None
@@ -270,7 +273,7 @@ def _result(
     rounding: float,
 ) -> VelocityStep:
     dof = float(min(min(left.dof, right.dof) for *_, left, right in readings))
-    # Student's t of the slopes' difference, of the choice that tells them apart best.
+    # Student's t of the difference of the slopes, for the choice with the clearest difference.
     apart = max(ratio for _, _, ratio, _, _ in readings)
     one_slope = degree > 0 and apart < stdtrit(dof, 1 - _CHANCE / 2) ** 2
     choices = [two for two, *_ in readings]

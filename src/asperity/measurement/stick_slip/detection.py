@@ -21,12 +21,12 @@ _LOADING = 0.75
 #: In symmetrical noise half of the rises last longer than the falls next to them. An excess of this
 #: many standard deviations shows loading and slip.
 _ASYMMETRY = 3.0
-#: Of widths of means, those whose ratio of rises to falls is within this factor of the largest
-#: count; the narrowest of them is chosen.
+#: The narrowest width of means is chosen whose ratio of rises to falls is within this factor of the
+#: largest ratio.
 _BLUNTER = 3.0
 
-#: Cycles of an oscillation scatter by less than this share, those of noise by a half or more; and
-#: fewest cycles that show it.
+#: Cycles of an oscillation scatter by less than this share, cycles of noise by a half or more; and
+#: smallest number of cycles for this decision.
 _REGULAR, _FEWEST_CYCLES = 0.25, 8
 
 
@@ -68,7 +68,7 @@ def turning_points(values: Float, height: float) -> Index:
                 continue
             break
         gone = np.zeros(at.size, bool)
-        # A small change at an end is no turn of what lies inside.
+        # Both ends of a small change are removed, also at the first and the last point.
         gone[small[small > 0]] = True
         gone[small[small < size.size - 1] + 1] = True
         gone[0] |= small[0] == 0
@@ -90,9 +90,9 @@ class Falls:
     thresholds : array, (m,)
         Smallest fall between such means that is no noise.
     evidence : int
-        Evidence for loading and slip, against a symmetrical signal: 3 where the rises are more than
-        twice as long as many falls, 2 where they are longer by less or than few falls, 1 where
-        falls come back regularly, else 0.
+        Evidence for loading and slip, against a symmetrical signal: 3 if there are many falls and
+        rises last more than twice as long; 2 if rises last longer, but less than twice as long or
+        with few falls; 1 if falls come back regularly; otherwise 0.
     """
 
     peak: Index
@@ -144,7 +144,7 @@ def _thresholds(noise: Noise, scatter: Float) -> Float:
 
 
 def _cycle(peak: Index, trough: Index, samples: int) -> float:
-    """Median number of samples from peak to peak; of one event the shorter rise next to it."""
+    """Median number of samples from peak to peak; of a single event the shorter rise next to it."""
     if peak.size > 1:
         return float(np.median(np.diff(peak)))
     return float(min(peak[0], samples - trough[0]))
@@ -304,13 +304,13 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
 def _without_ringing(force: Float, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise twice as fast as the loading around it is the
-    instrument's. Loading is as fast as the fastest rises but for a quarter of the time.
+    The slider does not move backwards: a rise twice as fast as the loading around it is ringing of
+    the instrument. The loading has the slope that rises exceed for a quarter of the time.
     """
     if peak.size < 3:
         return peak, trough
     length = np.maximum(peak[1:] - trough[:-1], 1).astype(float)
-    # Peaks and troughs are where noise has made them so: the slope is that of all samples.
+    # Noise decides where peaks and troughs are: the slope is fitted to all samples between them.
     first, stop = trough[:-1], peak[1:] + 1
     rate = Sums(force, first, (first + stop) // 2).line(first, stop)[1]
     near = np.arange(rate.size)[:, None] + np.arange(-_NEAR, _NEAR + 1)

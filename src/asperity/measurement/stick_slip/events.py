@@ -1,7 +1,8 @@
 """Slip events of a stick-slip recording: onset, end, forces, drop, creep, each with uncertainty.
 
 Around each fall the force is modelled as a straight line up to the onset, a slip, and a straight
-line after the end. A slider at constant friction moves by half a cosine, while the drive moves on.
+line after the end. During the slip a slider at constant friction follows half a cosine, while the
+drive continues to move.
 """
 
 from __future__ import annotations
@@ -361,7 +362,7 @@ def _timing(
         late /= np.maximum(length, 1.0)
         shifts.append(np.median(late, axis=2))
         unit = _scatter_of_mean(scatter, np.maximum(length, 2.0) / 2) / drop[many]
-        # The standard deviation, of which normal values exceed twice by 5 %.
+        # The standard deviation of normal values, from their 95 % quantile.
         away = np.abs(late - shifts[-1][:, :, None]) / unit
         factors.append(np.quantile(away, 0.95, axis=2).max(0) / 1.96)
     excess = max(min(distance) / (len(_SHAPES) - 1), 1.0)

@@ -48,7 +48,7 @@ class StickSlipHealing:
 
     @property
     def b_minus_a(self) -> tuple[float, float]:
-        """95 % interval of B - A of a rate-and-state law; NaN where growth cannot be told.
+        """95 % interval of B - A of a rate-and-state law; NaN where `reason` says why.
 
         The growth is `FACTOR` times B - A: the interval holds every factor.
         """

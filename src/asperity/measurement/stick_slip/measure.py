@@ -292,8 +292,8 @@ def _loading(events: SlipEvents) -> tuple[float, float]:
     """Median loading slope of the sticks, corrected for drift, and its standard uncertainty.
 
     The mean force changes if friction varies along the track, which does not change the loading,
-    or if the gauge drifts, which adds its rate to the loading. The two cannot be told apart: half
-    of the rate is subtracted, with an uncertainty of half of the rate.
+    or if the gauge drifts, which adds its rate to the loading. The recording does not show which:
+    half of the rate is subtracted, with an uncertainty of half of the rate.
     """
     if len(events) < 2:
         return np.nan, np.nan

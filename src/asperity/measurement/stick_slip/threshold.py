@@ -6,9 +6,10 @@ softest that slides steadily. The frequency there is that of oscillations whose 
     T = T0 + c drop^2,       T0 proportional to 1/sqrt(K)
 
 near the threshold, where the cycles are those of the linear equation of motion (Bureau et al.,
-2000, Eqs. 16 and 17: omega^2 = K V^2 / (A W0 D0)). Cycles that grow out of steady sliding or die
-away to it give T0; where no recording has such cycles, the regular ones of several stiffnesses do.
-Cycles with sticks do not: their force rises at K V/W0, that of a sine at pi drop/T.
+2000, Eqs. 16 and 17: omega^2 = K V^2 / (A W0 D0)). T0 comes from cycles that grow out of steady
+sliding or die away to it, or, if no recording has such cycles, from regular cycles at several
+stiffnesses. Cycles with sticks are not used: their force rises at K V/W0, that of a sine at
+pi drop/T.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from asperity.measurement.stick_slip.events import SlipEvents
 #: by less than this factor, and if their drops range over at least the second factor.
 _LONGER, _RANGE = 1.25, 1.3
 #: A cycle is small if the largest slope of a sine of its drop and period is below this multiple of
-#: K V/W0. Periods of growing cycles of random truth are up to 5 % longer than those of vanishing
-#: ones at 1.2, 14 % at 1.5 and 27 % at 2; with sticks the ratio is 2.6 to 3 and the period 3 to 6
-#: times as long.
+#: K V/W0. In simulated recordings growing cycles at 1.2, 1.5 and 2 times K V/W0 have periods up to
+#: 5, 14 and 27 % longer than vanishing cycles; cycles with sticks are at 2.6 to 3, and have periods
+#: 3 to 6 times as long.
 _SLOPE = 2.0
 #: Fewest small cycles, and factor by which drops must grow or die to exclude chance.
 _FEWEST, _GROWTH = 3, 3.0
@@ -72,7 +73,7 @@ class Threshold:
         have one error in common: n of them have sqrt(n) times the uncertainty, so that their mean
         is no surer than each. NaN where there is no bracket.
     frequency, frequency_err : float
-        Frequency of vanishing oscillations at the threshold (Hz); NaN where it cannot be told.
+        Frequency of vanishing oscillations at the threshold (Hz); NaN where it is not known.
     sticks_at, slides_at : float
         The bracket: largest K/W0 with stick-slip and smallest with steady sliding (1/m); NaN where
         there is none.
@@ -157,7 +158,7 @@ def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
     Returns
     -------
     list of Threshold
-        In rising velocity; one with a `reason` where it cannot be told.
+        In rising velocity; where a threshold is not known, its `reason` says why.
     """
     table = [row for row in rows if all(row.get(n) for n in ("V", "K", "W0", "regime"))]
     table.sort(key=lambda row: row["V"])
@@ -229,7 +230,7 @@ def _frequency(group: list[Mapping[str, Any]], centre: float) -> tuple[float, fl
 
 
 def write_thresholds(path: Path, table: Sequence[Threshold]) -> None:
-    """Write thresholds as `asperity recipe` takes them; what cannot be told is a comment.
+    """Write thresholds as `asperity recipe` takes them; velocities without one are comments.
 
     Parameters
     ----------

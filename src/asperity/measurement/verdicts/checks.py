@@ -141,7 +141,7 @@ def drift_rate(reading: LockInReading) -> Rate:
 
 
 def stick_slip(reading: LockInReading, time: Float, force: Float) -> Check:
-    """Whether the force oscillates slowly, by itself."""
+    """Whether the force has a slow oscillation that the load does not cause."""
     line = other_line(reading, time, force, 1)
     number, sentence, seen = 0.0, "no slow oscillation is significant", False
     if line is not None:

@@ -1,10 +1,11 @@
 """Faults of the instrument: repeated samples, a computed force, mains, flat tops.
 
-A waveform that is clipped before the recorder's noise is added has no two equal samples: only the
-mean cycle shows it. Two descriptions of the mean cycle are compared by the Bayesian information
-criterion: a sum of harmonics, and one that is cut off above, below or on both sides. Few harmonics
-and a level describe a clipped signal to within its noise, where the corners need many harmonics; a
-smooth signal, be it ever so flat at its top, needs as many harmonics with the level as without.
+A waveform that is clipped before the recorder adds its noise has no two equal samples: only the
+mean cycle shows that it is clipped. Two descriptions of the mean cycle are compared by the Bayesian
+information criterion: a sum of harmonics, and a sum of harmonics that is cut off above, below or on
+both sides. Few harmonics and a level describe a clipped signal to within its noise, while without a
+level its corners need many harmonics. A smooth signal, however flat its top, needs as many
+harmonics with a level as without.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from asperity.measurement.window import LoadInterval
 from asperity.recording.defects.levels import held_length
 
 _PIECE = 1 << 16
-#: Mains frequencies (Hz), how many harmonics of them count, and how far a network wanders (Hz).
+#: Mains frequencies (Hz), number of their harmonics, and largest departure of a network (Hz).
 _MAINS, _MAINS_HARMONICS, _WANDER = (50.0, 60.0), 4, 0.2
 #: A line counts above this multiple of its background, a median. White noise exceeds it at one of
 #: the five spectral values that are searched once in 13,000 times.
@@ -41,25 +42,26 @@ _FILLED = 16
 _MEAN_PERIODS, _MEAN_SAMPLES = 2, 64
 #: Model error of a cycle, as a share of its height.
 _LEFT = 2e-3
-#: Most harmonics of the description that is cut off, and of the one that is not.
+#: Most harmonics of a description that is cut off, and of a description that is not.
 _CUT, _WHOLE = 4, 40
 #: Initial shares of the period at the level, and most rounds from each.
 _STARTS, _ROUNDS = (0.06, 0.12, 0.2, 0.3, 0.4, 0.48), 12
 #: Smallest and largest share of the period at a level: below, little is cut off; above, there is
 #: more level than signal.
 _SHARES = (0.05, 0.55)
-#: How much better the description that is cut off must be. Of 1,500 cycles of three harmonics with
-#: noise, and of 2,598 of orbits of four laws, two of them with inertia too (0.1 to 100 um/s,
-#: epsilon 0.01 to 0.8, 1 to 316 Hz, noise of 0.3, 3 and 30 % of mu1), the highest are at 8.5, 7.8,
-#: 7.8 and 6.2; cycles that are cut off at half their height under noise of 30 % are at 14 to 51.
+#: Smallest gain in the criterion at which a cycle counts as cut off. Of 1,500 cycles of three
+#: harmonics with noise, and of 2,598 of orbits of four laws, two of them with inertia too (0.1 to
+#: 100 um/s, epsilon 0.01 to 0.8, 1 to 316 Hz, noise of 0.3, 3 and 30 % of mu1), the highest gains
+#: are 8.5, 7.8, 7.8 and 6.2; cycles that are cut off at half their height under noise of 30 % have
+#: gains of 14 to 51.
 _MARGIN = 12.0
 
 
 def held_samples(reading: LockInReading, load: Float, force: Float) -> Check:
-    """Whether a channel repeats samples, as one does that is converted slower than recorded.
+    """Whether a channel repeats samples, because it is converted more slowly than recorded.
 
-    The value of each run of k equal samples belongs to its beginning: a harmonic of frequency f
-    lags by pi f (k - 1)/rate and is smaller by the sinc of that.
+    The value of a run of k equal samples belongs to its first sample: a harmonic of frequency f
+    lags by pi f (k - 1)/rate and is smaller by the sinc of this angle.
     """
     number, sentence = 0.0, "no channel repeats its samples"
     rate = (reading.samples - 1) / (reading.end - reading.start)
@@ -77,10 +79,10 @@ def held_samples(reading: LockInReading, load: Float, force: Float) -> Check:
     return LOCK_IN.check("held samples", number, sentence)
 
 
-def made_force(
+def computed_force(
     reading: LockInReading, samples: Samples, time: Float, load: Float, force: Float
 ) -> tuple[Check, ...]:
-    """That the force was made of a friction coefficient, if it was, and whether it can be right.
+    """Whether a force that was computed as friction times load can be right.
 
     A recorder that divides the force by a mean load gives a coefficient that the load does not
     modulate; times the instantaneous load it makes a force in proportion to the load.
@@ -99,16 +101,16 @@ def made_force(
         f"the force was made from friction x load ('{name}'); the recorded coefficient is "
         f"modulated by {number:.2g} of epsilon times its mean"
     )
-    if number < LOCK_IN["made force"][0]:
+    if number < LOCK_IN["computed force"][0]:
         sentence += (
             ". It hardly follows the load: if the recorder divided by a mean load, mu1 and phase1 "
             "are those of the load and not of the friction; use the recorded shear force"
         )
-    return (LOCK_IN.check("made force", number, sentence),)
+    return (LOCK_IN.check("computed force", number, sentence),)
 
 
 def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -> Check:
-    """Whether what is taken for the modulation can be the mains in the load's signal.
+    """Whether the modulation can be hum of the mains in the load's signal.
 
     A line that vanishes in the pauses of the recording is not the mains.
     """
@@ -126,7 +128,7 @@ def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -
         switched |= quiet and line + background < _SWITCHED * number * abs(reading.W0)
     sentence = (
         f"the modulation, epsilon = {number:.3g} at {f:.6g} Hz, lies at a harmonic of the mains "
-        f"({near[0]:g} Hz); so small a one may be hum in the load's signal and no modulation"
+        f"({near[0]:g} Hz); so small a modulation may be hum in the load's signal"
         if number < LOCK_IN["mains"][0] and not switched
         else f"the modulation lies at a harmonic of the mains ({near[0]:g} Hz), and is "
         + ("switched off in the pauses" if switched else "larger than hum usually is")
@@ -173,7 +175,7 @@ def lines_in_the_pauses(
                 sentence = (
                     f"without modulation the force has a line of {number:.2g} mu{n} "
                     f"{symbol('W0')} at {f:.6g} Hz: mains, cross-talk or the drive, "
-                    "which is part of what is read"
+                    "which is part of the reading"
                 )
                 largest = number, sentence, seen
     if largest is None:
@@ -185,7 +187,7 @@ def lines_in_the_pauses(
 
 
 def hum(reading: LockInReading, time: Float, force: Float) -> Check:
-    """Whether hum at other harmonics of the mains says that there is some at the modulation too."""
+    """Whether hum at other harmonics of the mains makes hum at f or 2f likely."""
     f = reading.frequency
     number, sentence, seen = 0.0, "no hum is to be expected at the modulation or its double", False
     for base in _MAINS:
@@ -304,8 +306,8 @@ def _mean_cycle(reading: LockInReading, time: Float, values: Float, channel: int
 
 
 def _compared(cycle: _Cycle) -> tuple[float, _Level]:
-    """How much better a cycle is described cut off than whole, and how it is cut off."""
-    # Squares of a mean that is large would leave no digits to the cycle.
+    """Gain in the criterion of the best description that is cut off, and this description."""
+    # With a large mean the squares would leave no digits to the cycle.
     cycle = cycle._replace(value=cycle.value - cycle.value.mean())
     size = cycle.value.size
     most = min(_WHOLE, (size - 4) // 2)
@@ -330,10 +332,10 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
 
 
 def _cut_off(cycle: _Cycle, columns: Float, side: str, share: float, seen: set[bytes]) -> _Level:
-    """Harmonics that are cut off, fitted where they are not: levels and harmonics in turns.
+    """Harmonics that are cut off: harmonics fitted inside the levels, then levels, in turns.
 
-    What is beyond a level decides all that follows: where that was `seen` from another start, the
-    end is the same, and is not computed again.
+    The phases beyond the levels determine all later rounds: phases that were `seen` from another
+    start lead to the same end, and are not computed again.
     """
     value, weight = cycle.value, 1 / cycle.doubt
     squares, rows, right = weight**2, columns * weight[:, None], value * weight

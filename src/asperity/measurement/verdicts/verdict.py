@@ -104,7 +104,7 @@ LOCK_IN = Limits(
         "steady load": (0.01, 0.05),
         "shifting response": (0.07, 0.4),
         "held samples": (0.01, 0.1),
-        "made force": (0.3, -1.0),
+        "computed force": (0.3, -1.0),
         "mains": (0.02, 0.005),
         "lines in the pauses": (0.02, 0.2),
         "hum": (0.05, 0.5),

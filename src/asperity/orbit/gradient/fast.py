@@ -110,7 +110,7 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
 
 
 def fast_values(parameters: Parameters, fast: FastOrbits, program: Program) -> ResponseValues:
-    """Response of the orbits, with its derivatives to the parameters."""
+    """Response of the orbits, with its derivatives by the parameters."""
     problem = program.equations.problem(only_where(fast.converged, parameters))
     equations = _equations(program)
     unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)

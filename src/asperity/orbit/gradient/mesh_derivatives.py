@@ -1,12 +1,12 @@
-"""Derivatives of orbits on meshes by the implicit function theorem, without knowing the law.
+"""Derivatives of orbits on meshes by the implicit function theorem, for any law.
 
-With D the collocation equations of an orbit Y for parameters p, D(p, Y) = 0, its derivative is
--D_Y^-1 D_p: the linear equations of a Newton step, for all parameters at once. What a law has to
-give is in `asperity.slider.pointwise`.
+With D the collocation equations of an orbit Y for parameters p, D(p, Y) = 0, the derivative of the
+orbit is -D_Y^-1 D_p: the linear equations of a Newton step, for all parameters at once.
+`asperity.slider.pointwise` evaluates the law.
 
-The derivative of a multiplier m with the right eigenvector v and the left one w of the monodromy
-matrix T_M ... T_1 is sum_i w_i (dT_i) v_i / (w_i T_i v_i), with both carried along the transfer
-maps T_i.
+The derivative of a multiplier m is sum_i w_i (dT_i) v_i / (w_i T_i v_i), where the right
+eigenvector v and the left eigenvector w of the monodromy matrix T_M ... T_1 are carried along the
+transfer maps T_i.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from asperity.slider.problem import Problem
 
 #: Number of right-hand sides that are solved together; shorter sets are padded.
 _SIDES = 8
-#: Largest relative difference of multipliers on the mesh from the known ones.
+#: Largest relative difference of multipliers on the mesh from the known multipliers.
 _MULTIPLIER_GAP = 1e-5
 
 
@@ -60,7 +60,7 @@ def orbit_derivatives(
     logs: Complex | None = None,
     names: Collection[str] | None = None,
 ) -> Float:
-    """Derivatives of mean, harmonics and multipliers to the parameters.
+    """Derivatives of mean, harmonics and multipliers by the parameters.
 
     Parameters
     ----------
@@ -71,16 +71,16 @@ def orbit_derivatives(
         Converged orbits.
     harmonics : int
     logs : complex array, shape (size, points), optional
-        Logarithms of the multipliers, whose derivatives are wanted too. They are NaN where the mesh
-        does not resolve them.
+        Logarithms of the multipliers, to add their derivatives, which are NaN where the mesh does
+        not resolve the multipliers.
     names : collection of str, optional
-        Parameters that derivatives are wanted to; all by default. The others are zero.
+        Parameters with derivatives; all by default. Derivatives by other parameters are zero.
 
     Returns
     -------
     array, shape (parameters, points, columns)
-        Columns are the mean, the real and the imaginary parts of the harmonics, and those of the
-        logarithms of the multipliers.
+        Columns are the mean, then the real and the imaginary parts of the harmonics, then those of
+        the logarithms of the multipliers.
     """
     with np.errstate(all="ignore"):
         given, points = equations.influential(names), len(problem.system.V)
@@ -105,9 +105,9 @@ def orbit_derivatives(
 
 
 def _slopes(problem: Problem, orbit: Orbit, directions: Problem) -> tuple[Float, Float, Float]:
-    """Changes of rates (size, STAGES, directions, ...) and F/W0 (directions, STAGES, ...).
+    """Derivatives of rates and of F/W0 by the parameters, and of F/W0 by each state.
 
-    With the parameters, at fixed states; then those of F/W0 with each state, (size, STAGES, ...).
+    Shapes are (size, STAGES, directions, ...), (directions, STAGES, ...) and (size, STAGES, ...).
     """
     count, parts = len(directions.system.V), []
     for start in range(0, count, _SIDES):

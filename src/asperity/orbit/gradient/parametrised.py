@@ -23,7 +23,7 @@ from asperity.parameters import RULES, Parameter, law_parameters, point_paramete
 from asperity.parameters.arguments import typed
 from asperity.slider import Motion, QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
-from asperity.slider.named import equation_parameters, slider_from, slider_values, with_value
+from asperity.slider.parameters import equation_parameters, slider_from, slider_values, with_value
 from asperity.slider.problem import Problem
 
 #: Series of a `Periodic` load, as the names of their coefficients begin.

@@ -43,8 +43,8 @@ MESHES = (216, 648, 1944)
 #: the relative error of the derivatives some thousand times larger (the pulse's shift divided by
 #: its width).
 _AGREEMENT = (1e-10, 1e-8)
-#: The same between two successive meshes: the finer mesh has an error smaller by 3^8, for a stiff
-#: orbit by 3^4.
+#: Largest relative difference between two successive meshes. The error of the finer mesh is smaller
+#: by 3^8, for a stiff orbit by 3^4.
 _MESH_AGREEMENT = (1e-8, AGREEMENT)
 
 
@@ -53,9 +53,9 @@ _MESH_AGREEMENT = (1e-8, AGREEMENT)
 _FEW_NODES = NODES[:2]
 
 
-#: Attempts of Newton's method, each on a new mesh: of 9,100 orbits of fits under slow modulation
-#: the first attempt found 7,500 and the second 98. A third and a fourth would find 21 and 10 more
-#: and take a third of the time.
+#: Attempts of Newton's method, each on a new mesh. Of 9,100 orbits of fits under slow modulation
+#: the first attempt found 7,500 and the second 98. A third and a fourth attempt would find 21 and
+#: 10 more, in half as much time again.
 _ROUNDS = 2
 #: Patience of Newton's method for coarse orbits, in a single attempt. Of 36,000 orbits 136 converge
 #: only after three steps without a smaller change, and 62 % of the steps of failed attempts come
@@ -127,9 +127,9 @@ class KnownOrbits:
     known : bool array, shape (points,)
         Whether an orbit of each point is known.
     near : bool array, shape (points,)
-        Whether the known orbit belongs to parameters so similar that a direct search tries no
-        initial guess but a transient where Newton's method fails from this orbit: of 204 such rows
-        of twelve tables the other guesses found two orbits, and transients 126.
+        Whether the known orbit belongs to nearly the same parameters. Where Newton's method fails
+        from such an orbit, a direct search tries only a transient: of 204 such rows of twelve
+        tables the other initial guesses led to two orbits, and transients to 126.
     """
 
     points: Annotated[int, at_least(0)]
@@ -150,8 +150,8 @@ class KnownOrbits:
             put(self.orbit, index, orbit)
             return
         remesh = partial(remeshed, intervals=FIRST_MESH)
-        inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
-        for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
+        inputs, points = (take(problem, index), orbit), np.arange(len(index))
+        for part, kept in run_chunks(remesh, inputs, points, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
     def complete(
@@ -171,9 +171,9 @@ class KnownOrbits:
     def picked(self, index: Index) -> KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
-        others = KnownOrbits(len(index), orbit)
-        others.known[:], others.near[:] = self.known[index], self.near[index]
-        return others
+        picked = KnownOrbits(len(index), orbit)
+        picked.known[:], picked.near[:] = self.known[index], self.near[index]
+        return picked
 
 
 def followed_orbits(
@@ -198,10 +198,10 @@ def followed_orbits(
     meshes : tuple of int
         Numbers of intervals, rising. If empty, orbits are coarse: on `FIRST_MESH`, unchecked.
     numbers : complex array, shape (1 + harmonics, points), optional
-        Mean and harmonics, where they are known. Otherwise each mesh is compared with the one
-        before, the first with `FIRST_MESH`, and a point that Newton's method fails on is left out.
+        Mean and harmonics, if they are known. Otherwise each mesh is compared with the preceding
+        mesh, the first with `FIRST_MESH`, and points at which Newton's method fails are left out.
     patient : bool
-        Whether Newton's method makes all attempts of an orbit; otherwise it makes one, and ends it
+        Whether Newton's method makes all attempts. Otherwise it makes a single attempt, which ends
         after `_PATIENCE` steps without a smaller change.
 
     Yields
@@ -260,13 +260,13 @@ def search_orbits(
     parameters : dict of str to array, shape (points,)
     wanted : bool array, shape (points,)
     direct : bool
-        Whether only to solve each point independently, without following branches: from the known
-        orbits, by series under slow modulation, from the averaged limit, and from transients.
+        Whether to solve each point by itself, without following branches: from the known orbits, by
+        series under slow modulation, from the averaged limit, and from transients.
     coarse : bool
         Whether a direct search takes orbits on the coarsest mesh, unchecked.
     motions : bool, optional
-        Whether a direct search integrates a transient for each orbit that it does not find
-        otherwise; by default it does unless `coarse`.
+        Whether a direct search integrates a transient for each point without an orbit from other
+        initial guesses; by default it does unless `coarse`.
     known : KnownOrbits, optional
         Orbits of the first points. The search stores the orbits that it finds there, and a direct
         search takes its initial guesses from there.

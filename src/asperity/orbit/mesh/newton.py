@@ -66,7 +66,7 @@ class Plane(NamedTuple):
 
     @classmethod
     def of_fixed_parameters(cls, orbit: Orbit) -> Plane:
-        """Dt = 0."""
+        """The equation dt = 0."""
         return cls(np.zeros_like(orbit.nodes), np.ones(orbit.nodes.shape[-1]))
 
 
@@ -87,7 +87,8 @@ class NewtonStep(NamedTuple):
     largest : array, shape (points,)
         Largest change of the slip exponent and of a logarithmic state at the collocation points.
     error : array, shape (points,)
-        The same with t, and with forces and velocities relative to their swing.
+        The largest of `largest`, the change of t, and changes of forces and velocities relative to
+        their ranges over the period.
     """
 
     change: Change
@@ -103,7 +104,7 @@ class NewtonResult(NamedTuple):
     orbit : Orbit
     t : array, shape (points,)
     error : array, shape (points,)
-        Last change, inf where it was not finite.
+        Size of the last step; inf where it was not finite.
     steps : int array, shape (points,)
     """
 
@@ -129,7 +130,7 @@ def _step(
     widths, nodes, slopes = orbit
     a, b = coefficients
     defect = constant[:, :, 0]
-    # Without a direction of the parameters t does not matter to the equations.
+    # Without a direction of the parameters the equations do not depend on t.
     column = constant[:, :, 1] if constant.shape[2] > 1 else jnp.zeros_like(defect)
     gain = widths * jnp.einsum("k,nkmb->nmb", b, column)
     gap = jnp.roll(nodes, -1, axis=1) - nodes
@@ -226,8 +227,7 @@ def solve_in_plane(
     plane : Plane
     max_steps : int
     tolerance : float
-        On the last change: of the slip exponent and the logarithmic states absolutely, of forces
-        relative to their swing.
+        Bound on `NewtonStep.error` of the last step.
     few : int
         Number of points that may be left unfinished.
     patience : float
@@ -239,8 +239,8 @@ def solve_in_plane(
     error, steps = np.full(t.shape, np.inf), np.zeros(t.shape, int)
     smallest, waited = error.copy(), steps.copy()
     for _ in range(max_steps):
-        going = (error > tolerance) & (waited < patience)
-        if going.sum() <= few:
+        active = (error > tolerance) & (waited < patience)
+        if active.sum() <= few:
             break
         equations = condensed(problem, orbit, direction, at=at)
         # The guess lies in the plane, and every change keeps it there.
@@ -248,10 +248,10 @@ def solve_in_plane(
         with np.errstate(invalid="ignore", divide="ignore"):
             shortened = np.minimum(1.0, _LARGEST_CHANGE / step.largest)
         # Converged points are not changed while other points of the chunk iterate.
-        change = Change(*(np.where(going, part, 0.0) for part in step.change))
+        change = Change(*(np.where(active, part, 0.0) for part in step.change))
         orbit, t = moved(orbit, t, change, shortened)
         size = np.where(np.isfinite(step.error), step.error, np.inf)
-        error, steps = np.where(going, size, error), steps + going
+        error, steps = np.where(active, size, error), steps + active
         waited = np.where(error < smallest, 0, waited + 1)
         smallest = np.minimum(error, smallest)
         if direction is not None:
@@ -270,7 +270,7 @@ def solve(
     result = solve_in_plane(
         lambda _: (problem, None), guess, t, plane, max_steps=max_steps, few=few, patience=patience
     )
-    # The last points of a chunk continue in a smaller chunk, whose steps take less time.
+    # The last few points continue in a smaller chunk, whose steps take less time.
     taken = int(result.steps.max())
     left = np.flatnonzero((result.error > TOLERANCE) & (result.steps == taken))
     if 0 < len(left) <= few and taken < max_steps:
@@ -297,7 +297,7 @@ def remeshed(problem: Problem, orbit: Orbit, intervals: int) -> Orbit:
 
 
 def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
-    """Weight of each state's error, shape (size, intervals, points): what it does to the slip."""
+    """Weight of each state's error, shape (size, intervals, points): its effect on the slip."""
     system = problem.system
     scales = np.abs(values.slip_gradient).mean(1)
     swing = np.abs(orbit.nodes).max(1) + least_swing(system, orbit.nodes.shape[-1])
@@ -316,12 +316,10 @@ def refined_orbit(
     rounds: int = _ROUNDS,
     patience: float = math.inf,
 ) -> tuple[Orbit, T, Float]:
-    """The orbit on an equidistributed mesh of `intervals`, what is read of it, and its error.
+    """The orbit on an equidistributed mesh of `intervals`, the result of `read`, and the error.
 
-    The error is the last change by Newton's method.
-
-    Where Newton's method failed, the orbit is the guess on the new mesh, a better initial guess for
-    a finer one than the last iterate.
+    The error is the size of the last Newton step. Where Newton's method failed, the orbit is the
+    guess on the new mesh: for a finer mesh it is a better initial guess than the last iterate.
     """
     first, result = _attempt(problem, guess, intervals, patience)
     mesh, points = jax.tree.map(np.copy, first), len(result.error)

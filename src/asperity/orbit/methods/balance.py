@@ -1,8 +1,8 @@
 """The fast method with inertia and radiation damping: Fourier collocation of slow states.
 
 The elongation z = f + l F_i/W of spring and joint and the states of the law change little within a
-period, as without inertia. What changes much is the friction g = F_i/W, which the balance of forces
-gives on the whole grid at once. With slip u = v_pl/V, slider velocity v = u + g'/s and mobility m,
+period, as without inertia. The friction g = F_i/W changes much; the balance of forces gives it on
+the whole grid at once. With slip u = v_pl/V, slider velocity v = u + g'/s and mobility m,
 
     g''/(m s) + (d/s) g' + (w + l) g + d u + u'/m = z + S,      dz/dtheta = kappa (p - u),
 
@@ -55,9 +55,10 @@ _NEAR = 3e-2
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
-#: Tolerance on the error: harmonics may be much smaller than the states. Most steps on a grid.
+#: Tolerance on the error, small because harmonics may be much smaller than the states; and the
+#: largest number of steps on a grid.
 _TOLERANCE, _MOST_STEPS = 1e-11, 40
-#: Steps for a linear system, more than the orbit took.
+#: Number of steps for a linear system beyond that of the orbit.
 _MORE_STEPS = 3
 #: Tolerance on the averaged limit from which the iteration starts.
 _AVERAGED_TOLERANCE = 1e-2
@@ -135,7 +136,7 @@ class BalanceEquations(Equations):
         D, c = self.derivative, _coefficients(problem)
         n, ones, none = range(len(slow)), jnp.ones_like(g), jnp.zeros_like(g)
         _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
-        # Change of slip with friction and with the states of the law, one after the other.
+        # Derivatives of the slip by the friction and by each state of the law.
         softening, *by_state = (push(*(ones if i == j else none for i in n)) for j in n)
         matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (
             c.damping * c.elastic + c.inertness * softening[None]
@@ -179,8 +180,8 @@ class BalanceEquations(Equations):
         new, change = self._advance(problem, cycle, unknowns, at, moved, _LARGEST_CHANGE)
         parts = zip(new.zero_mean, unknowns.zero_mean, strict=True)
         moves = [jnp.abs(a - b).max(0) for a, b in parts]
-        # z relative to its size, because its rate has the round-off of kappa; the other states are
-        # exponents.
+        # The change of z counts relative to z, because its rate has the round-off of kappa; the
+        # other states are exponents.
         moves[0] /= jnp.abs(new.zero_mean[0]).max(0) + 1e-3 * problem.system.kappa
         return new, jnp.stack([leap, *moves, *map(jnp.abs, change)]).max(0)
 
@@ -385,14 +386,14 @@ _LEAST_SWING = 0.2
 def sticking_joint(
     problem: Problem, at: Excitation, theta: np.ndarray, softening: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
-    """The swing of a slider on a joint that sticks, for a unit of elongation z of spring and joint.
+    """The motion of a slider on a joint that sticks, per unit of elongation z of spring and joint.
 
     Under a harmonic load the harmonics of F_i/W obey
 
         (1 + l + impedance_n) G_n + eps/2 (G_{n-1} + G_{n+1}) = delta_{n0},
 
-    a three-term recurrence, whose minimal solution is a continued fraction. Another load is carried
-    as without inertia and damping.
+    a three-term recurrence, whose minimal solution is a continued fraction. Under other loads the
+    function leaves out inertia and damping.
 
     Parameters
     ----------

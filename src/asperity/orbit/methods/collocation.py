@@ -76,10 +76,7 @@ def refine(
 
 
 def _finish(problem: Problem, solution: Solution, orbit: Orbit, index: Index) -> None:
-    """Resolve multipliers that are not resolved yet, and store the points `index` or discard them.
-
-    Outcomes of these points say which of the three they need.
-    """
+    """Resolve multipliers, and store the points `index` or discard them, according to `outcome`."""
     stiff = index[solution.outcome[index] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     resolve_multipliers(problem, solution, orbit, stiff)
     converged = solution.converged[index]
@@ -89,16 +86,15 @@ def _finish(problem: Problem, solution: Solution, orbit: Orbit, index: Index) ->
 
 def _store_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Index) -> None:
     """Write waveforms and orbits of the points `rows` to `solution`, if they were requested."""
+    chunk = mesh_chunk(problem.system.size)
     phases = solution.waveform.shape[1]
     if phases:
-        chunk = mesh_chunk(problem.system.size)
         sample = partial(waveform, phases=phases)
         for part, samples in run_chunks(sample, (problem, orbit), rows, chunk):
             solution.waveform[..., part] = samples
     intervals = len(solution.orbit.mesh) - 1
     if intervals:
         remesh = partial(remeshed, intervals=intervals)
-        chunk = mesh_chunk(problem.system.size)
         for part, kept in run_chunks(remesh, (problem, orbit), rows, chunk):
             put(solution.orbit, part, kept)
 
@@ -163,8 +159,8 @@ class Collocation(Method):
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`."""
         solution = Solution.unsolved(problem, options)
-        everyone = np.arange(len(solution.outcome))
-        orbit, solved = orbits_from_averaged_limit(problem, everyone)
+        points = np.arange(len(solution.outcome))
+        orbit, solved = orbits_from_averaged_limit(problem, points)
         refine(problem, solution, orbit, solved, options)
         options.progress(int(solution.converged.sum()))
         return solution
@@ -193,7 +189,7 @@ def orbits_from_averaged_limit(
     Orbit
         Of all points, on `FIRST_MESH` intervals.
     array of int
-        The points that Newton's method converged at.
+        The points at which Newton's method converged.
     """
     system, solved = problem.system, [index[:0]]
     orbit = Orbit.empty(scheme_for(system), system.size, FIRST_MESH, len(system.V))
@@ -208,8 +204,8 @@ def orbits_from_averaged_limit(
 def _first_orbit(problem: Problem, patience: float) -> tuple[Orbit, Float]:
     """Collocation from the averaged limit, with an error for each point.
 
-    The averaged limit is that of the quasi-static equations. Their orbit is the initial guess of
-    equations with inertia.
+    The averaged limit is that of the quasi-static equations, whose orbit is the initial guess for
+    the equations with inertia.
     """
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
@@ -226,7 +222,7 @@ def _first_orbit(problem: Problem, patience: float) -> tuple[Orbit, Float]:
 
 @jit_large
 def _averaged_states(sliding: Problem) -> Array:
-    """The averaged limit, (size, points), from samples where collocation has them."""
+    """The averaged limit, (size, points), from samples of the load at the collocation points."""
     points = points_of(sliding)
     mesh = graded_mesh(FIRST_MESH, 1, _GRADING)
     widths = np.diff(mesh, axis=0)
@@ -239,7 +235,7 @@ def _averaged_states(sliding: Problem) -> Array:
 
 @jit_large
 def _converted(problem: Problem, states: Array, slopes: Array, theta: Array) -> tuple[Array, Array]:
-    """States of the problem from quasi-static ones, (size, ..., points), and their slopes."""
+    """States of the problem from quasi-static states, (size, ..., points), and their slopes."""
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
 
@@ -274,8 +270,8 @@ def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
 
 #: Each interval is divided into 3, 9, 27... parts for finer transfer maps, up to this total number.
 _MOST_INTERVALS = 35_000
-#: Largest number of intervals of all points for work on whole chunks of points (some 200 MB).
-_MOST_SIDE_BY_SIDE = 100_000
+#: Largest number of intervals of all points of a chunk (some 200 MB).
+_MOST_IN_CHUNK = 100_000
 
 #: Mean logarithm of the multipliers, exact by Liouville's formula, above which the largest
 #: multiplier overflows a double, and above which no mesh resolves the other ones.
@@ -308,7 +304,7 @@ def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, inde
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_INTERVALS]
     for parts in splits:
         solve = partial(split_observables, parts=parts)
-        most = _MOST_SIDE_BY_SIDE // (intervals * parts)
+        most = _MOST_IN_CHUNK // (intervals * parts)
         chunk = tuple(k for k in mesh_chunk(problem.system.size) if k <= most) or 1
         for part, observables in run_chunks(solve, (problem, orbit), index, chunk):
             logs = observables.log_multipliers

@@ -54,10 +54,10 @@ _LARGEST_CHANGE = 1.5
 _CONVERGED = 1e-9
 #: Number of steps after which a point with a large last change is abandoned.
 _PATIENCE, _FAR = 7, 0.5
-#: Largest change of a state from one series to the next at which the latter is exact: errors fall
-#: exponentially with the nodes.
+#: Largest change of a state from one series to the next at which the second series is exact:
+#: errors fall exponentially with the number of nodes.
 _AGREED = 1e-10
-#: Share of the first harmonic that round-off may reach: the accuracy that is promised of mu1.
+#: Largest share of round-off in the first harmonic: the accuracy of mu1 that is promised.
 _DIGITS = 1e-8
 #: Limit of the extrapolated error of the longest series, below which that series is tried.
 _HOPEFUL = 1e-8
@@ -89,8 +89,8 @@ class FourierSeries(Method):
 def follows_steady_sliding(problem: Problem, index: Index) -> Index:
     """The points of `index` at which a slider follows a modulation slower than its relaxation.
 
-    Steady sliding is stable at all phases there. Where it is not, the slider may leave the orbit of
-    a series for slip events, and the motion decides which orbit is the one that is measured.
+    Steady sliding is stable at all phases there. At other points the slider may leave the orbit of
+    a series for slip events, and only a transient shows which orbit it reaches.
     """
     slow = index[steady_sliding(take(problem, index))[0] >= _SLOW] if len(index) else index
     growths = run_chunks(adiabatic_growth, (problem,), slow, FEW)
@@ -105,8 +105,8 @@ def series_orbits(
 ) -> tuple[Orbit, Index]:
     """Orbits of the points `index` of a problem (NumPy arrays) on even intervals.
 
-    Also returned are the points that a series of one of the `numbers` of nodes resolves. Orbits of
-    the others are the last series, an initial guess.
+    Also returned are the points that a series of one of the `numbers` of nodes resolves. At other
+    points the orbit is the last series, an initial guess.
     """
     system, resolved = problem.system, [index[:0]]
     scheme = scheme_for(system)
@@ -148,10 +148,10 @@ def _solve(problem: Problem, numbers: tuple[int, ...]) -> tuple[Complex, Bool]:
 
 
 def _above_round_off(problem: Problem, Y: Float, at: Index) -> Bool:
-    """Whether round-off leaves the first harmonic of the first state at each point its digits.
+    """Whether round-off changes the first harmonic of the first state by less than `_DIGITS`.
 
-    A step from a solution is round-off; other nodes round differently. Heavy sliders move so little
-    that it may be all they do. Without modulation there is no harmonic to resolve.
+    A Newton step from the solution, resampled to other nodes, has the size of round-off. Heavy
+    sliders may move less than round-off. Without modulation there is no harmonic to resolve.
     """
     again = _resampled(Y, Y.shape[1] + 2)
     _newton(problem, again, at, 1)
@@ -174,9 +174,8 @@ def _newton(problem: Problem, Y: Float, at: Index, most_steps: int) -> Index:
             break
         values = values_at(system, excitation, np.zeros_like(Y[:, 0]), Y)
         rates, jacobian = values.rates, values.jacobian
-        usable = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
-        finite = np.asarray(usable)
-        at = at[finite[at]]
+        finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
+        at = at[np.asarray(finite)[at]]
         gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at], optimize=True)
         try:
             step = _solved(jacobian[..., at], derivative, gap)

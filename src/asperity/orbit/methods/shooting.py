@@ -7,10 +7,10 @@
 The determinant of the monodromy matrix is compared with Liouville's formula, a quadrature that
 does not use the integrated derivatives. Points that fail a check are left to other methods.
 
-States and their derivatives to the first states are integrated by the explicit method of order 8
-of Dormand and Prince, all operating points in lock step and without step-size control: E. Hairer,
-S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (Springer, 1993),
-section II.5. The derivatives at the end of the period are the monodromy matrix.
+States and their derivatives with respect to the initial states are integrated by the explicit
+method of order 8 of Dormand and Prince, all operating points in lock step and without step-size
+control: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+(Springer, 1993), section II.5. The derivatives at the end of the period are the monodromy matrix.
 
 The initial guess is the averaged limit of a slider that swings on its asperities, as that of
 `asperity.orbit.methods.balance`, with a mean relaxation by slip.
@@ -57,7 +57,7 @@ def averaged_start(problem: Problem) -> tuple[Array, Array]:
     at = at._replace(w=at.w * points)
     softening = _softening(problem, points)
     swing, velocity = sticking_joint(problem, at, theta, softening)
-    # The load under which a joint without inertia carries as much.
+    # The load under which a joint without inertia carries the same force.
     w = 1 / swing - quasi_static.compliance_ratio
     centre = averaged_limit(quasi_static, at._replace(w=w), np.full(_NODES, 1 / _NODES)).centre
     Y = jnp.stack(centre)[:, None]
@@ -83,7 +83,7 @@ def _softening(problem: Problem, points: Array) -> Array:
 
 
 class _Divisions(NamedTuple):
-    """Numbers of steps in the period, coarse to fine."""
+    """Numbers of steps in the period: for Newton's method, and for the refinement."""
 
     fastest: float  # relaxation by slip per radian that they resolve
     coarse: int  # number of steps of Newton's method
@@ -99,8 +99,8 @@ _DIVISIONS = (
     _Divisions(40.0, 32, (64, 128, 256, 512), 0.6),
 )
 
-#: Points in a call, where there are many and where few are left; no powers of two, at which
-#: arrays share cache lines.
+#: Points in a call while many are left, and when few are left; no powers of two, at which arrays
+#: share cache lines.
 _CHUNK, _FEW = 240, 24
 
 #: Newton steps on a division, and the largest change of an exponent in one.
@@ -137,7 +137,7 @@ class Shooting(Method):
         guess, relaxation = np.empty((size, len(rows))), np.empty(len(rows))
         for members, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
             guess[:, members], relaxation[members] = values
-        # Points of like difficulty belong together.
+        # Points of similar difficulty belong together.
         rows = np.argsort(relaxation, kind="stable")
         for divisions in _DIVISIONS:
             chosen = rows[relaxation[rows] <= divisions.fastest]
@@ -169,7 +169,7 @@ def _refine(
         In the order in which they are solved.
     """
     size, points = first.shape
-    inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
+    inverse = np.zeros((size, size, points))  # of the unit matrix minus the monodromy matrix
     # Results on the previous division; NaN before the first.
     numbers = np.full((1 + options.harmonics, points), np.nan + 0j)
     logs = np.full(first.shape, np.nan + 0j)
@@ -207,7 +207,7 @@ def _refine(
 
 
 def _chords(problem: Problem, first: Float, inverse: Float, rows: Index, steps: Steps) -> Index:
-    """Chord steps with the matrices of a coarser division, in place; the rows left finite."""
+    """Chord steps with the matrices of a coarser division, in place; the rows that stay finite."""
     solve, nearly = partial(chord_step, steps=steps), []
     for _ in range(_CHORDS):
         far = []
@@ -222,7 +222,7 @@ def _chords(problem: Problem, first: Float, inverse: Float, rows: Index, steps: 
 
 
 def _agreed(observed: Observables, numbers: Complex, logs: Complex) -> Bool:
-    """Which points have the numbers of the division before, and Liouville's determinant."""
+    """Points that agree with the preceding division and with Liouville's determinant."""
     determinant = np.linalg.det(np.moveaxis(observed.monodromy, -1, 0))
     with np.errstate(all="ignore"):
         liouville = np.abs(determinant * np.exp(-observed.log_determinant) - 1)
@@ -239,7 +239,7 @@ def _sample(
     steps: Steps,
     grading: float,
 ) -> None:
-    """Write the waveforms of the points `rows`, if any are wanted."""
+    """Write the waveforms of the points `rows`, if they were requested."""
     phases = solution.waveform.shape[1]
     if not phases:
         return
@@ -255,11 +255,11 @@ def _chunk(rows: Index) -> int:
 
 
 def _joined(parts: list[Index]) -> Index:
-    """Rows in order, so that points of like difficulty stay together."""
+    """Rows in order, so that points of similar difficulty stay together."""
     return np.sort(np.concatenate([np.empty(0, dtype=int), *parts]))
 
 
-#: Most steps in a period: the tables of a pass have room for as many, so that one program serves.
+#: Most steps in a period. All tables have this length, so that one compiled program serves all.
 MOST_STEPS = 512
 
 
@@ -280,13 +280,13 @@ class PeriodIntegration(NamedTuple):
     observables : Observables
         Observables of an orbit if the period closes.
     step : array, shape (size, points)
-        Newton's, to be added to the first states.
+        Newton's step, to be added to the initial states.
     leap : array, shape (points,)
-        What it does to the slip exponent and logarithmic states.
+        Largest change of the slip exponent and of a logarithmic state by the step.
     change : array, shape (points,)
-        What it does to these and to the velocity; inf if the slider sticks.
+        The larger of `leap` and the change of the velocity; inf if the slider sticks.
     inverse : array, shape (size, size, points)
-        Inverse of 1 less the monodromy matrix.
+        Inverse of the unit matrix minus the monodromy matrix.
     """
 
     observables: Observables
@@ -299,7 +299,7 @@ class PeriodIntegration(NamedTuple):
 def period_steps(count: int, grading: float, harmonics: int) -> Steps:
     """`count` steps per period, at most `MOST_STEPS`, uniform in tau = theta - g sin(tau).
 
-    A `grading` g > 0, below 1, makes them shorter where a harmonic load is lightest.
+    A `grading` g, 0 <= g < 1, makes the steps shorter where a harmonic load is smallest.
     """
     tau = 2 * np.pi * np.arange(count + 1) / count
     theta = tau + grading * np.sin(tau)
@@ -319,7 +319,7 @@ def _padded(table: np.ndarray) -> np.ndarray:
 
 
 def _slopes(problem: Problem, theta: Array, flow: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Slopes of the states and, where they are there, of their derivatives."""
+    """Slopes of the states and, if `flow` has them, of their derivatives."""
     at = problem.load.at(theta)
     states, *derivatives = flow
     if not derivatives:
@@ -329,9 +329,9 @@ def _slopes(problem: Problem, theta: Array, flow: tuple[Array, ...]) -> tuple[Ar
 
 
 def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
-    """States, and derivatives if any, one step later.
+    """States, and derivatives if `flow` has them, one step later.
 
-    The stages are a loop, so that the rates are compiled once and not for each of them.
+    The stages are a loop, so that the rates are compiled once and not for each stage.
     """
     table = jnp.asarray(dormand_prince_8().A)
     stages, length = table.shape[1], steps.lengths[k]
@@ -352,7 +352,7 @@ def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
 def chord_step(
     problem: Problem, start: Array, inverse: Array, *, steps: Steps
 ) -> tuple[Array, Array]:
-    """First states, and the change as in `PeriodIntegration`, by its `inverse` of orbits nearby."""
+    """Initial states after a step with a given `inverse`, and the change of `PeriodIntegration`."""
 
     def body(k: Array, flow: Any) -> Any:
         return _advance(problem, steps, k, flow)
@@ -439,8 +439,8 @@ def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array)
 def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]:
     """Largest change of slip exponent and logarithmic states by a step, without and with velocity.
 
-    The spring force counts as if the asperities carried all of it. The velocity has no part in what
-    makes the equations nonlinear, but it may be far off.
+    The spring force counts as if the asperities carried all of it. The velocity does not make the
+    equations nonlinear, but may still be far from its solution.
     """
     system, at = problem.system, problem.load.at(0.0)
     names = system.mechanical
@@ -455,7 +455,7 @@ def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]
 
 @partial(jax.jit, static_argnames=("count",))
 def _path(problem: Problem, start: Array, steps: Steps, *, count: int) -> Array:
-    """States at the beginnings of `count` steps less those of the first, (count, size, points)."""
+    """States at the beginnings of `count` steps minus the initial states, (count, size, points)."""
 
     def body(flow: Any, k: Array) -> tuple[Any, Array]:
         return _advance(problem, steps, k, flow), flow[0] - start

@@ -141,8 +141,9 @@ def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
 def _elapsed(raw: NDArray[Any]) -> tuple[Float, str] | None:
     """Seconds since the first time stamp, and this stamp; None if the texts are no time stamps.
 
-    ISO 8601, days before or behind months, hours:minutes:seconds, which go on beyond midnight, and
-    minutes:seconds. Where day and month can be exchanged, the shorter recording is meant.
+    Formats are ISO 8601, dates with the day before or after the month, minutes:seconds, and
+    hours:minutes:seconds, also across midnight. If day and month can be exchanged, the order that
+    makes the recording shorter is used.
 
     Parameters
     ----------

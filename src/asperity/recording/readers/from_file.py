@@ -2,9 +2,9 @@
 
 A reader is a module, or any object, with
 
-- ``is_format(path) -> bool``: whether a file is of the format, by what it holds;
-- ``read(path) -> RawRecording``: its columns as recorded. A reader that has them as keywords
-  takes the user's ``group``, ``delimiter`` or ``decimal`` too, None where the user names none.
+- ``is_format(path) -> bool``: whether the content of a file has the format;
+- ``read(path) -> RawRecording``: the columns of a file as recorded. If this function has keywords
+  ``group``, ``delimiter`` or ``decimal``, it gets the user's values, None by default.
 
 Readers of other packages are entry points in the group ``asperity.readers``, and are tried first.
 """

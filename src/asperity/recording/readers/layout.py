@@ -187,8 +187,8 @@ def _headings(
 ) -> Headings:
     """Headings among the lines above the first row of numbers.
 
-    The last lines with as many cells as the table are taken; commented ones only where no other
-    fits. Next to a row of names and one of units there may be one of descriptions.
+    The last lines with as many cells as the table are taken, lines of comment only where no other
+    line fits. Next to a row of names and a row of units there may be a row of descriptions.
 
     Parameters
     ----------

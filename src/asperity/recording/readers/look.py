@@ -3,11 +3,11 @@
 The header is big-endian: title (20 bytes), number of records (int32), number of channels (int32),
 sweep (int32), ``dtime`` (float32); then 16 (older) or 32 headers of 84 bytes, one a channel: name
 (13 bytes), units (13), gain (float32), comment (50), number of elements (int32). Channels that are
-not used are called ``no_val``. Columns follow, one behind the other.
+not used are called ``no_val``. The columns follow one after the other.
 
-Older files hold big-endian float32, as the header is; newer ones float64 in the byte order of the
-machine that wrote them, mostly little-endian. The header does not state the format, so the size of
-the file decides between 4 and 8 bytes, and the numbers themselves the byte order.
+Older files hold big-endian float32, like the header; newer files hold float64 in the byte order of
+the machine that wrote them, mostly little-endian. The header does not state the format: the size
+of the file decides between 4 and 8 bytes, and the numbers themselves decide the byte order.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Numbers that stand for a missing value, such as -9999 or -999.25.
 
-Loggers and spreadsheets write them where a sensor gave nothing. Such a number is told from a
-reading by its digits, which are nines, and by its place: it is further from every other value of
-its column than any of them is from zero.
+Loggers and spreadsheets write such numbers where a sensor gave no value. They differ from readings
+by their digits, which are nines, and by their distance from every other value of the column, which
+is larger than the distance of any of these values from zero.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _CODE = re.compile(r"-?9{3,}(?:\.(?:9+|25))?")
 
 
 def without_codes(values: Float, name: str) -> tuple[Float, Finding | None]:
-    """Values of a column, NaN in place of numbers that stand for a missing one.
+    """Values of a column, NaN in place of numbers that stand for a missing value.
 
     Parameters
     ----------

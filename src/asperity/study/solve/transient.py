@@ -16,7 +16,7 @@ from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
 from asperity.questions.sweep import NumberTable, Sweep, TransientTable
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 from asperity.study.points import Answers, Points, SweepOutcome
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import InputError
+from asperity.outputs.atomic import replaced
 from asperity.outputs.json import json_content
-from asperity.outputs.written import replaced
 from asperity.study.grid import SweepGrid
 from asperity.study.plan import ATTRIBUTES
 

@@ -17,8 +17,8 @@ import zarr
 
 from asperity.arrays import Float
 from asperity.errors import InputError
+from asperity.outputs.atomic import to_disk
 from asperity.outputs.json import json_content
-from asperity.outputs.written import to_disk
 from asperity.study.plan import OF_CHUNKS, OF_POINTS
 from asperity.study.points import Answers
 from asperity.study.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset

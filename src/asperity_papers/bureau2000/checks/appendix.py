@@ -6,10 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from asperity.air import (
-    bessel_ratio,
-    shear_viscosity_ratio,
-)
+from asperity.air import bessel_ratio, shear_viscosity_ratio
 from asperity.ledger import check
 from asperity_papers.bureau2000.machine import RR, Float, Machine, Mixed, Numbers
 
@@ -27,7 +24,10 @@ def only_fitting_parameter(machine: Machine) -> Mixed:
 
 
 def _layer_by_differences(machine: Machine) -> tuple[Float, NDArray[np.complex128], np.complex128]:
-    """Radii, delta P/delta h of Eq. (35) at 120 Hz by finite volumes, and its sum over rings."""
+    """Radii, delta P/delta h of Eq. (35) at 120 Hz by finite volumes, and its sum over rings.
+
+    The sum times the width of a ring is the force on the layer per delta h.
+    """
     p, layer, cells = machine.numbers, machine.air_layer(), 1000
     omega = 2 * np.pi * p.frequency
     R, h0 = float(layer.R), float(layer.h0)
@@ -111,7 +111,7 @@ def borne_fraction_formula(machine: Machine) -> Numbers:
 
 
 def _two_forces(machine: Machine) -> float:
-    """Viscous over rate-dependent force of one oscillation, each from its own definition."""
+    """Viscous over rate-dependent force of an oscillation, each force from its definition."""
     p, V = machine.numbers, machine.numbers.shear_viscosity_velocity
     law, omega, amplitude = machine.slider(RR).law, 2 * np.pi * p.frequency, 1e-9
     velocity = omega * amplitude

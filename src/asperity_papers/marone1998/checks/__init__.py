@@ -7,5 +7,5 @@ from asperity_papers.marone1998.laboratory import Laboratory
 
 
 def model(numbers: Material) -> Laboratory:
-    """The argument of the checks."""
+    """The argument of the checks: the paper's interfaces on its springs."""
     return Laboratory(numbers)

@@ -1,4 +1,4 @@
-"""Claims on slide-hold-slide tests: Figure 3 and what the text says of the models there."""
+"""Claims on slide-hold-slide tests: Figure 3 and the text on its models."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from asperity_papers.marone1998.laboratory import (
     scans,
 )
 
-#: Hold times (s) of the claims that name none, and stiffnesses (1/m) of those on stiffness.
+#: Hold times (s) of claims without a hold time; stiffnesses (1/m) of claims on stiffness.
 TIMES = np.array([1.0, 10.0, 100.0, 1e3, 1e4])
 STIFFNESSES = np.logspace(3, 6, 10)
 
 
 def pairs(name: str) -> tuple[Float, Float]:
-    """Two columns of a reading of Figure 3."""
+    """Hold times (s) and healing that were read off a curve of Figure 3."""
     table = np.array(scans()["figure_3"][name])
     return table[:, 0], table[:, 1]
 
 
 def relative(new: Float, old: Float) -> float:
-    """The largest relative change."""
+    """Largest relative difference."""
     return float(np.max(np.abs(new / old - 1)))
 
 
 @check("maximum-at-load-velocity")
 def maximum_at_load_velocity(laboratory: Laboratory) -> Numbers:
-    def off(name: str) -> Float:
+    def distance(name: str) -> Float:
         held, law = laboratory.holds(name, *laboratory.stiff, TIMES), laboratory.granite(name)
         rate_term = law.A * np.log(held.velocity_at_maximum / held.velocity)
         return np.max(np.abs(rate_term)) / law.A
 
-    return by_law(off)
+    return by_law(distance)
 
 
 @check("ageing-soft")
@@ -53,7 +53,7 @@ def ageing_soft(laboratory: Laboratory) -> Numbers:
 @check("ageing-stiff", AGEING, "ageing")
 @check("slip-curves", SLIP, "slip")
 @check("prz-curves", PRZ, "perrin_rice_zheng")
-def off_the_curve(laboratory: Laboratory, name: str, reading: str) -> Numbers:
+def distance_from_curve(laboratory: Laboratory, name: str, reading: str) -> Numbers:
     times, read = pairs(reading)
     healing = laboratory.healing(name, *laboratory.stiff, times)
     return by_time(times, healing - read, "off at ") | by_time(times, healing)
@@ -161,8 +161,8 @@ def prz_below_data(laboratory: Laboratory) -> Numbers:
 
 def _misfit(laboratory: Laboratory, V: float) -> float:
     times, read = pairs("stiff")
-    off = laboratory.healing(AGEING, laboratory.numbers.k_stiff, V, times) - read
-    return float(np.sqrt(np.mean(off**2)))
+    difference = laboratory.healing(AGEING, laboratory.numbers.k_stiff, V, times) - read
+    return float(np.sqrt(np.mean(difference**2)))
 
 
 @check("actual-velocities-improve")
@@ -189,16 +189,16 @@ def data_same(laboratory: Laboratory) -> Numbers:
 
 @check("healing-scales-as-b")
 def healing_scales_as_b(laboratory: Laboratory) -> Numbers:
-    off = {}
+    ratios = {}
     for B in (0.009, 0.012, 0.018):
         slope = laboratory.slope(AGEING, *laboratory.soft, 1e6, 1e7, B=B)
-        off[f"b = {B:g}"] = float(slope / (B * np.log(10)))
-    return off
+        ratios[f"b = {B:g}"] = float(slope / (B * np.log(10)))
+    return ratios
 
 
 @check("long-hold-limit")
 def long_hold_limit(laboratory: Laboratory) -> Numbers:
-    """theta/t, and V over the drive's, towards a hold of 1e5 s at both springs."""
+    """theta/t, and V over the velocity of the drive, after long holds with both springs."""
     numbers: Numbers = {}
     times = np.array([1e3, 1e4, 1e5])
     for label, (k, V) in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
@@ -229,11 +229,11 @@ def product(laboratory: Laboratory) -> Numbers:
     p = laboratory.numbers
     V, time = p.V_soft * np.array([1.0, 10.0]), np.array([1e3, 1e2])
 
-    def off(name: str) -> Float:
-        one, other = laboratory.healing(name, p.k_stiff, V, time)
-        return other / one - 1
+    def change(name: str) -> Float:
+        slow, fast = laboratory.healing(name, p.k_stiff, V, time)
+        return fast / slow - 1
 
-    return by_law(off)
+    return by_law(change)
 
 
 @check("faster-falls-faster")
@@ -277,8 +277,8 @@ def not_the_direct_effect(laboratory: Laboratory) -> Numbers:
 def stress_falls_by_slip(laboratory: Laboratory) -> Numbers:
     k, V = laboratory.stiff
 
-    def off(name: str) -> float:
+    def difference(name: str) -> float:
         held = laboratory.holds(name, k, V, TIMES)
         return relative(held.relaxation, k * held.hold_slip)
 
-    return by_law(off)
+    return by_law(difference)

@@ -1,4 +1,4 @@
-"""Claims on velocity steps: Figure 2 and what the text says of it."""
+"""Claims on velocity steps: Figure 2 and the text on it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from asperity_papers.marone1998.laboratory import (
     by_law,
 )
 
-#: Stiffness over the paper's of a spring that hardly yields.
+#: Stiffness of a nearly rigid spring, in multiples of the paper's.
 _STIFF = 1e4
 
 
@@ -54,7 +54,7 @@ def figure_2(laboratory: Laboratory, name: str) -> Numbers:
 @check("peak-height", "direct")
 @check("peak-to-end", "evolution")
 def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
-    """Change of friction at the printed stiffness, and at one so high that it does not matter."""
+    """Change of friction with the printed spring, and with a nearly rigid spring."""
 
     def change(law: str, *stiffness: float) -> float:
         return float(getattr(up_and_down(laboratory, law, *stiffness), name)[0])
@@ -65,7 +65,7 @@ def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
 
 @check("end-level")
 def end_level(laboratory: Laboratory) -> Numbers:
-    """Drop of friction 7 Dc after the step, by integration, and in the limit."""
+    """Drop of friction from before the step to 7 Dc after it, and to steady sliding."""
     p = laboratory.numbers
     slow, fast = laboratory.pair("V_2")
     steps = Programme(Slide(7 * p.D0_2 / fast, velocity=fast), load=1.0, velocity=slow)

@@ -12,7 +12,7 @@ from asperity_papers.marone1998.laboratory import AGEING, DECADE, Laboratory, Nu
 
 @check("decade-of-velocity")
 def decade_of_velocity(laboratory: Laboratory) -> Numbers:
-    """Healing and static friction itself, a decade of velocity apart, of the gouge of Figure 5."""
+    """Change of healing and of static friction of the gouge of Figure 5 per decade of velocity."""
     p, law = laboratory.numbers, laboratory.gouge()
     held = hold_response(
         law, hold_time=1e4, velocity=laboratory.pair("V_5"), stiffness=p.k_stiff, settling=False
@@ -80,11 +80,11 @@ def afterslip_relation(laboratory: Laboratory) -> Numbers:
     t, u = np.array(scan["slip"]).T
     after = u[1:] - u[0]
 
-    def off(p: np.ndarray) -> np.ndarray:
+    def residuals(p: np.ndarray) -> np.ndarray:
         alpha, rate = np.exp(p)
         return np.asarray(alpha * np.log1p(rate * t[1:]) - after)
 
-    fit = least_squares(off, np.log([40.0, 1.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    fit = least_squares(residuals, np.log([40.0, 1.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
     alpha, rate = np.exp(fit.x)
     return {
         "worst": float(np.max(np.abs(fit.fun)) / (2 * scan["pixel"])),
@@ -94,7 +94,7 @@ def afterslip_relation(laboratory: Laboratory) -> Numbers:
 
 @check("maximum-condition")
 def maximum_condition(laboratory: Laboratory) -> Numbers:
-    """One plus what is said to vanish at the maximum: healing as printed, d mu/dt over k V."""
+    """1 plus the quantity that is zero at the maximum: printed, healing; derived, mu'/(k V)."""
     k, V = laboratory.stiff
     held = laboratory.holds(AGEING, k, V, 1e3)
     return {
@@ -107,5 +107,5 @@ def maximum_condition(laboratory: Laboratory) -> Numbers:
 @check("memory-length-against-strain")
 @check("distance-to-weakening")
 def not_readable(laboratory: Laboratory) -> Numbers:
-    """Nothing: the points of Figures 8 and 12 are not among the readings."""
+    """No numbers: scans.toml has no readings of Figures 8 and 12."""
     return {}

@@ -19,9 +19,9 @@ from typing import Any, TypeVar
 
 from asperity._version import __version__
 from asperity.errors import InputError, require
+from asperity.outputs.atomic import replaced, to_disk, writable
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
-from asperity.outputs.written import replaced, to_disk, writable
 from asperity.parameters.arguments import typed
 
 _Result = TypeVar("_Result")

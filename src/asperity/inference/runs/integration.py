@@ -28,9 +28,9 @@ from asperity.algebra.runge_kutta import rodas_5p
 from asperity.algebra.small_systems import apply, inverse_points
 from asperity.arrays import Float
 from asperity.inference.runs.drive import Drive, excitation, shifted
-from asperity.inference.runs.reading import GAIN
+from asperity.inference.runs.gauge import GAIN
 from asperity.slider.motion import Motion
-from asperity.slider.named import slider_from
+from asperity.slider.parameters import slider_from
 
 #: Relative and absolute local error of a step, for states of order 1.
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-9
