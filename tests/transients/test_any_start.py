@@ -75,14 +75,11 @@ def test_any_start_ends_with_numbers_or_a_reason(law):
 
 @pytest.mark.parametrize(
     ("law", "options"),
-    population(
-        [
-            ("rice-ruina", {"radiation_damping": 1e3}),
-            ("elasto-plastic", {"inertia": True}),
-            ("regularised", {"inertia": True}),
-        ],
-        short=2,
-    ),
+    [
+        ("rice-ruina", {"radiation_damping": 1e3}),
+        ("elasto-plastic", {"inertia": True}),
+        pytest.param("regularised", {"inertia": True}, marks=pytest.mark.long),
+    ],
 )
 def test_any_start_with_inertia_or_damping_ends_with_numbers_or_a_reason(law, options):
     slider = slider_of(law)
