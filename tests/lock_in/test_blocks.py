@@ -5,7 +5,9 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.lock_in.demodulation import LockInStream, lock_in
+from asperity.lock_in.noise import _at_lines
 from asperity.lock_in.normal_equations import Basis, even_step, join, merged, sums
+from asperity.lock_in.reference import window_basis
 
 TIME = 3.0 + np.arange(20_011) * 1e-3
 BASIS = Basis(2 * np.pi * 61.3, 3, 2, 13.0, 10.005)
@@ -42,6 +44,27 @@ def test_sums_of_blocks_add_up_to_those_of_the_whole(blocks, tables) -> None:
     assert abs(moments - columns @ np.stack(values, axis=1)).max() < 1e-8
     assert block_sums.count.sum() == TIME.size
     assert block_sums.middle @ block_sums.count / TIME.size == pytest.approx(TIME.mean(), rel=1e-12)
+
+
+def test_the_last_blocks_have_the_columns_of_their_own_window() -> None:
+    values = channels(TIME)
+    last = sums(BASIS, TIME, values, blocks=7)
+    first = int(last.count[:3].sum())
+    own = window_basis(TIME[first:], BASIS.omega, BASIS.harmonics, BASIS.degree)
+    gram, moments = last.after(3, own).totals()
+    columns = plain(own, TIME[first:])
+    assert abs(gram - columns @ columns.T).max() < 1e-9 * TIME.size / 1e3
+    expected = columns @ np.stack([channel[first:] for channel in values], axis=1)
+    assert abs(moments - expected).max() < 1e-8
+
+
+def test_lines_of_a_spectrum_are_sums_of_their_exponentials() -> None:
+    rng = np.random.default_rng(3)
+    at = np.sort(rng.uniform(-0.5, 0.5, 300))
+    residual = rng.standard_normal((300, 2)) + 1j * rng.standard_normal((300, 2))
+    for steps in (np.array([40, -37, 3, 7, 81]), np.array([5]), np.arange(2, 98)):
+        expected = np.exp(-1j * np.pi * np.outer(steps, at)) @ residual
+        np.testing.assert_allclose(_at_lines(steps, at, residual), expected, atol=1e-11)
 
 
 def jittering(time):

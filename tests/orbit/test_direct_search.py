@@ -8,9 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from asperity import Slider
 from asperity.errors import InputError
+from asperity.laws import RiceRuina
 from asperity.orbit import KnownOrbits, Outcome, response_function
 from asperity.orbit.gradient import search as direct
+from asperity.orbit.methods.settled import settled_orbits
+from asperity.slider.problem import checked_problem, flatten
 
 #: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast
 #: method finds none of these orbits.
@@ -95,6 +99,17 @@ def test_a_motion_that_runs_away_has_no_orbit_and_ends_a_search_for_every_one():
     values, slopes = DIRECT.value_and_jacobian(fine, every=True)
     assert values.mean_friction == pytest.approx(each.mean_friction[[0, 2]], rel=1e-9)
     assert np.isfinite(slopes["A"].mean_friction).all()
+
+
+def test_a_transient_that_goes_on_for_many_periods_is_not_taken_for_periodic():
+    """Near the critical stiffness a disturbance decays by a few per cent in a period."""
+    A, B, D0, load, V = 0.008, 0.009, 3e-6, 50e6, 1.2e-9
+    critical = (B - A) * load / D0
+    law = RiceRuina(mu0=0.6, A=A, B=B, D0=D0, V0=1e-6)
+    slider = Slider(law, spring=critical * np.array([1.02, 2.0]), load=load)
+    drive = {"velocity": V, "epsilon": 4e-5, "frequency": 1 / (3600 * 12.42)}
+    problem = flatten(checked_problem(slider, **drive))[0]
+    assert settled_orbits(problem, np.arange(2))[1].tolist() == [1]
 
 
 def test_orbits_of_an_earlier_call_lead_to_those_of_the_search():
