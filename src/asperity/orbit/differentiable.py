@@ -249,10 +249,9 @@ class ResponseFunction:
             raise InputError(
                 f"parameters must be complete, got none for {', '.join(missing)}; give them in SI"
             )
-        table = equations.table()
         given = {
             n: obeying(given.get(n, 0.0), f"parameters['{n}']", p.kind, p.rule)
-            for n, p in table.items()
+            for n, p in equations.table.items()
         }
         traced = any(isinstance(v, jax.core.Tracer) for v in given.values())
         shapes = {n: np.shape(v) for n, v in given.items()}

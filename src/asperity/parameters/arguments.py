@@ -74,19 +74,27 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
     if isinstance(function, type):
         function.__init__ = typed(function.__init__)  # type: ignore[misc]
         return function
-    signature = inspect.signature(function)
-    known = cache(lambda: annotations_of(function))
+    kinds = cache(lambda: annotations_of(function))
+    parameters = inspect.signature(function).parameters.values()
+    positional = [
+        p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+    ]
+    several = next((p.name for p in parameters if p.kind is p.VAR_POSITIONAL), None)
 
     @wraps(function)
     def call(*args: P.args, **keywords: P.kwargs) -> R:
-        try:
-            bound = signature.bind(*args, **keywords)
-        except TypeError as error:
-            raise TypeError(f"{function.__qualname__}() {error}") from None
-        for name, kind in known().items():
-            if name in bound.arguments:
-                bound.arguments[name] = of_type(bound.arguments[name], kind, name)
-        return function(*bound.args, **bound.kwargs)
+        known, count = kinds(), len(positional)
+        checked: Any = [
+            of_type(value, known[name], name) if name in known else value
+            for name, value in zip(positional, args, strict=False)
+        ]
+        further: Any = args[count:]
+        if further and several in known:
+            further = of_type(further, known[several], several)
+        for name, kind in known.items():
+            if name in keywords:
+                keywords[name] = of_type(keywords[name], kind, name)
+        return function(*checked, *further, **keywords)
 
     return call
 
@@ -121,6 +129,7 @@ class _OtherTypeError(Exception):
     """A value that an annotation does not allow."""
 
 
+@cache
 def _origin_and_parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
     # NumPy's NDArray and ArrayLike are named aliases on Python 3.12 and later.
     kind = getattr(get_origin(kind) or kind, "__value__", kind)

@@ -129,7 +129,6 @@ def recorded_friction(
     return (f, jacobian) if good else None
 
 
-@eqx.filter_jit
 def through(
     motion: Motion,
     free: Free,
@@ -163,20 +162,40 @@ def through(
     done : array, shape ()
         Whether the end was reached.
     """
+    curve, slopes, steps, done = _integrated(motion, free, given, drive, room)
+    return *_read(motion, free, given, drive, reading, curve, slopes, steps), done
+
+
+#: Compiled apart from the reading: recordings of any number of samples share the program of a law,
+#: which takes most of the time to compile.
+_integrated = eqx.filter_jit(integrated)
+
+
+@eqx.filter_jit
+def _read(
+    motion: Motion,
+    free: Free,
+    given: dict[str, Any],
+    drive: Drive,
+    reading: Reading,
+    curve: Curve,
+    slopes: Curve,
+    steps: Array,
+) -> tuple[Array, Array]:
+    """Friction as recorded, and its derivatives, from the motion and its derivatives."""
     x = free.numbers(given)
-    curve, slopes, steps, done = integrated(motion, free, given, drive, room)
 
     def friction(curve: Curve, x: Array) -> Array:
         return _recorded(motion, drive, free.values(given, x), curve, steps, reading)
 
     f = friction(curve, x)
     if not len(free.directions):
-        return f, jnp.zeros((0, f.size)), done
+        return f, jnp.zeros((0, f.size))
 
     def along(change: Curve, direction: Array) -> Array:
         return jax.jvp(friction, (curve, x), (change, direction))[1]
 
-    return f, jax.vmap(along)(slopes, free.directions), done
+    return f, jax.vmap(along)(slopes, free.directions)
 
 
 def _recorded(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple
 
 import jax
@@ -69,14 +69,14 @@ class ParametrisedProblem:
         """Whether the equations need elastic asperities."""
         return self.motion in (Inertial, RadiatingAsperities)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all parameters: of the law, K, W0, M, V, frequency, eta, and of the load."""
         eta = ("eta",) if self.damped else ()
         of_law = law_parameters(self.law)
         return (*of_law, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
 
-    @property
+    @cached_property
     def load_names(self) -> tuple[str, ...]:
         """Names of the parameters of the load."""
         if self.coefficients is None:
@@ -93,6 +93,7 @@ class ParametrisedProblem:
         """Names of parameters without influence, which a caller may leave out."""
         return () if self.massive else ("M",)
 
+    @cached_property
     def table(self) -> dict[str, Parameter]:
         """Kind, rule and meaning of each parameter, in the order of `names`."""
         known = point_parameters(self.law)
@@ -157,7 +158,7 @@ class ParametrisedProblem:
     def valid(self, parameters: Mapping[str, Array]) -> Array:
         """Mask of the points whose parameters all obey their rules, shape (points,)."""
         good = [jnp.isfinite(parameters[name]) for name in self.names]
-        for name, parameter in self.table().items():
+        for name, parameter in self.table.items():
             if parameter.rule != "finite":
                 good.append(RULES[parameter.rule].holds(parameters[name]))
         return jnp.stack(good).all(0)
