@@ -4,6 +4,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,6 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 from benchmarks.random_truths import FREE as ALL_FREE, drawn_table, fast_point, slow_point
 from click.testing import CliRunner
-from scipy.integrate import quad
 
 from asperity import Slider, periodic_response, samples
 from asperity.cli.main import main
@@ -74,7 +74,7 @@ def test_laws_are_compared_without_naming_what_is_free(made, pmma):
     fixed = {"K": pmma.K, "W0": pmma.W0, "B": pmma.B, "D0": pmma.D0}
     laws = ("rice-ruina", "elasto-plastic", "cut-off")
     comparison = compare(
-        made("elasto-plastic", 1), laws, fixed=fixed, material=pmma, evidence=False
+        made("elasto-plastic", 1), laws, fixed=fixed, material=pmma, evidence=False, starts=1
     )
     own = {name: list(j.fit.parameters) for name, j in comparison.laws.items()}
     assert own == {"elasto-plastic": ["A", "lambda", "eps_ratio"], "rice-ruina": ["A", "eps_ratio"]}
@@ -140,7 +140,9 @@ def test_errors_too_small_exclude_no_law_by_their_size(judged):
     comparison = judged("rice-ruina", 3, claimed=1 / 3, laws=LAWS[:2])
     assert not comparison.decided
     assert "too small by a factor of about 3" in comparison.verdict
+    # No other stiffness would describe these data.
     assert "with K free" not in comparison.verdict.lower()
+    assert comparison.laws["rice-ruina"].fit.p_value < 1e-3
     assert not any(j.excluded for j in comparison.laws.values())
 
 
@@ -159,13 +161,6 @@ def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma):
     assert high < wrong
 
 
-def test_no_stiffness_is_named_where_none_would_do(made, pmma):
-    table = made("rice-ruina", 3, claimed=1 / 3)
-    result = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma)
-    assert result.p_value < 1e-3
-    assert not any("with K free" in w for w in result.warnings)
-
-
 def test_errors_too_large_leave_what_the_data_show(judged):
     comparison = judged("elasto-plastic", 4, claimed=3.0, laws=LAWS[::2])
     assert comparison.best == "elasto-plastic"
@@ -174,19 +169,21 @@ def test_errors_too_large_leave_what_the_data_show(judged):
     )
 
 
-def test_an_outlier_is_named_and_does_not_decide(judged):
-    comparison = judged("elasto-plastic", 5, spoiled=5, by=0.4, laws=LAWS[::2])
-    assert comparison.left_out == ("row 6",)
-    assert "row 6" in comparison.verdict
-    assert comparison.decided
-    assert comparison.best == "elasto-plastic"
-
-
 def test_a_law_that_is_wrong_everywhere_has_no_outliers(made, pmma):
-    result = fit(made("elasto-plastic", 6), "rice-ruina", ("eps_ratio", "A"), material=pmma)
+    free = {"free": ("eps_ratio", "A"), "material": pmma, "check_stiffness": False}
+    result = fit(made("elasto-plastic", 6), "rice-ruina", **free)
     assert result.p_value < 1e-6
     assert outlying_rows(result.residuals[0]) == []
     assert not any("check that reading" in w for w in result.warnings)
+
+
+def integral_of(density, middle, reach):
+    """Integral of a density like a normal one, whose width is an eighth of `reach`.
+
+    The trapezium rule in steps of half the width is off by exp(-8 pi^2) for a normal density.
+    """
+    x = np.linspace(middle - reach, middle + reach, 33)
+    return np.trapezoid([density(each) for each in x], x)
 
 
 def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
@@ -202,7 +199,7 @@ def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
 
     middle = math.log(value)
     reach = 8 * se / value
-    integral = quad(density, middle - reach, middle + reach, epsrel=1e-4)[0]
+    integral = integral_of(density, middle, reach)
     expected = result.log_likelihood + math.log(integral)
     assert evidence.log == pytest.approx(expected, abs=5 * evidence.standard_error + 1e-3)
     assert evidence.effective_samples > 300
@@ -224,6 +221,7 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
         middle = math.log(others.values["eps_ratio"])
         reach = 8 * others.parameters["eps_ratio"].se / others.values["eps_ratio"]
 
+        @cache
         def posterior(x, others=others):
             return math.exp(0.5 * (others.chi2 - others.objective.chi2(np.array([x]))))
 
@@ -231,8 +229,7 @@ def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
             apart = of_run.objective.log_likelihood(np.array([x])) - of_run.log_likelihood
             return posterior(x) * math.exp(apart)
 
-        low, high = middle - reach, middle + reach
-        whole, part = (quad(f, low, high, epsrel=1e-4)[0] for f in (posterior, product))
+        whole, part = (integral_of(f, middle, reach) for f in (posterior, product))
         expected = of_run.log_likelihood + math.log(part / whole)
         assert validation.runs[name] == pytest.approx(expected, abs=0.05)
     assert validation.log_density == pytest.approx(sum(validation.runs.values()))
@@ -372,6 +369,8 @@ def test_the_command_leaves_outliers_out(made, tmp_path, start):
     assert done.exit_code == 0, done.output
     record = json.loads(done.stdout)
     assert record["left_out"] == [f"row {row + 1}" for row in rows]
+    assert all(name in record["verdict"] for name in record["left_out"])
+    assert record["decided"]
     assert record["best"] == law == "elasto-plastic"
     assert not record["laws"][law]["excluded"]
 
