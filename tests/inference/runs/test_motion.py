@@ -1,5 +1,6 @@
 """Motion over a whole recording and its derivatives, compared with SciPy."""
 
+import jax
 import numpy as np
 import pytest
 from benchmarks.coverage import integrated
@@ -63,6 +64,27 @@ def test_derivatives_agree_with_scipy(computed, name):
     np.testing.assert_allclose(
         derivative[away_from_step], expected[away_from_step], atol=1e-3 * scale
     )
+
+
+def test_recordings_of_any_length_share_the_compiled_motion():
+    drive = Drive(EDGES, PULL, np.ones(4), LOAD_SLOPE)
+    few = recorded_friction(MOTION, AT, FREE, drive, reading_at(TIMES))
+    compiled = []
+
+    def listen(event, *_, fun_name="", **__):
+        if event.endswith("backend_compile_duration"):
+            compiled.append(fun_name)
+
+    times = np.linspace(0.0, 70.0, 20 * 280 + 1)
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        many = recorded_friction(MOTION, AT, FREE, drive, reading_at(times))
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    assert any("_read" in name for name in compiled), compiled
+    assert not any("integrated" in name for name in compiled), compiled
+    for a, b in zip(many, few, strict=True):
+        np.testing.assert_allclose(a[::20], b, rtol=1e-9, atol=1e-12)
 
 
 def test_means_over_blocks_agree_with_scipy():
