@@ -24,7 +24,7 @@ def slow(shooting):
 def _long_steps():
     """Each point of a boundary is solved by itself: longer steps leave fewer of them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(BoundaryHalf, "control", BoundaryHalf.control._replace(longest=0.08))
+        patch.setattr(BoundaryHalf, "control", BoundaryHalf.control._replace(longest=0.2))
         yield
 
 

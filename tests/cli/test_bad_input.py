@@ -722,10 +722,18 @@ def test_an_option_without_influence_is_refused(
     assert not any(tmp_path.iterdir())
 
 
-def test_a_phase_counts_with_an_axis_of_its_amplitude(asperity, tmp_path) -> None:
+def test_a_phase_counts_with_an_axis_of_its_amplitude(asperity, tmp_path, monkeypatch) -> None:
+    class MappedError(Exception):
+        pass
+
+    def mapped(out, law, numbers, **_):
+        raise MappedError(numbers["epsilon2_phase"].value)
+
+    monkeypatch.setattr("asperity.study.map.write_map", mapped)
     axes = ("--x", "epsilon=0.05:0.1:2", "--y", "epsilon2=0.05:0.1:2")
     call = ("map", *SLIDING, "-f", "120 Hz", *axes, "--set", "epsilon2_phase=1")
-    assert asperity(*call, "--out", tmp_path / "m.nc").exit_code == 0
+    with pytest.raises(MappedError, match=r"^1\.0$"):
+        main([*call, "--out", str(tmp_path / "m.nc")], standalone_mode=False)
 
 
 def test_a_decimal_comma_is_named(asperity) -> None:

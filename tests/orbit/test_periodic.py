@@ -68,6 +68,7 @@ FURTHER = {
 #: asperities, and for one of three states.
 SUITE = ("rice-ruina", "elasto-plastic")
 PAPER = population([*SUITE, *(name for name in LAWS if name not in SUITE)], short=2)
+SHARP = "rice-ruina, sharpest pulse"
 BEYOND = population(["two-state", *(name for name in FURTHER if name != "two-state")])
 #: V, eps, f. Fast modulation, for every law.
 FAST = [(V, eps, 120.0) for V in (1e-7, 1e-6) for eps in (0.005, 0.24, 0.5, 0.9)]
@@ -77,7 +78,7 @@ SLOW = [(1e-4, 0.005, 120.0), (1e-4, 0.24, 120.0), (1e-4, 0.9, 120.0), (1e-5, 0.
 SLOW += [(1e-7, 0.5, 1.0), (1e-6, 0.005, 1.0), (1e-6, 0.9, 1.0)]
 #: The same, of orbits to which the branch from steady sliding is followed.
 FOLLOWED = [(1e-6, 0.24, 0.4), (1e-5, 0.5, 4.0)]
-#: A pulse on the finest mesh, which takes as long as all other points: of one law.
+#: A pulse on the finest mesh, which takes as long as all other points: of one law, long.
 SHARPEST = (1e-5, 0.9, 1.0)
 #: Where the first grid of the fast method is enough, and one point for which it is not.
 MILD = [(V, eps, 120.0) for V in (1e-6, 3e-6) for eps in (0.005, 0.05)]
@@ -85,7 +86,7 @@ STRONG = (1e-6, 0.12, 120.0)
 #: One law with and one without elastic asperities: each has the robust method compiled, one of them
 #: with the way along branches. The others have the points that the fast method answers.
 POINTS = {name: FAST + SLOW * (name in ("rice-ruina", "elasto-plastic")) for name in LAWS}
-POINTS["rice-ruina"] = [*FAST, SHARPEST, *SLOW, *FOLLOWED]
+POINTS |= {"rice-ruina": [*FAST, *SLOW, *FOLLOWED], SHARP: [SHARPEST]}
 POINTS |= {
     name: [point for point in FAST if point[1] < 0.9]
     for name in ("elasto-plastic-age", "strength-area")
@@ -101,18 +102,23 @@ def respond(name, V, epsilon, frequency, **options):
 @cache
 def solved(name):
     """Response of a law at its points."""
-    return respond(name, *np.transpose(POINTS[name]))
+    return respond(law_of(name), *np.transpose(POINTS[name]))
 
 
-@pytest.fixture(scope="module", params=PAPER)
+def law_of(name):
+    """Law of a case: that before a comma."""
+    return name.partition(",")[0]
+
+
+@pytest.fixture(scope="module", params=[*PAPER, pytest.param(SHARP, marks=pytest.mark.long)])
 def case(request, reference):
-    """Name of a law, its response, and the reference's solution.
+    """Name of a case, its response, and the reference's solution.
 
     The reference's Newton's method starts from the package's orbit, 0.1 % off.
     """
     name = request.param
     V, epsilon, frequency = np.transpose(POINTS[name])[..., None]
-    printed = reference.Printed(V=V, frequency=frequency, **LAWS[name][1])
+    printed = reference.Printed(V=V, frequency=frequency, **LAWS[law_of(name)][1])
     force, log_slip = solved(name).waveform[..., :: SAMPLES // SEGMENTS]
     shot = reference.multiple_shooting(printed, epsilon, force, 1.001 * log_slip)
     return name, solved(name), shot

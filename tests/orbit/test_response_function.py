@@ -263,7 +263,8 @@ def test_law_without_dynamics_is_refused():
 NAMES = ["A", "D0", "K", "V", "epsilon"]
 
 
-@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic"])
+#: `DAMPED` and the orbits of the search below have rigid asperities in every run.
+@pytest.mark.parametrize("law", population(["elasto-plastic", "rice-ruina"]))
 class TestInertiaAndDamping:
     """Both at once, so that one program has both; by the fast method."""
 

@@ -51,5 +51,5 @@ def test_the_amplitude_at_which_the_slider_comes_to_rest_is_that_of_the_printed_
     assert f"comes to rest once a period from epsilon = {limit:.3g} on" in stopped.result[()]
     below = response(0.999 * limit)
     assert below.stable
-    assert not rest_within(20, below.start, 0.999 * limit)
-    assert rest_within(20, below.start, 1.001 * limit)
+    assert not rest_within(4, below.start, 0.999 * limit)
+    assert rest_within(4, below.start, 1.001 * limit)

@@ -21,8 +21,8 @@ OTHERS = {
     "prakash-clifton": {"L": "1 um", "V_star": "1 um/s"},
 }
 LAWS = [name for name, law in registered().items() if law.rate_dependent]
-#: In every run: two and three states, elastic asperities, rest and reversal.
-SUITE = ("rice-ruina", "two-state", "elasto-plastic", "regularised")
+#: In every run: rigid and elastic asperities, rest and reversal.
+SUITE = ("rice-ruina", "elasto-plastic", "regularised")
 HOLD = Programme(Hold("1 s"), load=7.0, velocity="1 um/s")
 
 

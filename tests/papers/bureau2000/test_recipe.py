@@ -86,7 +86,9 @@ def test_measurements_without_noise_give_the_true_values(recovered):
 def test_a_bifurcation_that_occurs_twice_is_named(exact, recovered):
     columns, bifurcations = exact
     twice = {n: np.append(c, c[0]) for n, c in bifurcations.items()}
-    found = paper_procedure(table_of(columns), Thresholds("ends", **twice), fixed=MACHINE)
+    # Without the rows of the later steps, which are left out.
+    steady = {n: c if np.ndim(c) == 0 else c[:6] for n, c in columns.items()}
+    found = paper_procedure(table_of(steady), Thresholds("ends", **twice), fixed=MACHINE)
     assert "row 3 of ends is equal to row 1 of ends: remove it" in found.warnings[0]
     assert not any("is equal to" in warning for warning in recovered.warnings)
 

@@ -1,8 +1,11 @@
 """The virtual experiment: measurements of simulated recordings, compared with computed orbits."""
 
+import os
+
 import numpy as np
 import pandas as pd
 import pytest
+from loky import cpu_count
 from scipy.stats import binom
 
 import asperity as asp
@@ -63,6 +66,12 @@ def test_the_series_are_those_of_the_paper(experiment):
         assert len(set(series.seeds)) == 3
     seeds = [seed for series in all_series() for seed in series.seeds]
     assert len(set(seeds)) == len(seeds)
+
+
+def test_the_experiment_runs_in_another_process_if_there_is_a_second_core(monkeypatch):
+    monkeypatch.setattr(recordings, "experiment", os.getpid)
+    with recordings.experiment_in_background() as process:
+        assert (process() == os.getpid()) == (cpu_count() < 2)
 
 
 def test_the_machine_has_the_eps_eff_of_all_figures():

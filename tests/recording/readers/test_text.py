@@ -374,17 +374,17 @@ def test_a_first_row_with_surplus_cells_moves_no_column(written, planted):
     assert [f.name for f in trace.findings if f.severity == "error"] == ["malformed row"]
 
 
-def test_a_table_of_20000_columns_is_read_with_one_finding(written):
-    values = np.round(np.random.default_rng(0).normal(size=(6, 20_000)), 4)
+def test_a_table_of_4000_columns_is_read_with_one_finding(written):
+    values = np.round(np.random.default_rng(0).normal(size=(6, 4000)), 4)
     values[:, 0] = np.arange(6) / 100
-    names = ["time (s)", "W (N)", "F (N)", *(f"channel {i}" for i in range(3, 20_000))]
+    names = ["time (s)", "W (N)", "F (N)", *(f"channel {i}" for i in range(3, 4000))]
     rows = "\n".join(",".join(map(str, row)) for row in values.tolist())
     trace = read(written(",".join(names) + "\n" + rows + "\n"))
-    assert len(trace.channels) == 19_999
-    assert np.array_equal(trace.channel("channel 19999").values, values[:, -1])
+    assert len(trace.channels) == 3999
+    assert np.array_equal(trace.channel("channel 3999").values, values[:, -1])
     # One finding describes all columns without a unit.
     (finding,) = [f for f in trace.findings if f.name == "unknown unit"]
-    assert finding.number == 19_997
+    assert finding.number == 3997
 
 
 def test_a_real_file_of_a_triaxial_rig_is_read():
