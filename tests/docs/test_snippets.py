@@ -22,14 +22,12 @@ from references import snippets as pages
 ROOT = pages.ROOT
 #: Pages whose code takes more than about eight seconds. Other tests prove their content in every
 #: run: fits of the same recording and of tables (`tests/inference`), folds, bifurcations and
-#: boundaries (`tests/branches`), slow modulation (`tests/orbit`), other loads (`tests/loads`), and
-#: stick-slip (`tests/experiment`, `tests/measurement`).
+#: boundaries (`tests/branches`).
 SLOW = {
     "docs/tutorials/python.md",
     "docs/tutorials/velocity_step.md",
     *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
     *("docs/healing.md", "docs/fitting.md", "docs/theory/continuation.md"),
-    *("docs/tutorials/faults_and_tides.md", "docs/write_your_own_load.md", "docs/stick_slip.md"),
 }
 #: Pages that `tests/papers/bureau2000/test_claims.py` runs, with its computed ledger.
 ELSEWHERE = {"docs/claims.md"}
