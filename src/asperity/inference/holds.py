@@ -262,17 +262,15 @@ class HoldTerm(DataTerm):
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None where a hold has no solution."""
-        names = tuple(law_parameters(self.law))
+        names = tuple(n for n in values if n in law_parameters(self.law))
         table, rows = self.table, self.table.rows
         at = np.minimum(np.arange(-(-rows // _ROWS) * _ROWS), rows - 1)
-        known = self._fixed | {n: values[n] for n in names if n in values}
+        known = self._fixed | {n: values[n] for n in names}
         given = {n: jnp.full(at.shape, v) for n, v in known.items()}
         drive = (jnp.asarray(x[at]) for x in (table.K, table.V, table.hold_time))
-        # All derivatives, so that fits of other free parameters share the compiled program.
-        predicted, slopes = (np.asarray(a) for a in _with_slopes(self.law, given, *drive))
-        free = [names.index(n) for n in values if n in names]
+        predicted, slopes = (np.asarray(a) for a in _with_slopes(self.law, names, given, *drive))
         columns = np.zeros((rows, len(values)))
-        columns[:, [n in names for n in values]] = slopes[free].T[:rows]
+        columns[:, [n in names for n in values]] = slopes.T[:rows]
         sigma = self.sigma
         whitened = (predicted[:rows] - table.healing) / sigma
         if not (np.isfinite(whitened).all() and np.isfinite(columns).all()):
@@ -313,16 +311,16 @@ class HoldTerm(DataTerm):
         ]
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=(0, 1))
 def _with_slopes(
     law: type[Law],
+    names: tuple[str, ...],
     given: dict[str, Array],
     K: Array,
     V: Array,
     hold_time: Array,
 ) -> tuple[Array, Array]:
-    """Healing, and its derivatives by the parameters of the law, shape (parameters, points)."""
-    names = tuple(law_parameters(law))
+    """Healing, and its derivatives with respect to the named parameters, shape (names, points)."""
 
     def of(values: dict[str, Array]) -> Array:
         slider = slider_from(law, {**given, **values, "K": K, "W0": jnp.ones_like(K)})
