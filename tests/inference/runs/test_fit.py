@@ -318,15 +318,19 @@ def test_a_spike_as_small_as_changes_of_friction_is_left_out_by_the_fit():
 
 
 @pytest.mark.long
-def test_an_unknown_lag_of_the_gauge_makes_no_outliers():
+def test_an_unknown_lag_of_the_gauge_leaves_no_stretch_out():
     """Many samples in a row that depart from the fit are a motion that the law cannot describe."""
     case = CASES["loads"]
     (run,) = runs_of(case, 1)
     lagging = lfilter([0.3], [1.0, -0.7], run.friction, zi=[0.7 * run.friction[0]])[0]
     free = [*FREE, "alpha"]
     result = fit(replace(run, friction=lagging), case.law, free, start=case.true, starts=1)
-    assert result.objective.terms[0].noise["outliers"] == []
-    assert any("just after changes of its drive" in w for w in result.warnings)
+    # Of the samples at intervals of 0.1 s, only one after a change of the drive may be left out.
+    left_out = result.objective.terms[0].noise["outliers"]
+    assert np.all(np.diff(left_out) > 0.15)
+    assert len(left_out) < len(run.drive.edges)
+    (said,) = [w for w in result.warnings if "just after changes of its drive" in w]
+    assert "intervals do not hold" in said
 
 
 def test_each_sample_left_out_costs_the_largest_departure_of_noise(steps_fit):
