@@ -203,6 +203,10 @@ class DataTerm(ABC):
         """The same data, of which half without a solution may be left out; itself without these."""
         return self
 
+    def smoother(self) -> DataTerm:
+        """The same data with larger uncertainties: chi-squared then has fewer minima."""
+        return self
+
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
@@ -486,6 +490,10 @@ class Objective:
     def partial(self) -> Objective:
         """The objective of `DataTerm.partial` data; itself without these."""
         return self._of([term.partial() for term in self.terms])
+
+    def smoother(self) -> Objective:
+        """The objective of `DataTerm.smoother` data."""
+        return self._of([term.smoother() for term in self.terms])
 
     def _of(self, terms: Sequence[DataTerm]) -> Objective:
         same = all(a is b for a, b in zip(terms, self.terms, strict=True))

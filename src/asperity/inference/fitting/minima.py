@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from itertools import islice
 from operator import attrgetter
 
@@ -40,7 +39,7 @@ _SAME, _SAME_COARSE = 1e-3, 0.02
 _RARE, _WITH_SEARCH = 1 / 16, 32
 #: Largest numbers of further starts for a table that no minimum describes: with the fast method,
 #: and with searched orbits. A start of the 600 fast tables leads to the minimum in 3 of 4 cases, in
-#: the worst table in 1 of 12; of 26 slow tables none needed further starts.
+#: the worst table in 1 of 12.
 _FURTHER, _FURTHER_WITH_SEARCH = 32, 6
 #: Rows with which starts are compared.
 _SCREENED_ROWS = 8
@@ -48,7 +47,7 @@ _SCREENED_ROWS = 8
 #: data for each free parameter in them.
 _ROWS, _DATA_EACH = 24, 3
 #: Tolerance of a minimum of the coarse objective, or of a law that is far off; largest number of
-#: its evaluations, and for a law that is far off or as a first look at another memory length.
+#: its evaluations, and the number after which the best minimisations are chosen.
 _COARSE_TOLERANCE, _EVALUATIONS, _FIRST_EVALUATIONS = 1e-3, 60, 12
 #: A law is far off if the probability of chi-squared is lower: its exact minimum and intervals
 #: change no verdict.
@@ -101,7 +100,7 @@ def minima_of(
     minima: list[Minimum] = []
     if not objective.has_table:
         starts = [*special, *_best(objective, drawn_starts, chi2)]
-        minima = _minimised_from(objective.minimise, starts, progress)
+        minima = _minimised_from(objective, starts, progress)
     elif np.isfinite(chi2).sum() >= chi2.size * _RARE:
         minima = _by_solved_rows(objective, drawn_starts, special, progress)
     if not minima:
@@ -119,25 +118,27 @@ def _by_solved_rows(
     little about the minimum that is reached from there. Orbits are searched for if the fast method
     has no solution for some row: as soon as a minimum describes the other rows, or in the end.
     """
-    solved = objective.partial()
-    chi2 = solved.chi2_of_many(np.array(drawn))
-    starts = [*known, *_best(solved, drawn, chi2)]
-    ends = _minimised_from(partial(_roughly, solved), starts, progress)
+    partial = objective.partial()
+    chi2 = partial.chi2_of_many(np.array(drawn))
+    starts = [*known, *_best(partial, drawn, chi2)]
+    ends = _minimised_from(
+        partial, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
+    )
     minima = _on_all_rows(objective, ends)
-    if not _describes(objective, minima) and _describes(solved, ends):
+    if not _describes(objective, minima) and _describes(partial, ends):
         beyond = _with_searched_orbits(objective, ends, minima)
         if _describes(objective, beyond, ends):
             return beyond
         objective.use_search(False)
-    for start in _further(objective, drawn, chi2, starts)[:_FURTHER]:
+    for k, start in enumerate(_further(objective, drawn, chi2, starts)[:_FURTHER]):
         if _describes(objective, minima, ends):
             break
-        new = _roughly(solved, start)
+        new = _from_further_start(partial, start, smoothly=k % 2 > 0)
         if math.isfinite(new.chi2) and _is_new(new, ends):
             ends = sorted([*ends, new], key=_CHI2)
             minima = sorted([*minima, *_on_all_rows(objective, [new])], key=_CHI2)
     minima = distinct(minima)
-    far_off = bool(ends) and _far_off(solved, ends[0])
+    far_off = bool(ends) and _far_off(partial, ends[0])
     lower = bool(minima) and not far_off and ends[0].chi2 < minima[0].chi2 - GAIN
     if ends and (not minima or lower or _blocked(objective, minima[0])):
         return _with_searched_orbits(objective, ends, minima, far_off=far_off)
@@ -172,6 +173,17 @@ def _further(
     taken = {u.tobytes() for u in starts}
     order = (drawn[i] for i in np.argsort(chi2) if math.isfinite(chi2[i]))
     return [u for u in order if u.tobytes() not in taken]
+
+
+def _from_further_start(objective: Objective, start: Float, *, smoothly: bool) -> Minimum:
+    """The rough minimum from a start, optionally by way of that with larger uncertainties."""
+    if smoothly:
+        start = (
+            objective.smoother()
+            .minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS // 2)
+            .u
+        )
+    return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
 
 
 def _describes(
@@ -227,21 +239,21 @@ def _best(objective: Objective, starts: list[Float], chi2: Float) -> list[Float]
 
 
 def _minimised_from(
-    minimise: Callable[[Float], Minimum], starts: Sequence[Float], progress: Progress | None = None
+    objective: Objective,
+    starts: Sequence[Float],
+    progress: Progress | None,
+    *,
+    tolerance: float | None = None,
+    evaluations: int = 100,
 ) -> list[Minimum]:
     """Minima reached from the starts, best first."""
     advance = counted(progress, len(starts))
     advance(0)
     minima = []
     for start in starts:
-        minima.append(minimise(start))
+        minima.append(objective.minimise(start, tolerance=tolerance, evaluations=evaluations))
         advance(1)
     return sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2)
-
-
-def _roughly(objective: Objective, start: Float) -> Minimum:
-    """The minimum reached from a start, to a coarse tolerance."""
-    return objective.minimise(start, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
 
 
 def _by_few_rows(
@@ -259,16 +271,16 @@ def _by_few_rows(
     screened = coarse.thinned(_SCREENED_ROWS) or coarse
     chi2 = screened.chi2_of_many(np.array(drawn))
     starts = [*known, *_best(objective, drawn, chi2)]
-    ends = _minimised_from(partial(_roughly, coarse), starts, progress)
+    roughly = _roughly_minimised(coarse, starts, progress)
     for start in _further(objective, drawn, chi2, starts)[:_FURTHER_WITH_SEARCH]:
-        if _describes(coarse, ends):
+        if _describes(coarse, roughly):
             break
-        new = _roughly(coarse, start)
+        new = _from_further_start(coarse, start, smoothly=True)
         if math.isfinite(new.chi2):
-            ends = sorted([*ends, new], key=_CHI2)
+            roughly = sorted([*roughly, new], key=_CHI2)
     # A law that is far off for few rows does not describe all of them.
-    far_off = bool(ends) and _far_off(coarse, ends[0])
-    minima = _on_all_rows(objective, ends, far_off=far_off)
+    far_off = bool(roughly) and _far_off(coarse, roughly[0])
+    minima = _on_all_rows(objective, roughly, far_off=far_off)
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]
     if minima or (again and far_off):
@@ -280,9 +292,23 @@ def _by_few_rows(
         ends = [_minimised_near(objective, u, [], far_off=True) for u in islice(solved, 1)]
     else:
         chi2 = objective.chi2_of_many(np.array(drawn))
-        starts = [*again, *_best(objective, drawn, chi2)]
-        ends = distinct(_minimised_from(partial(_roughly, objective), starts), _SAME_COARSE)
+        ends = _roughly_minimised(objective, [*again, *_best(objective, drawn, chi2)], None)
     return [end if _far_off(objective, end) else objective.minimise(end.u) for end in ends]
+
+
+def _roughly_minimised(
+    objective: Objective, starts: Sequence[Float], progress: Progress | None
+) -> list[Minimum]:
+    """Minima to a coarse tolerance, best first: few evaluations choose those that are continued."""
+    ends = _minimised_from(
+        objective, starts, progress, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
+    )
+    # In 83 fits, none of 50 minimisations so far above one that describes the data ended lower.
+    highest = ends[0].chi2 + _CONTINUED if _describes(objective, ends) else math.inf
+    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_MINIMISED] if end.chi2 < highest]
+    return _minimised_from(
+        objective, apart, None, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS
+    )
 
 
 def _coarse(objective: Objective) -> Objective | None:
@@ -305,7 +331,7 @@ def _on_all_rows(
     for end in ends:
         if minima and end.chi2 > highest:
             break
-        near = _roughly(coarser, end.u)
+        near = coarser.minimise(end.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
         if len(distinct([*before, near], _SAME_COARSE)) == len(before):
             continue  # the minimum of an earlier end
         before.append(near)
@@ -343,7 +369,9 @@ def _with_other_lengths(objective: Objective, minima: list[Minimum]) -> list[Min
                 best, {i: x}, tolerance=_COARSE_TOLERANCE, evaluations=_FIRST_EVALUATIONS
             )
             if there.chi2 < _HOPELESS * highest:
-                ends.append(_roughly(coarse, there.u))
+                ends.append(
+                    coarse.minimise(there.u, tolerance=_COARSE_TOLERANCE, evaluations=_EVALUATIONS)
+                )
         for side in (-1, 1):
             apart = [
                 end
