@@ -49,7 +49,8 @@ _NEAR = 0.1
 #: orbits this model does not reach, even at the minimum.
 _LEAST_SHARE = 0.5
 #: Relative uncertainty with which chi-squared is smooth: for a table of slow modulation 8 of 12
-#: minimisations reached the minimum with it, and none of 26 with the uncertainties of the table.
+#: minimisations reached the minimum with it, and none of 26 with the uncertainties of the table
+#: (`benchmarks.random_truths --slow`, seed 207 of linker-dieterich).
 _SMOOTHING = 0.3
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
